@@ -1,8 +1,7 @@
-"""The kinds and sizes of a public function's arguments, checked before it runs.
+"""Checks of public functions' arguments against their type hints, before a function runs.
 
-Kinds are those of the type hints. Each package's `__init__` asks for it once, so that a new public
-function is checked too. What is converted at every call anyway, machines and arrays of states, is
-checked where that is done.
+Each package's `__init__` calls `check_arguments` once, which wraps all of the package's public
+functions. Machines and arrays of states are checked by the functions, which convert them anyway.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ _CHECKED_LATER = {
 """Type hints of arguments that the functions themselves check, at no cost."""
 
 _LOOKED_AT = 1000
-"""Longest sequence whose elements are all looked at."""
+"""Longest sequence whose elements are checked, one by one."""
 
 
 _LARGEST = 2**63
-"""Whole numbers are smaller: what counts elements in memory or indexes them."""
+"""Whole numbers must be smaller: they count elements in memory or index them, in 64 bits."""
 
 
 class Between(NamedTuple):

@@ -7,6 +7,8 @@ from reprlib import Repr
 from typing import Any
 
 _LONGEST = 60
+"""Characters of a value that a message shows."""
+
 _brief = Repr()
 _brief.maxstring = _brief.maxother = _brief.maxlong = _LONGEST
 _brief.maxlevel = 3

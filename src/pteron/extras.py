@@ -1,4 +1,4 @@
-"""The command that installs an extra into the Python that runs, from where Pteron came."""
+"""The pip command that installs one of Pteron's optional extras, such as `viewer`, for messages."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from markupsafe import Markup
 from pteron.templates import template
 
 _DIGITS = 5
+"""Significant digits of a number."""
 
 
 class Column(NamedTuple):

@@ -31,7 +31,7 @@ class Playback:
     Attributes
     ----------
     motion : Motion
-        The platform's.
+        The platform's motion.
     forces : array, shape (T, n), or None
         N or N m; None where there are none beside the motion.
     source : str

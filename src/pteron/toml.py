@@ -34,6 +34,8 @@ _BOUNDS = {
     "less_than": "below",
     "less_than_equal": "of at most",
 }
+"""Words of messages for pydantic's kinds of fault."""
+
 _WORDS = {
     "number": "a number",
     "integer": "a whole number",
@@ -41,6 +43,7 @@ _WORDS = {
     "boolean": "true or false",
     "object": "a table",
 }
+"""Words of messages for the types of a JSON schema."""
 
 # Strings and comments are blanked before long keys are sought: dots in them are no keys.
 _STRING_OR_COMMENT = re.compile(

@@ -1,4 +1,4 @@
-"""Controllers: laws from the wanted motion and the measured joints to forces of the drives."""
+"""Controllers: from the reference motion and the measured joints to the forces of the drives."""
 
 from pteron.arguments import check_arguments
 from pteron.controllers.adaptive import Adaptive

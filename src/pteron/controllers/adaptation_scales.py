@@ -1,4 +1,4 @@
-"""Scales of adaptation: how strongly a motion excites each parameter, and how large each may be."""
+"""Scales for adaptive control: how a motion excites each parameter, and how large each may be."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _TYPICAL = 0.5, 5.0
 """Speed and acceleration of a platform point in a typical motion, m/s and m/s^2."""
 
 _TURNS = 10
-"""Directions at each of its poses."""
+"""Random directions of velocity and acceleration at each pose of a typical motion."""
 
 _HARDLY = 1e-3
 """Share of the best excited combination below which another counts as not excited."""
 
 _NEAR = 0.1
-"""Share by which velocities and accelerations are disturbed at most: what errors call for counts
-too. Bounded, as one far sample would slow down all learning."""
+"""Greatest random disturbance of velocities and accelerations, as a share: errors of control move
+the machine too. It is bounded, as one far sample would slow down all learning."""
 
 _SAMPLES = 400
-"""Samples of a motion that are used, at least."""
+"""Least number of samples to which a longer motion is thinned."""
 
 _DRIVES = 0.1
 """The share of a joint's typical force, and of its mass, that a drive may take in any case."""

@@ -18,7 +18,7 @@ from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters
 
 _SHARE = 0.02
-"""The usual rate of adaptation, of the bandwidth."""
+"""The default rate of adaptation over the bandwidth."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Computed torque: forces for the wanted accelerations, corrected by the errors."""
+"""Computed torque control: the forces for the wanted accelerations, corrected by the errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base of all controllers: gains and a period, and from them a law for a machine."""
+"""The abstract base of all controllers: gains, a sampling period, and the making of a law."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pteron.reduction import BaseParameters
 
 @dataclass(frozen=True)
 class Controller(ABC):
-    """A controller: a frozen dataclass of gains; `law` makes what runs of it.
+    """A controller as data, its gains and sampling period; `law` makes the `Law` for a machine.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Proportional and derivative feedback: the poles that errors are to have, as sampled gains."""
+"""The abstract base of controllers with PD feedback: sampled gains from bandwidth and damping."""
 
 from __future__ import annotations
 

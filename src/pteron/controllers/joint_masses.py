@@ -15,11 +15,13 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _POSES = 100
+"""Random poses at which the masses are computed."""
+
 _LEAST = (0.1, 0.01)
-"""Least measures of type I and type II of these poses; less where there are none."""
+"""Least type-I and type-II measures of these poses, in turn: less where there are no such poses."""
 
 _SHARE = 0.1
-"""Share of the poses at which a joint is lighter."""
+"""Share of the poses at which a joint's mass is less than the one returned."""
 
 
 def joint_masses(robot: RobotLike) -> Array:

@@ -1,4 +1,4 @@
-"""The law of a controller for one machine, called at every sample."""
+"""The law of a controller for one machine: a function that is called at every sample."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Dynamics in numbers: batched, validated, documented."""
+"""The public functions of dynamics: forces, accelerations, mass matrix, energies, regressor.
+
+They take a machine and arrays of states, check them, and return arrays.
+"""
 
 from pteron.arguments import check_arguments
 from pteron.dynamics.forces import (

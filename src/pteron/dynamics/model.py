@@ -1,4 +1,4 @@
-"""M x'' + C x' + g = J^T F in numbers, and the energies."""
+"""The terms of the equation of motion M x'' + C x' + g = J^T F at given poses, and the energies."""
 
 from __future__ import annotations
 

@@ -32,8 +32,10 @@ from pteron.kernels.graph import CONSTANT
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 Real = Literal["double", "float"]
+"""C's type of numbers."""
 
 _WIDTH = 97
+"""Width of comments."""
 
 
 def export_c(

@@ -37,6 +37,7 @@ _NAMES = {
 """Names of the exported functions, and of the library's that they are."""
 
 _LOADED = ("inverse_dynamics", "forward_dynamics")
+"""Exported functions that take a wrench on the platform too."""
 
 
 def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:

@@ -14,12 +14,14 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
 Output = Literal["force", "torque", "percent"]
+"""What code returns for the drives: forces at the joints, torques at the motors, or per cent of
+these."""
 
 DRIVEN = ("drive_forces", "feed_forward", "joint_feed_forward", *LAWS)
 """The functions whose forces are those of the drives."""
 
 NAMES = {"force": "forces", "torque": "motor_torques", "percent": "percent_of_rated"}
-"""Names of the output."""
+"""Names of the outputs in these units."""
 
 _NEEDS = {"force": (), "torque": ("ratio",), "percent": ("ratio", "rated_torque")}
 """Keys of the drive that each output needs."""

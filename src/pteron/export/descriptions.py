@@ -1,4 +1,4 @@
-"""Texts in generated code: summaries of functions, meanings of inputs and outputs, tables."""
+"""Texts in generated code: what functions compute, what their inputs and outputs mean, tables."""
 
 from __future__ import annotations
 
@@ -45,6 +45,7 @@ SUMMARIES = {
 """Summaries of functions; the others have that of the library's function of the same name."""
 
 MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
+"""Added where poses are returned, one a row."""
 
 BRANCHES = (
     " A leg may be bent the other way in a row: then its inverse kinematics are not the joint "

@@ -38,11 +38,13 @@ from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _FUNCTIONS = ("drive_accelerations", "joint_coordinates", "jacobian", "squared_type_i")
+"""Functions of the exported C that `fmu.c` calls."""
 
 LEAST = 0.01
 """The type-I measure of a leg at which a simulation ends."""
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+"""Flags of the C compiler."""
 
 _CALL = {
     "pose": "state",

@@ -38,6 +38,7 @@ _XML: dict[Kind, dict[str, str]] = {
     "INPUT": {"causality": "input", "variability": "continuous"},
     "RESULT": {"causality": "output", "variability": "continuous", "initial": "calculated"},
 }
+"""Attributes in modelDescription.xml of a block's variables."""
 
 
 @dataclass(frozen=True)

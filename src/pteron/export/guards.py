@@ -35,14 +35,16 @@ _PRINTED = {
     "fmin": "MIN({0}, {1})",
     "fmax": "MAX({0}, {1})",
 }
+"""Operations in Structured Text; `guards` write the others."""
 
 INPUT_POWER, _DIVISOR, _FACTOR = 6, -20, 30
-"""Powers of ten: inputs and factors are not larger, divisors not smaller."""
+"""Powers of ten: no input and no factor is larger, no divisor smaller."""
 
 _EXPONENT = "69.0"
-"""Exponent of e below which the power is smaller than 10^`_FACTOR`."""
+"""Largest exponent of e: its power is below 10^30."""
 
 _ZERO = "0.0"
+"""Zero as LREAL."""
 
 
 class Names:

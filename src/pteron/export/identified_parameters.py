@@ -25,6 +25,7 @@ from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
 
 _NAME = "base_parameters"
+"""The input of code, and the key of the file, that has them."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,10 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms import Platform
 
 _MILLIMETRES = 1000.0
+"""LinuxCNC's unit of length, a metre's."""
+
 _DEGREES = 180.0 / math.pi
+"""LinuxCNC's unit of angles, a radian's."""
 
 _LONGEST = 26
 """Characters of a module's name before "kins": rtapi.h has 31 in all (RTAPI_NAME_LEN)."""
@@ -38,7 +41,7 @@ _THEIRS = (
     *("corexy", "genhex", "genser", "gentriv", "lineardelta", "matrix", "max", "penta", "puma"),
     *("rose", "rotarydelta", "rotate", "scara", "tripod", "triv", "user"),
 )
-"""Machines after which modules of LinuxCNC 2.9 are called."""
+"""Names of LinuxCNC 2.9's own kinematics modules, before "kins"."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A machine's name as an identifier: letters, digits and one separator."""
+"""A machine's name as an identifier and as a file's stem: letters, digits and one separator."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import unicodedata
 from pteron.manipulator import Manipulator
 
 _PLAIN = re.compile(r"[A-Za-z0-9]+([ _-][A-Za-z0-9]+)*")
-"""Names of which nothing is lost but which separator it was, and capitals."""
+"""Names that lose nothing but their capitals and the kind of their separators."""
 
 _LONGEST = 100
-"""Characters of a stem: with what is added it fits file systems, and FMI's 200 for identifiers."""
+"""Longest stem: with what is added it fits file systems, and FMI's 200 for identifiers."""
 
 _DIGITS = 6
+"""Digits of the checksum of a name that is cut or changed."""
 
 _TAKEN = {"all", "clean", "depend", "help", "install", "package", "test"} | {
     *("con", "prn", "aux", "nul"),

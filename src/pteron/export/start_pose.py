@@ -1,4 +1,4 @@
-"""A pose that a written model can start from: well in reach, within the joints' limits."""
+"""A pose for an exported model to start from: well in reach, within the joints' limits."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 
 _TYPE_I, _TYPE_II = 0.01, 0.001
-"""Measures below which no pose is good; a type-II measure of a half is as good as a type-I of 1."""
+"""Least type-I and type-II measures of random poses that are tried."""
 
 _SHARE = 0.5
 """The share of the best pose's measure that a good pose has."""

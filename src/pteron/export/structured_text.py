@@ -28,6 +28,7 @@ _LREAL = 300
 """Power of ten that no number may exceed: LREAL ends at 1.8E+308."""
 
 _WIDTH = 96
+"""Width of comments."""
 
 _STATUSES = (("Usable", 3), ("Reachable", 1), ("Regular", 2))
 """The conditions in the order in which they are tested, and the status where one fails."""

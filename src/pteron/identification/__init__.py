@@ -1,4 +1,4 @@
-"""The parameters of a machine from a motion that it made, and how far to trust them.
+"""Identification of a machine's parameters from a log of its motion, with a verdict on trust.
 
 `identify` does all of it. Its parts can be used by themselves: `logs` reads, `signals` turns
 samples into states, `observations_of` stacks the regressor, `estimators` solve, `consistency` finds

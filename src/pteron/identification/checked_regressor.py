@@ -1,4 +1,4 @@
-"""Regressors and forces as a user brings them, checked and made observations."""
+"""Checks of a regressor and forces that a user brings, of any robot, which become observations."""
 
 from __future__ import annotations
 

@@ -28,11 +28,14 @@ _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which gains are not told from inertia."""
 
 _ITERATIONS = 50
+"""Most iterations."""
+
 _SETTLED = 1e-3
-"""Change of what is predicted, relative to what is left over, that no longer matters."""
+"""Change of the predicted currents, over the residuals, below which an iteration is the last
+one."""
 
 _ROUNDING = 1e-13
-"""Change of what is predicted, relative to the currents, that is rounding."""
+"""Change of the predicted currents, over the currents, that counts as rounding."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The error for a log that does not show what is asked of it."""
+"""The error for a log that does not show what a function needs to see in it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ Reason = Literal[
     "unsettled",
     "wrapped",
 ]
+"""Kinds of fault of a log, for programs."""
 
 
 class LogError(DataError):

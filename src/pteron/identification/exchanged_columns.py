@@ -1,4 +1,4 @@
-"""Columns of a log that are exchanged or have a flipped sign, found by the fit that mends it."""
+"""Search for columns of a log that are exchanged or of flipped sign: fits with them mended."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ from pteron.identification.plausibility import unphysical
 from pteron.identification.signals import Preprocessing
 
 DECISIVE = 3.0
-"""Factor by which the error must fall for a fault to be called found."""
+"""Factor by which mending must reduce the error of the fit for a fault to count as found."""
 
 _EXPLAINED = 0.3
-"""Error relative to the forces below which a fit explains them."""
+"""Error of a fit, relative to the forces, below which it explains them."""
 
 _ALIKE = 1.2
-"""Error over the least one up to which faults explain the forces as well."""
+"""Error of a fit, over the least one, up to which it explains the forces as well."""
 
 _ROUNDING = 1e-7
-"""Error relative to the forces below which all is explained: the root of what a difference of
-squares loses, some 1e-15 of them."""
+"""Error relative to the forces that counts as zero: the root of what a difference of squares loses,
+some 1e-15 of them."""
 
 _ROWS = 4000
+"""Rows of the observations, at least, to which longer ones are thinned."""
 
 _LOOKED_INTO = 12
-"""Faults that fit alike, and of which the fewest changes are seen to be physical or not."""
+"""Faults that fit alike, those of fewest changes, whose fits are tested for physical values."""
 
 _TOLD = 3
-"""Equivalent faults that are listed."""
+"""Equivalent faults that a message lists."""
 
 
 @dataclass(frozen=True)

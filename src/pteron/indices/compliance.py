@@ -21,7 +21,7 @@ _GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 """Gauss points along a beam: its energy is quadratic in the place, so that two are exact."""
 
 _FREE = 1e-12
-"""Compliance, over the whole one, below which a self-stress counts as free."""
+"""Compliance of a self-stress, as a share of the largest, below which it costs no energy."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Stiffness:
         Natural frequencies of the bodies' masses, in platform coordinates, on these springs, Hz,
         ascending; infinite where nothing gives way.
     lengths : int
-        Number of of the pose's coordinates, the first ones, are lengths.
+        How many of the pose's coordinates, the first ones, are lengths.
     """
 
     compliance: Matrices

@@ -40,7 +40,10 @@ class Material:
 
 
 STEEL = Material(210e9, 81e9)
+"""Steel: 210 and 81 GPa."""
+
 ALUMINIUM = Material(70e9, 26e9)
+"""Aluminium: 70 and 26 GPa."""
 
 
 @dataclass(frozen=True)

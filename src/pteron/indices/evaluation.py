@@ -1,4 +1,4 @@
-"""An index of performance at poses, however many."""
+"""Evaluation of one performance index, such as the condition number, at any number of poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The equations of internal forces, solved for many states: reactions and stiffness share them."""
+"""Internal forces of the legs that hold given loads, solved for many states at a time.
+
+Reactions and stiffness both use them.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Expressions made executable: by CasADi, Numba, C and JAX, in fractions and in intervals.
+"""CasADi expressions made executable ("kernels"): by CasADi, Numba, C, JAX, fractions, intervals.
 
-Batching, threads and caching live here and only here.
+Batches of states, threads and the cache of compiled code live here and only here.
 """
 
 from pteron.arguments import check_arguments

@@ -1,7 +1,7 @@
-"""Bounds on a machine's functions in boxes of poses, by the better of two forms of intervals.
+"""Bounds on a machine's functions in boxes of poses, by the narrower of two forms of intervals.
 
-The natural form (see `kernels.intervals`) errs by what falls with the box's width. The mean-value
-form f(m) + f'(X) (X - m), m being the box's middle, errs by what falls with its square: for every
+The natural form (see `kernels.intervals`) is too wide by about the box's width. The mean-value form
+f(m) + f'(X) (X - m), m being the box's middle, is too wide by about its square: for every
 x in the box X there is an f'(y), y between m and x, of which f(x) - f(m) is the product with x - m.
 It is taken where f is proved to be defined and continuous in all of the box, and f' defined; where
 f has a kink, the interval of f' holds the slopes of both sides.

@@ -1,13 +1,14 @@
-"""Compiled code on disk, so that a second start does not compile; and texts that took a while.
+"""The cache on disk: compiled code, so that a second start does not compile, and texts of programs.
 
 An entry is a folder of files under the user's cache directory, named by a digest of all that it
 was made of. It is built in a folder of its own and moved into place, so that two processes may
-build it at once; a manifest of digests tells a damaged one, which is then built again.
+build it at once; a manifest of digests tells a damaged one, which is then built again. Entries used
+least lately are removed when all of them exceed 512 MB.
 
-A text is one file, which begins with its digest; so many of the latest are kept. Of entries, those
-used last are kept, up to 512 MB.
+A text, such as a serialised CasADi function, is one file, which begins with its digest; the latest
+3000 are kept.
 
-What lies there is loaded and run. So a directory that belongs to somebody else, or that others may
+Cached code is loaded and run. So a directory that belongs to somebody else, or that others may
 write to, is neither read nor written: a temporary one, gone with the process, takes its place.
 """
 
@@ -40,6 +41,7 @@ _WORK = ".pteron-work-"
 """Begins the name of a folder that is being built, or being removed."""
 
 _MANIFEST = "manifest.json"
+"""The file of an entry that has the digests of the others."""
 
 _MARK = ".made-by-pteron"
 """A file in each folder that is made here, which says whose process works on it: the sweep touches

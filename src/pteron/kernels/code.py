@@ -1,4 +1,7 @@
-"""Straight-line code from a graph: what the printers of C, Python and Structured Text share."""
+"""Straight-line code from a graph of operations, for the printers of C, Python and Structured Text.
+
+Tables say how each operation is written in a language; `statements` writes a line for each node.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compilers at work: a command with all that it starts, which can be ended from another thread."""
+"""Compilers run as subprocesses, which another thread can end with all that they started."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 _RUNNING: set[subprocess.Popen[str]] = set()
+"""Subprocesses that run now; guarded by `_CHANGES`."""
+
 _CHANGES = threading.Lock()
 
 

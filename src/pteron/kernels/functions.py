@@ -1,4 +1,8 @@
-"""The table of what can be compiled: each function's inputs, and its outputs as expressions."""
+"""The table of functions that can be compiled, by name.
+
+For each: its inputs, its outputs as CasADi expressions, and the conditions on the pose under which
+its result counts.
+"""
 
 from __future__ import annotations
 
@@ -30,21 +34,22 @@ from pteron.equations.singular_distance import type_ii_distances
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
 Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
-"""An expression, some of one shape to be stacked, or one whose shape is given: else a column is a
-vector."""
+"""An expression, of which a column becomes a vector; a list of expressions to be stacked; or an
+expression with the shape it is to have."""
 
 Outputs = dict[str, Output]
+"""Outputs by name, in order."""
 
 Need = Literal["rows", "reach", "type I", "type II"]
 """A condition on the pose: in reach, not singular of type I, of type II; "rows" asks for the first
 two of those legs alone whose row [dq/dc | dq/dphi] depends on the pose."""
 
 TYPE_I = 1e-4
-"""The type-I measure of a leg below which what is divided by it is refused: the relative error is
-1e-15 to 1e-14 over the measure's square: six digits are left here."""
+"""Least type-I measure of a leg (0 where it is singular) where a result is divided by it: the
+relative error is 1e-15 to 1e-14 over the measure's square, so that six digits are left here."""
 
 TYPE_II = 1e-9
-"""The type-II measure below which what is computed from J^-1 is refused: six digits are left."""
+"""Least type-II measure of the machine where a result needs J^-1: six digits are left here."""
 
 Symbols = dict[str, Any]
 """The expressions an entry builds with, by name: the inputs, or what a caller puts for them."""

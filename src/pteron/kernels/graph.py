@@ -20,6 +20,7 @@ from pteron.kernels.kernel import Port
 Value = TypeVar("Value")
 
 INPUT, CONSTANT = "input", "constant"
+"""Operations of nodes that compute nothing."""
 
 _CODES = {
     "add": ca.OP_ADD,
@@ -45,6 +46,8 @@ _CODES = {
     "or": ca.OP_OR,
     "select": ca.OP_IF_ELSE_ZERO,
 }
+"""CasADi's codes of the operations that printers know by name."""
+
 _NAMES = {code: name for name, code in _CODES.items()}
 
 

@@ -1,4 +1,4 @@
-"""Loop-invariant code motion: what depends on a shared input alone is computed once a batch."""
+"""Loop-invariant code motion: a program is split so that a batch's shared part is computed once."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pteron.kernels.kept import Program
 
 
 def hoisted(program: Program, name: str) -> tuple[Program, ca.Function]:
-    """Return a program that takes numbers instead of one input, and what makes them of it.
+    """Return a program without the work that depends on its input x alone, and that work.
 
-    The numbers are the largest subexpressions of that input alone, so that function(..., x, ...) =
-    first(..., second(x), ...). Ports keep their names and their order.
+    They are functions `first` and `second` with function(..., x, ...) = first(..., second(x), ...):
+    second(x) has the largest subexpressions of x. Inputs and outputs keep their names and order.
     """
     function = program.function
     place = function.name_in().index(name)

@@ -32,8 +32,14 @@ Mask = NDArray[np.bool_] | None
 """None: no box."""
 
 _ULP = 2.0**-52
+"""Share of itself by which a bound from + - * / or a root is widened."""
+
 _UNDERFLOW = 1e-300
+"""Widening, beside that, of a product or a quotient, which may underflow."""
+
 _LIBM = 2.0**-49
+"""Share by which sines, cosines, arc tangents and exponentials are widened."""
+
 _NEAR = 1e-12
 """Relative distance from a sine's extreme within which it counts as reached."""
 

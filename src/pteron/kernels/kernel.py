@@ -18,14 +18,16 @@ from pteron.kernels.named_columns import by_name
 from pteron.shapes import PoseLike
 
 Array = NDArray[np.float64]
+"""An array of float64, of any shape."""
 
 SHARE = 4096
-"""States below which a thread costs more than they do."""
+"""Least states for each thread: fewer take less time than it costs to start one."""
 
 _AXES = 32
-"""NumPy broadcasts no more."""
+"""Most axes that NumPy broadcasts."""
 
 _FREE = frozenset({ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST, ca.OP_ASSIGN})
+"""Instructions that do not count as operations."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +37,13 @@ class Port:
     Parameters
     ----------
     name : str
-        What it holds.
+        What it holds, such as "pose".
     shape : tuple of int
         Its shape for one state; the batch axes lead.
     shared : bool
         For an input: one value serves the whole batch.
     columns : tuple of str
-        What the columns of a table are called that is given in its place; none if none can be.
+        Names of the columns of a table that may be given in its place; empty where none may.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Numbers by the names of their columns: a table where an array is expected."""
+"""Tables given where an array is expected: its columns are picked by their names."""
 
 from __future__ import annotations
 

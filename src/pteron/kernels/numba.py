@@ -1,8 +1,8 @@
 """Target `numba`: straight-line Python that Numba compiles, for machines without a C compiler.
 
-Two functions: one state, and batches in blocks of states held as structures of arrays, in loops
-that LLVM turns into vector code. Numba's own cache holds the result, within an entry of ours that
-tells whether it is whole.
+There are two functions: one for a single state, and one for batches, in blocks of states held as
+structures of arrays, in loops that LLVM turns into vector code. Numba caches the result on disk
+within an entry of `kernels.cache`, which tells whether it is whole.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from pteron.kernels.kernel import Array, ArrayKernel, Port
 _FILE = "kernel.py"
 
 _BLOCK = 64
+"""States in a block."""
 
 
 class Jitted(ArrayKernel):

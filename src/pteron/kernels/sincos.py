@@ -1,9 +1,9 @@
 """Sine and cosine in straight-line arithmetic, the same bits on every float64 target.
 
-libm's functions keep a compiler from turning a loop into vector code, and differ from one library
-to another. These are an expression like any other, and every target evaluates that: the angle
-minus q pi/2, in three parts (Cody and Waite), then a polynomial for each. The error is below one
-unit in the last place (measured: 0.8).
+Calls of a C library's `sin` and `cos` keep a compiler from turning a loop into vector code, and
+libraries differ in the last bit. Here both are an expression of plain arithmetic, which every
+target evaluates: the angle minus q pi/2, in three parts (Cody and Waite), then a polynomial for
+each. The error is below one unit in the last place (measured: 0.8).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 
 LIMIT = 1e5
-"""rad; farther out q pi/2 has too few digits, and libm's functions serve."""
+"""rad; for larger angles q pi/2 has too few digits, and the C library's functions serve."""
 
 _PARTS = (1.5707963267923333, 2.5633441515839558e-12, 1.0562999066987428e-23)
 """pi/2; the first two have 37 bits, so that their product with q is exact up to the limit."""

@@ -1,8 +1,8 @@
-"""A machine's motion under its drives' forces, in steps of Runge and Kutta's method.
+"""A machine's motion under its drives' forces, in steps of Runge and Kutta's fourth-order method.
 
-The equations are those of `drive_accelerations`. In C the steps are one loop: a state goes on
-without a call from Python, and of a batch each lane of a vector holds a machine. Without a C
-compiler NumPy makes the same steps, to the same bits, of the virtual machine's accelerations.
+The equations are those of `drive_accelerations`. In C all steps are one loop without calls from
+Python; in a batch each lane of a vector register holds a machine. Without a C compiler NumPy makes
+the same steps, to the same bits, with accelerations from CasADi's virtual machine.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from pteron.manipulator import Manipulator
 _STATE = ("pose", "velocity")
 
 _SPAN = Port("steps", (2,), shared=True)
+"""The input with the length of a step, s, and the number of steps."""
 
 
 class Steps(ArrayKernel):

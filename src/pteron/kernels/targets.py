@@ -1,4 +1,4 @@
-"""`compile`: a machine's function made executable on a target."""
+"""`compile`: a machine's function, such as its inverse dynamics, made executable on a target."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ TARGETS: dict[str, type[Kernel]] = {
 """The targets by name."""
 
 Grade = Literal["specialised", "parametric", "general"]
+"""Numbers folded into the code: all of the machine's, its geometry and gravity, or none."""
 
 FIXED: dict[str, Callable[[Manipulator], Array]] = {
     "parameters": parameters,

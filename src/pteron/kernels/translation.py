@@ -1,4 +1,4 @@
-"""CasADi functions to graphs of many-term sums, and back."""
+"""Translation of CasADi functions to graphs of many-term sums (see `terms`), and back."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ARITHMETIC: dict[str, Callable[..., int]] = {
     "mul": lambda graph, a, b: graph.product([a, b]),
     "div": lambda graph, a, b: graph.quotient(a, b),
 }
-"""Operations that the pass looks into."""
+"""Operations that become sums and products; others are nodes of their own."""
 
 
 def read(function: ca.Function) -> tuple[TermGraph, list[int]]:

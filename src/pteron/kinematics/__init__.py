@@ -1,4 +1,7 @@
-"""Kinematics in numbers: batched, validated, documented."""
+"""The public functions of kinematics: poses, joint coordinates, Jacobians, modes, singularities.
+
+They take a machine and arrays of poses or joint coordinates, check them, and return arrays.
+"""
 
 from pteron.arguments import check_arguments
 from pteron.kinematics.architecture import Architecture, architecture, is_singular_everywhere

@@ -1,9 +1,8 @@
-"""Layouts that are singular everywhere, with the reason and how it is known.
+"""Machines whose layout is singular at every pose (det J = 0): the test, the reason, the proof.
 
-det J of a layout vanishes at every pose, or at none but some. One pose at which it does not is
-proof of the latter. Of the former there are three degrees: exact arithmetic, for a geometry that
-is meant in simple numbers; the closed form A cos(phi) + B sin(phi) of P-R-R-R legs, to rounding;
-or many poses.
+One pose at which det J is not zero disproves it. It is proved by exact arithmetic, for a geometry
+that is meant in simple numbers, or by the closed form A cos(phi) + B sin(phi) of P-R-R-R legs, up
+to rounding; else it is concluded from many random poses.
 """
 
 from __future__ import annotations
@@ -27,15 +26,20 @@ _VANISHING = 1e-10
 """Type-II measures, or singular values over the largest, below this are rounding."""
 
 _SAMPLES = 64
+"""Random poses in reach at which det J is looked at."""
+
 
 _PRIMES = (2305843009213690799, 2305843009213689479, 2305843009213688159, 2305843009213684559)
 """Primes modulo which 2, 3 and 5 are squares, and -1 is none."""
 
 _ATTEMPTS = 400
+"""Random states tried modulo a prime: at most of them a square root does not exist."""
+
 _ZEROS = 3
 """Zeros at random states modulo a prime of 61 bits: by chance once in 10^40 or so."""
 
 Proof = Literal["closed form", "exact arithmetic", "numerical", "one pose"]
+"""Grounds on which a layout is known to be singular everywhere or, by one pose, not to be."""
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 
 _BATCH = 4096
+"""Rows of joint coordinates solved at a time."""
+
 
 _HUGE = 1e30
 """Sizes of the machine beyond which joints have no pose; det G stays finite."""

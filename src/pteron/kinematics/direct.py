@@ -1,4 +1,4 @@
-"""Joint coordinates to poses, and the modes that poses are in."""
+"""Direct kinematics: joint coordinates to poses, and the modes (branches) that poses are in."""
 
 from __future__ import annotations
 

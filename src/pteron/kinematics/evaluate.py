@@ -1,7 +1,7 @@
 """Evaluation of public functions: one kernel a call, and errors that name a state it refuses.
 
-The kernel returns its values and a status. Nothing else happens as long as the status is good; the
-particulars of a bad state are worked out only then.
+The kernel returns its values and, for each state, a status: 1 where they count, 0 where they do
+not. The particulars of a bad state are worked out only where there is one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Joint screws, and the rates and accelerations of every joint, passive ones included."""
+"""The screws, rates and accelerations of every joint at given poses, passive joints included."""
 
 from __future__ import annotations
 

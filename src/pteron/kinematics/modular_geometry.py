@@ -21,6 +21,8 @@ _SIMPLE = 1000
 """Largest denominator of a component's square."""
 
 _ROUNDING = 1e-14
+"""Largest error of a component's square, or of a right angle, that counts as rounding."""
+
 
 _DIGITS = 12
 """Decimals of a number of a file, m or without unit."""

@@ -1,4 +1,4 @@
-"""Poses to joint coordinates, links and Jacobians."""
+"""Inverse kinematics: poses to joint coordinates, link vectors and Jacobians."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses in reach, drawn at random from a ball that holds them all."""
+"""Poses in reach, drawn at random from the box about a ball that holds them all."""
 
 from __future__ import annotations
 
@@ -15,13 +15,19 @@ from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator
 
 _BATCH = 4096
+"""Poses drawn at a time."""
+
 _ATTEMPTS = 250
+"""Batches drawn before it is concluded that poses in reach are too rare."""
+
 _SCOUTS = 100
+"""Poses found first in the whole box; their own bounding box, widened, serves for the others."""
 
 _SEEN = 1000
 """Poses that tell how often limits are kept."""
 
 _SELDOM = 0.1
+"""Share of poses up to which a passive joint that keeps its limits is named in a message."""
 
 
 def drawn_poses(

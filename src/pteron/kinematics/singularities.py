@@ -16,27 +16,29 @@ from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
+"""Size of the type-II measure that, if no angle in reach has a larger one, counts as zero."""
+
 
 _DRAWN = 4096
 """Random poses among which the best type-II measure is sought."""
 
 _FOREMOST = 6
-"""Those of them that are improved."""
+"""How many of the best random poses are improved by a local search."""
 
 _TRIES = 200
-"""Poses that are tried to improve one."""
+"""Evaluations of the measure in each local search."""
 
 _IMPROVED = 1e-7
-"""Improvements that count as none."""
+"""Improvement of the measure below which a local search ends."""
 
 _ANGLES = 720
-"""Samples of phi."""
+"""Samples of the platform's angle phi over a turn."""
 
 _HALVINGS = 50
-"""Halvings that lead from half a degree to rounding."""
+"""Bisections between two samples, half a degree apart: down to rounding."""
 
 _ZERO = 1e-9
-"""The measure where its sign changes, but for rounding."""
+"""Largest size of the measure at a zero so found; at a gap in the reach it is larger."""
 
 
 @lru_cache(maxsize=64)

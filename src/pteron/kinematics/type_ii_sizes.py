@@ -1,4 +1,4 @@
-"""The size of the type-II measure, as floors ask for it."""
+"""The size of the type-II measure of poses, to compare with a least value (a floor)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points of a machine's joints and of its platform's parts, for pictures."""
+"""Points of a machine's joints and of its platform's parts in given poses, for pictures."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ _SPARE = 0.25
 """Length of a guide without limits, beyond what poses use, as a share of the leg's size."""
 
 _ARC = np.radians(5.0)
+"""Angle between two points of an arc, rad."""
 
 
 class Part(NamedTuple):

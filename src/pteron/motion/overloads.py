@@ -1,4 +1,4 @@
-"""Forces and speeds of a motion beyond the limits of the drives."""
+"""Warnings about forces and speeds of a motion beyond the limits of the drives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A machine that carries a payload."""
+"""A machine with a payload: a point mass joined to its platform."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from pteron.reduction.find import base_parameters
 from pteron.reduction.result import BaseParameters
 
 _NONZERO = 1e-9
-"""Pivots of the grouping, whose entries are of order one in lengths of a link, are larger."""
+"""Least pivot in an exchange of columns: the grouping's entries are of order one."""
 
 
 def cheapest_parameters(robot: RobotLike) -> BaseParameters:

@@ -1,4 +1,4 @@
-"""The regressor at configurations drawn at random in a field, where nothing is rounded."""
+"""The regressor at random states in exact arithmetic: modulo a prime, or in fractions."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.exact_geometry import ExactGeometry
 
 _ATTEMPTS = 20000
+"""Poses tried before it is concluded that none serves."""
 Element = TypeVar("Element")
 
 

@@ -1,7 +1,8 @@
 """Method `exact`: the null space of the regressor by exact arithmetic, with a certificate.
 
-Found modulo primes of 61 bits, lifted to fractions, and verified in fractions: so the rank is
-bounded from below by a minor that does not vanish, and from above by null vectors that annihilate.
+Null vectors are found modulo primes of 61 bits, lifted to fractions, and verified in fractions. So
+the rank is bounded from below by a minor that does not vanish, and from above by null vectors that
+annihilate the regressor.
 """
 
 from __future__ import annotations
@@ -36,12 +37,23 @@ from pteron.reduction.symbols import algebraic_values, symbolic_shares
 from pteron.reduction.transfers import Transfer
 
 _BITS = 61
+"""Bits of a prime."""
+
 _MOST_PRIMES = 8
+"""Primes whose residues are combined to fractions before that is given up."""
+
 _ROOTS_PRIMES = 3
-"""With roots in the geometry, shares are hardly ever fractions: they are not tried for long."""
+"""The same with roots in the geometry: shares are hardly ever fractions then."""
+
 _SPARE_STATES = 4
+"""Random states beyond those whose rows are as many as the columns."""
+
 _RATIONAL_CHECKS = 2
+"""States at which the result is verified in fractions."""
+
 _MODULAR_CHECKS = 2
+"""States at which the result is verified modulo a prime that it was not found with."""
+
 
 Number = TypeVar("Number", int, Fraction)
 Relations = dict[int, dict[int, int]]

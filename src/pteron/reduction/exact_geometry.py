@@ -24,9 +24,13 @@ from pteron.manipulator import Manipulator
 from pteron.reduction.surds import Surd, direction_cosine, length
 
 Element = TypeVar("Element")
+
 ExactVector = tuple[Surd, Surd, Surd]
+"""Components along x, y and z."""
 
 _PARALLEL = 1e-9
+"""rad within which directions count as parallel, or at a right angle."""
+
 _FINE = 10**12
 """Largest denominator of an approximation: its error is below 1e-12 times 1e-6."""
 

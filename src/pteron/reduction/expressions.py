@@ -14,9 +14,14 @@ from pteron.bodies.parameters import Parameter
 from pteron.reduction.grouping import Share, Shares
 
 Terms = Mapping[int, Share]
+"""The terms of a base parameter: shares by the number of the column, a parameter."""
 
 _MINUS = "\u2212"
+"""The minus sign of HTML texts."""
+
 _NARROW = "\u202f"
+"""The narrow space that stands for a product's sign in HTML."""
+
 
 _FACTORED = 60
 """Operations up to which a share is factored, to be read; longer ones only cost minutes."""

@@ -1,4 +1,4 @@
-"""`base_parameters`: the inertial parameters, and sums of them, that act on the actuator forces."""
+"""`base_parameters`: the sums of inertial parameters that alone act on the actuator forces."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from pteron.shapes import Seed
 Method = Literal["exact", "svd", "qr"]
 
 Groups = tuple[tuple[int, ...], ...]
+"""Legs, from 1, in groups that share their parameters."""
 
 _NUMERICAL: dict[str, Callable[..., Grouping]] = {"svd": svd_grouping, "qr": qr_grouping}
 

@@ -14,8 +14,9 @@ from pteron.reduction.certificate import NumericalCertificate, NumericalRank
 from pteron.reduction.grouping import Grouping, Shares
 
 _TOLERANCE = 1e-10
-"""Relative to the largest; columns are scaled to unit length. Rounding leaves 1e-14, and what is
-identifiable at all 1e-6 and more: the certificate reports the gap."""
+"""Singular values up to this share of the largest count as zero, with columns scaled to unit
+length: rounding leaves 1e-14, what is identifiable at all 1e-6 and more. The certificate reports
+the gap."""
 
 _STATES_PER_COLUMN = 4
 

@@ -26,9 +26,11 @@ from pteron.reduction.symbols import named_values, symbolic_shares, values_by_le
 from pteron.reduction.transfers import Transfer
 
 Form = Literal["text", "sympy", "latex", "html"]
+"""Forms in which expressions are written."""
 
 Symbols = bool | Literal["leg"]
-"""False: coefficients in numbers. True: in symbols of the geometry. "leg": each leg has its own."""
+"""Coefficients of expressions. False: numbers. True: symbols of the geometry, shared by legs that
+are alike. "leg": symbols of each leg's own."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,4 +1,7 @@
-"""Columns of the regressor: one for each parameter, or for the like parameters of several legs."""
+"""The regressor's columns: one for each parameter, or for the like parameters of several legs.
+
+For legs that share parameters, as equal legs do, their columns add up.
+"""
 
 from __future__ import annotations
 

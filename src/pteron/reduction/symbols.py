@@ -1,4 +1,4 @@
-"""The groupings in symbols of the geometry, from the mass transfers."""
+"""Base parameters in symbols of the geometry, such as (1/ll1^2) I_l1, from the mass transfers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Mass transfers: the relations between parameters that follow from the structure alone.
+"""Mass transfers: dependences between inertial parameters that follow from the structure alone.
 
 Two bodies that both carry a point may trade mass at it without any force noticing. Each transfer is
-a null vector of the regressor whose entries are polynomials in the geometry: the derivation of the
+a null vector of the regressor whose entries are polynomials in the geometry: from these follow the
 base parameters in symbols.
 """
 

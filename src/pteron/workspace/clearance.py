@@ -21,6 +21,7 @@ _PLURALS = {
     "lower": "last links",
     "platform": "platform",
 }
+"""Names of bodies in the plural, for warnings."""
 
 Thickness = Radii | Mapping[str, float] | float
 """Radii, some of them by name, or one for all bodies, m."""

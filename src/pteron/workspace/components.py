@@ -17,6 +17,7 @@ _CELLS = 1 << 22
 
 
 _ROUNDING = 1e-9
+"""Share of a cell that counts as rounding."""
 
 
 @dataclass(frozen=True)

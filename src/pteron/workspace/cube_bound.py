@@ -11,7 +11,10 @@ from pteron.workspace.components import lattice
 from pteron.workspace.paving import Paving
 
 _HALVINGS = 30
+"""Bisections of the edge."""
+
 _WIDER = 1e-9
+"""Share added to the bound, far more than rounding."""
 
 
 def cube_bound(paving: Paving) -> float:

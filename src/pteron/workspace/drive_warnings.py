@@ -17,7 +17,8 @@ _SLOW = 5.0
 hundreds."""
 
 _SMOOTH = 0.1
-"""Share of the greatest speed within which dry friction may change its sign smoothly."""
+"""Greatest `rest_speed`, within which dry friction changes its sign smoothly, over the greatest
+speed."""
 
 _APART = 20.0
 """Greatest ratio of a drive's peak to its rated force, or the inverse: servo drives have 2 to 5."""

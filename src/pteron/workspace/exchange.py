@@ -1,9 +1,9 @@
-"""Largest shapes and better geometry by gradients, with conditions at ever more points of a region.
+"""Largest shapes and better geometry by gradients, subject to conditions at all points of a shape.
 
-A shape's conditions are infinitely many, a row for every point in it. They are asked at a few
-points, the program is solved, and the points where the solution fails join them: the exchange
-method for semi-infinite programs (R. Hettich and K. O. Kortanek, SIAM Review 35(3), 1993). Within
-a round the geometry is taken as affine in the variables, which it is for lengths and points.
+The conditions are infinitely many, some for every point of the shape. They are asked at a few
+points, the program is solved, and the points where the solution fails are added: the exchange
+method for semi-infinite programs (R. Hettich and K. O. Kortanek, SIAM Review 35(3), 1993). Within a
+round the geometry is taken as affine in the variables, which it is for lengths and points.
 """
 
 from __future__ import annotations
@@ -21,26 +21,28 @@ from pteron.workspace.samples import Samples, Shape, lattice
 from pteron.workspace.smooth_conditions import SmoothConditions
 
 _PER_ROW = 3
-"""Points at which a round's worst values of each row join its conditions."""
+"""Points added in a round for each condition: those where it is least."""
 
 _ROUNDS = 12
+"""Most rounds."""
 
 _ROUNDING = 1e-12
-"""Rows above minus this count as kept."""
+"""A condition's value above minus this counts as kept."""
 
 _FIRST_STEP = 0.25
-"""Share of the unknowns' bounds within which the first round looks."""
+"""Step of the first round, as a share of the unknowns' bounds."""
 
 _FULL = 0.95
-"""A round that may go so far of its step may go further in the next."""
+"""Share of its step that a round must be able to take for the next to have a longer one."""
 
 _GAIN = 1e-5
-"""A smaller gain, over the objective, ends the rounds."""
+"""Gain, over the objective, below which the rounds end."""
 
 _HALVINGS = 12
+"""Bisections for the longest step that keeps all conditions."""
 
 _CUTS = 8
-"""Most times that a step over failing points between the samples is made shorter."""
+"""Most times that a step is shortened because points between the samples fail."""
 
 POINTS = 13
 """Points along each edge of a shape's box at which it is looked at."""

@@ -15,21 +15,23 @@ from pteron.workspace.samples import Shape, shape_samples
 from pteron.workspace.smooth_conditions import SmoothConditions
 
 _COARSE = 25
-"""Steps along the longest side of a grid."""
+"""Steps of a search grid along its longest side."""
 
 _FIRST = 5
-"""Points along each edge at which conditions are asked at first."""
+"""Points along each edge of the shape at which conditions are asked at first."""
 
 _SHRINKINGS = 30
+"""Most times that a shape from the grid is made smaller until it keeps the conditions."""
 
 UNKNOWN = -1e-6
-"""Stand-in for a row that is NaN, or that no proof decides: just below 0."""
+"""Stand-in for a condition's value that is NaN, or that no proof decides: just below 0."""
 
 _RIM = 0.98
-"""A counterexample further out, over half the edge, is avoided by a smaller share."""
+"""Share of the half edge within which a counterexample sends the search back; nearer to the rim the
+shape is only made smaller."""
 
 _EXCHANGES = 20
-"""Counterexamples that go back to the search; what is found then is made smaller instead."""
+"""Most counterexamples that send the search back; after them the shape is only made smaller."""
 
 
 @dataclass(frozen=True)

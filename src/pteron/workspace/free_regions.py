@@ -1,8 +1,8 @@
 """Regions of poses proved to be free of type-II singularities, in interval arithmetic.
 
 A region is cut into boxes until the type-II measure, whose bounds in a box are proved, has one sign
-in each. A pose at which it vanishes is sought by ordinary evaluation: between poses of either sign,
-and from boxes that are left by Newton's steps.
+in each. A pose at which it vanishes is sought in floating point: between poses at which it has
+opposite signs, and from boxes that are left by Newton's steps.
 """
 
 from __future__ import annotations
@@ -23,10 +23,14 @@ from pteron.workspace.regions import Box
 from pteron.workspace.smooth_conditions import smooth_conditions
 
 _SAMPLES = 4096
+"""Random poses at which the measure's sign is looked at first."""
+
 _PAIRS = 64
-"""Pairs of poses of either sign between which a singular pose is sought."""
+"""Pairs of poses of opposite sign between which a singular pose is sought."""
 
 _HALVINGS = 60
+"""Bisections between the poses of a pair."""
+
 _STEPS = 12
 """Newton's steps towards a singular pose from the middle of a box."""
 
@@ -34,7 +38,7 @@ _STARTS = 32
 """Boxes from whose middles a singular pose is sought, between two rounds."""
 
 _SINGULAR = 1e-10
-"""The measure of a pose that counts as singular."""
+"""Largest measure of a pose that counts as singular."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,8 @@
-"""The home pose: where a machine has the best margin, turned by no more than that is worth."""
+"""The home pose: where a machine has the best margin to singularities and limits.
+
+The margin counts turning of the platform as a loss. Among poses of nearly equal margin a simple one
+is taken: on an axis of symmetry, with little joint travel, in round numbers.
+"""
 
 from __future__ import annotations
 
@@ -23,25 +27,30 @@ from pteron.workspace.margins import pose_margins
 from pteron.workspace.unreachable import beyond_limits, nowhere
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))
-"""Numbers of random poses and their least measures: less where legs have little common reach."""
+"""Numbers of random poses and their least type-I and type-II measures, tried in turn: less is asked
+where legs have little common reach."""
 
 _SOURCES = (*EQUATIONS, "kinematics", "workspace")
 """The packages that a home pose depends on."""
 
 _STARTS = 12
+"""Random poses, the best ones, that are improved by a local search."""
 
 _STEPS = (0.02, 0.2)
-"""Size of the first simplex: m and rad."""
+"""Size of a local search's first simplex: m and rad."""
 
 _METRES = (0.1, 0.05, 0.01, 0.001)
+"""Round numbers that the pose is rounded to, coarsest first, m."""
+
 _DEGREES = (30.0, 15.0, 5.0, 1.0)
-"""Round poses that are tried, coarsest first: multiples of so many metres and degrees."""
+"""The same of angles, degrees."""
 
 _WORTH = 0.99
-"""The share of the best margin that counts as equal to it: nobody wants to type the rest."""
+"""Share of the best margin from which on a simpler pose is preferred."""
 
 _AXIS = 0.75
-"""The share that a place on the axis of a machine's symmetry must have: it is looked for there."""
+"""Share of the best margin from which on a pose on the axis of a machine's symmetry is
+preferred."""
 
 _SAME = 1e-9
 """Differences of margins that are rounding."""

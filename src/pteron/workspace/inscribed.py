@@ -22,6 +22,7 @@ from pteron.workspace.samples import Shape, cube
 from pteron.workspace.smooth_conditions import smooth_conditions
 
 _STARTS = 3
+"""Places of a search grid from which the shape is enlarged."""
 
 _SHARES = 40
 """Most times that a shape is made smaller by the tolerance until it is proved."""

@@ -1,8 +1,8 @@
-"""Places between a lattice's points where a condition fails that all the points keep.
+"""Places between a lattice's points where a condition fails though it holds at all the points.
 
 A leg whose links are about equally long cannot fold onto its guide: a thin tube in the workspace,
-through which no point of a lattice need go. About each of a row's least points on the lattice,
-steps along the row's slope look for its zero.
+which may pass between the points of a lattice. About each of a condition's least values on the
+lattice, steps along its slope look for a zero.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ from scipy.ndimage import maximum_filter, minimum_filter  # type: ignore[import-
 from pteron.kernels import Array
 
 _STEPS = 6
+"""Steps towards a zero."""
 
 _BEYOND, _FURTHER = 1.3, 0.1
-"""A step goes so much further than to the zero, as a factor and in cells of the lattice: a row may
-be curved about its least value, and a solution may lie on the rim of what fails."""
+"""A step goes further than to the zero of the tangent, by this factor and by this share of a cell:
+a condition may be curved about its least value, and failing places may be on the rim of what a
+shape holds."""
 
 _DEPTH = 1e-5
-"""A row that fails by less is left to the proof."""
+"""A condition that fails by less is left to the proof."""
 
 _MOST = 60
-"""Points that are looked at of each row, the lowest first: along a limit that the lattice ends at,
+"""Points looked at for each condition, the lowest first: along a limit that the lattice ends at,
 many are lower than those next to a tube, in an order that is rounding's."""
 
 

@@ -28,7 +28,8 @@ _UNLIKE = 20.0
 ends have 3."""
 
 _UPRIGHT = 0.1
-"""Share of a leg's length by which a platform is above or below its base, not level with it."""
+"""Height of the platform over its base, as a share of a leg's length, from which it is clearly
+above or below."""
 
 _ALIKE = 0.7
 """Share of the margin in one working mode from which on another serves as well."""

@@ -1,4 +1,4 @@
-"""Margins of poses to singularities and limits, and the part of its range that each joint uses."""
+"""Margins of poses to singularities and joint limits, and how each joint uses its range."""
 
 from __future__ import annotations
 

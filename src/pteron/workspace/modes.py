@@ -16,9 +16,13 @@ from pteron.workspace.conditions import EDGES, IntervalTest, condition_margins, 
 from pteron.workspace.paving import Paving, paving
 
 _HALVINGS = 50
+"""Bisections that lead to a contact."""
+
 _ROUNDS = 30
+"""Most times that boxes are halved."""
+
 _MOST = 200_000
-"""Boxes about an edge in which a contact is sought."""
+"""Most boxes about an edge of reach in which a contact is sought."""
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,10 @@ from pteron.workspace.nearest_vanishing import SINGULAR, Nearest, Search
 from pteron.workspace.vanishing import Kind, Vanishing
 
 _MOST = 20_000
+"""Boxes that the search for each kind and motion may look at by default."""
 
 By = Literal["translation", "rotation"]
+"""The motion that leads to the singular pose, alone."""
 
 
 @dataclass(frozen=True)

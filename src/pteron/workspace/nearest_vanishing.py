@@ -21,29 +21,31 @@ from pteron.workspace.boxes import halved
 from pteron.workspace.vanishing import Vanishing
 
 SINGULAR = 1e-10
-"""The measure of a pose that counts as singular."""
+"""Largest measure of a pose that counts as singular."""
 
 _BATCH = 256
-"""Boxes at a time."""
+"""Boxes examined in a round, the nearest."""
 
 _TRIED = 12
-"""The nearest of them from which a singular pose is sought."""
+"""Boxes of a round from which a singular pose is sought."""
 
 _SEEKING, _SELDOM = 16, 4
-"""Rounds in each of which one is sought; later in every fourth."""
+"""In each of the first 16 rounds a singular pose is sought, afterwards in every fourth."""
 
 _FARTHER = 1.2
-"""Times the least distance known within which another pose is worth quadratic programs."""
+"""Factor on the least distance known, within which another singular pose is worth quadratic
+programs."""
 
 _BESIDE = 0.1
-"""Share of its distance within which other poses are next to one."""
+"""Share of a pose's distance within which other poses count as its neighbours and are left out."""
 
 _LAST, _HITS = 128, 12
-"""Boxes, of those left in the end, that are searched, of the nearest and of all; and poses found in
-them that lead to quadratic programs."""
+"""Of the boxes left in the end so many are searched, the nearest and others spread over all; and so
+many poses found in them lead to quadratic programs."""
 
 _STEPS = 30
-"""Newton's steps: where a function does not change its sign they halve the distance only."""
+"""Newton's steps, so many since they only halve the distance where a function does not change its
+sign."""
 
 _BACK = 10
 """Newton's steps back into reach."""

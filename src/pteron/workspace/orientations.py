@@ -1,4 +1,4 @@
-"""The volume of the workspace over the platform's angle, in each working mode."""
+"""The volume of the workspace as a function of the platform's angle, in each working mode."""
 
 from __future__ import annotations
 

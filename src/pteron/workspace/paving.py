@@ -1,4 +1,4 @@
-"""The workspace in boxes: some proved inside, some undecided, all the rest proved outside."""
+"""The workspace as a set of boxes: some proved inside, some undecided, all else proved outside."""
 
 from __future__ import annotations
 

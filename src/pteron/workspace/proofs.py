@@ -26,6 +26,7 @@ _TRIED = 4096
 """Undecided boxes whose middles and corners are tried as counterexamples, on each level."""
 
 _SLICE = 1 << 16
+"""Boxes tested at a time."""
 
 _THINNEST = 1e-9
 """Share of the region's sides below which a box is not halved."""

@@ -1,4 +1,4 @@
-"""Plane slices through the reach at constant orientation: which poses serve, and what ends them."""
+"""Plane slices through the reach at constant orientation: poses in reach, and what ends it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pteron.shapes import PoseLike
 from pteron.workspace.volume import bounding_box
 
 REACHABLE = 0
-"""Status of a pose that serves."""
+"""Status of a pose in reach and within limits."""
 
 BEYOND_LIMITS = -1
 """Status of a pose that the legs reach but a joint's limits forbid."""
@@ -26,6 +26,7 @@ _RIM = 0.08
 """Share of the reach's width that a slice shows around it."""
 
 Plane = Literal["xy", "xz", "yz"]
+"""The two coordinates of the pose that vary."""
 
 
 @dataclass(frozen=True)

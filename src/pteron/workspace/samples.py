@@ -1,4 +1,4 @@
-"""Points of a shape that moves and grows, and of a region that does not."""
+"""Sample points for conditions: of a shape that moves and grows, and of a region that stays."""
 
 from __future__ import annotations
 

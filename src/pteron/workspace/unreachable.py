@@ -1,4 +1,4 @@
-"""Why a machine has no pose to work in: which legs miss it, or which joints pass their limits."""
+"""The error for a machine without a pose to work in: legs that miss it, or joints beyond limits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from pteron.workspace.margins import distance_to_limits
 from pteron.workspace.volume import deepest
 
 _DRAWN = 20_000
+"""Random poses that are tried."""
+
 _STARTS = 5
+"""Random poses, the best ones, that are improved by an optimiser."""
 
 _TOUCH = 1e-6
 """Metres of common reach that count as none."""

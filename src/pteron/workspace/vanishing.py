@@ -1,8 +1,8 @@
 """The functions of the pose that vanish at singular poses: their values, slopes and bounds.
 
-Next to the edge of a leg's reach the slope of what vanishes there has no end, as that of a square
-root has none. So roots are variables of their own, r^2 = g(x), r >= 0: of pose and roots the
-function is smooth on the edge too, and beyond it.
+At the edge of a leg's reach such a function has an infinite slope, as a square root has at 0. So
+roots are variables of their own, r^2 = g(x), r >= 0: of pose and roots the function is smooth on
+the edge too, and beyond it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from pteron.kernels.graph import INPUT, expression, graph_of
 from pteron.manipulator import Manipulator
 
 Kind = Literal["I", "II", "constraint"]
+"""Type I: a leg is stretched or folded. Type II: the actuators do not hold the platform.
+Constraint: the legs do not hold its orientation."""
 
 _WHAT = {"I": "squared_type_i", "II": "type_ii", "constraint": "constraint"}
 """The function that vanishes, by kind."""

@@ -18,18 +18,23 @@ from pteron.shapes import PoseLike, Seed
 from pteron.workspace.margins import distance_to_limits
 
 _SAMPLES = 20_000
+"""Random positions, some of which are in reach, that the search for the box begins with."""
+
 _STARTS = 5
+"""Positions, the best ones, from which an optimiser goes on."""
 
 _FRONT = 100
-"""Positions that are kept of those that are furthest to a side; as many twenty times are drawn
-about them in each of the rounds, ever nearer."""
+"""Positions kept in each round of the search for a side of the box: those furthest towards it.
+Twenty times as many are drawn about them."""
 
 _ROUNDS = 24
+"""Rounds of the search for a side."""
+
 _SPREAD = 0.2
-"""Their spread at first, over the size of the machine."""
+"""Standard deviation of the draws in the first round, over the size of the machine."""
 
 _NEARER = 0.75
-"""Factor of the spread from round to round."""
+"""Factor on that deviation from round to round."""
 
 _FAR = 1e3
 """Stand-in for no limit, m: the optimiser wants finite numbers."""
@@ -41,9 +46,10 @@ _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
 
 _BACK = 101
-"""Positions tried between start and result where the optimiser has gone too far."""
+"""Positions tried between the optimiser's start and its result, if that oversteps a bound."""
 
 _OPTIONS = {"ftol": 1e-10, "maxiter": 200}
+"""Options of the optimiser SLSQP."""
 
 _TOUCH = 1e-9
 """Metres by which the legs' reach must overlap to count as common."""

@@ -1,4 +1,4 @@
-"""Models for physics engines: one description of the opened mechanism, and files from it."""
+"""Models for physics engines (MJCF, SDF, URDF, Pinocchio), made from a tree of cut chains."""
 
 from typing import TYPE_CHECKING
 

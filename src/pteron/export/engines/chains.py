@@ -1,4 +1,4 @@
-"""The legs at a pose in numbers: their joints, their bodies and their ends."""
+"""The legs of a machine at a pose, as numbers: joint axes, bodies' frames and platform points."""
 
 from __future__ import annotations
 

@@ -22,8 +22,10 @@ COLORS = ("0.13 0.47 0.71 1", "0.84 0.37 0.05 1", "0.17 0.55 0.24 1", "0.55 0.35
 """Colours of the legs, in turn."""
 
 PLATFORM_COLOR = "0.78 0.66 0.21 1"
+"""Red, green, blue and opacity, here and below."""
 
 BASE_COLOR = "0.45 0.46 0.48 1"
+"""The base is grey."""
 
 
 def number(value: float) -> str:

@@ -16,10 +16,10 @@ from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 
 _GOOD = 0.1
-"""The least measure from singularities with which the middle of the joints' ranges will do."""
+"""Least measure of distance from singularities for the middle of the joints' ranges to be taken."""
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
-"""Numbers of random poses, and their least measures."""
+"""Numbers of random poses and their least measures, tried in turn."""
 
 _ALIKE = 1e-9
 """Difference below which two measures count as equal."""

@@ -1,8 +1,8 @@
-"""Inertia that the model does not determine, completed to real bodies.
+"""Inertia that a machine's model leaves open, completed to the bodies in space that engines want.
 
 A body that moves in a plane acts by its mass, its centre of mass in the plane and one moment of
-inertia; a slider by its mass alone; a rod without a spin. Engines want bodies in space. What is
-added here acts on no motion that the mechanism can make:
+inertia; a slider by its mass alone; a rod without a spin. What is added here acts on no motion that
+the mechanism can make:
 
 - a link's or the platform's other two moments about its centre are 0.6 and 0.7 of the one that
   acts, and its centre lies in the plane of its reference point;
@@ -31,7 +31,7 @@ _LEAST = 1e-10
 a body whose whole mass is at its centre is none to an engine."""
 
 _TINY = 2e-14
-"""kg m^2; engines refuse less."""
+"""Least moment of inertia that engines accept, kg m^2."""
 
 SHARE = 1e-10
 """Share of a body's mass and moments that a link between its joints has."""

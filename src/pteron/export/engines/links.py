@@ -13,6 +13,7 @@ from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody, TreeJoi
 from pteron.kernels import Array
 
 _SAME = 1e-6
+"""Distance below which points count as one, m."""
 
 
 class Link(NamedTuple):

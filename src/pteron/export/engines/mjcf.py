@@ -35,6 +35,7 @@ STIFFNESS = 0.2
 """The rate at which the loops' constraints pull gaps back, times the step."""
 
 _SAME = 1e-6
+"""Distance below which a shape's ends count as equal, m."""
 
 
 def export_mjcf(

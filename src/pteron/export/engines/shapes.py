@@ -11,7 +11,7 @@ from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody
 from pteron.kernels import Array
 
 _THICK = 0.011
-"""Radius of a link, as a share of the machine's size; the other sizes go by it."""
+"""Radius of a link, as a share of the machine's size; other shapes are in proportion."""
 
 _APART = 0.018
 """Half the distance of parallel rods, as a share of the machine's size: files do not say it."""
@@ -23,6 +23,7 @@ _OVERLAP = 0.55
 """Each part of a telescope has this share of the whole."""
 
 _SAME = 1e-6
+"""Distance below which points count as one, m."""
 
 
 def dressed(opened: Tree) -> Tree:

@@ -26,10 +26,10 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 _MOST = 1e6
-"""Stands for no limit of effort (N, N m) or velocity, which URDF requires."""
+"""Stand-in for no limit of effort (N, N m) or velocity, which URDF requires."""
 
 _FAR = 1e3
-"""Stands for no limit of a joint that slides, m."""
+"""Stand-in for no limit of a joint that slides, m."""
 
 
 def export_urdf(

@@ -1,4 +1,4 @@
-"""Klipper's configuration of a machine."""
+"""Export of a machine's kinematics as a configuration of Klipper, the printer firmware."""
 
 from pteron.export.klipper.configuration import export_klipper
 

@@ -17,9 +17,10 @@ _BELOW = 1e-3
 """Depth below the bed from which rotary_delta.py takes a machine to home, m."""
 
 _GOOD = 0.05
-"""The measure, of type I or twice that of type II, that every pose at the bed has at least."""
+"""Least measure of poses at the bed: the type-I measure, or twice the type-II measure."""
 
 _LEVELS, _RINGS, _DIRECTIONS = 200, 20, 24
+"""Heights tried, and at each one the rings of poses and the poses on a ring."""
 
 
 def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[float, float]:

@@ -27,10 +27,11 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 
 ZERO = 5e-13
-"""A coefficient below it is left out: over a metre it is less than a picometre."""
+"""Coefficients below it are left out: over a metre they make less than a picometre."""
 
 _LEAST_DETERMINANT = 1e-5
-"""Below it Klipper (generic_cartesian.py) holds that the steppers cannot move all axes."""
+"""The determinant below which Klipper (generic_cartesian.py) says that the steppers cannot move all
+axes."""
 
 
 def cartesian(robot: Manipulator) -> Iterator[ConfigSection]:

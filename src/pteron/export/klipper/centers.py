@@ -16,7 +16,7 @@ from pteron.legs.leg import Sphere
 from pteron.manipulator import Manipulator
 
 SAME = 1e-6
-"""Metres, or a unit vector's part, that a machine may differ from what Klipper takes."""
+"""Deviation, in metres or of a unit vector, from the regular machine that Klipper takes."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Sections of a Klipper configuration, and their texts."""
+"""Sections of a Klipper configuration: their entries, texts and units."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pteron.errors import ModelError
 from pteron.manipulator import Manipulator
 
 INSTEAD = "use --linuxcnc, or --c for a controller of your own"
+"""Advice at the end of refusals."""
 
 
 @dataclass(frozen=True)

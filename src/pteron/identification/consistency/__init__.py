@@ -1,4 +1,4 @@
-"""Real bodies that reproduce identified base parameters: positive masses, inertias that exist."""
+"""Real bodies for identified base parameters: masses above zero, inertias that a body can have."""
 
 from pteron.identification.consistency.bodies import real_bodies
 from pteron.identification.consistency.bounds import Bounds

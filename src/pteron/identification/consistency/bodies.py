@@ -1,4 +1,4 @@
-"""The bodies that parameters describe: their scales, their cones, and the nearest targets."""
+"""The bodies that parameters describe, as a cone program needs them: scales, margins, targets."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ from pteron.reduction import BaseParameters
 from pteron.reduction.sharing import share
 
 _ROUNDING = 1e-12
+"""Share of an inertia that counts as rounding."""
+
 _SMALL_PLATFORM = 0.25
-"""A platform whose points are all at P is taken as this fraction of a link, for its scale."""
+"""Size of a platform whose points are all at P, as a share of a link's, for its scale."""
 
 _MARGIN = 1e-3
+"""Largest margin of a body inside its cone, relative to its mass; a uniform rod has 0.067."""
+
 _LEAST_MARGIN = 1e-6
-"""Margins of a body inside its cone, relative to its mass; a uniform rod has 0.067."""
+"""Least margin of a body."""
 
 
 @dataclass(frozen=True)

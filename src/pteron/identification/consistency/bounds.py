@@ -1,4 +1,4 @@
-"""Prior knowledge of the bodies: limits of parameters, boxes that hold the bodies."""
+"""Prior knowledge of the bodies: limits of parameters, and boxes that hold a body's mass."""
 
 from __future__ import annotations
 

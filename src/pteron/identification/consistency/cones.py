@@ -18,7 +18,8 @@ from pteron.identification.consistency.bodies import Bodies
 from pteron.kernels import Array
 
 _TOLERANCES = (1e-10, 1e-9, 1e-8)
-"""The solver's, each where it gives up at the one before: the caller checks the answer alike."""
+"""Tolerances of the solver, the next where it gives up at one: the caller checks all answers
+alike."""
 
 _UNITS = (1e-4, 1e-3, 1e-2)
 """Units of residuals, over the values' distance from zero: with the first 1e5 standard deviations

@@ -34,13 +34,14 @@ from pteron.manipulator import (
 from pteron.reduction import BaseParameters
 
 _DEEPEST = 2.0
-"""Twice the margin: there the margin itself leaves room for the search of the nearest model."""
+"""Greatest depth of a body inside its cone, over its margin, that is asked for: with it the margin
+leaves space for the search of the nearest model."""
 
 _SHALLOW = 0.02
-"""Values whose bodies are not this much of the margin inside count as not feasible."""
+"""Depth, over the margin, below which values count as not feasible."""
 
 _FORCE = 1e-3
-"""A body or bound whose multiplier is this part of the largest one holds the fit back."""
+"""Share of the largest multiplier from which a body or a bound is said to hold the fit back."""
 
 _TOO_FAR = (
     "values: too far from those of real bodies for the solver; look at their units, and at the "

@@ -1,4 +1,4 @@
-"""Estimators: each takes observations and returns an estimate."""
+"""Estimators: each takes observations (regressor and forces) and returns an `Estimate`."""
 
 from collections.abc import Callable
 

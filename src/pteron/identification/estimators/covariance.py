@@ -1,8 +1,9 @@
-"""Covariance of values whose residuals are correlated, in time and between actuators.
+"""Covariance of estimated values whose residuals are correlated, in time and between actuators.
 
 Newey and West's sandwich estimates p x p numbers at each lag from a few hundred rows: its small
-eigenvalues come out far too small, and with them regions of several values. Here the noise of each
-actuator is an autoregression, a few numbers each, and the p x p covariance follows from these.
+eigenvalues come out far too small, and with them the confidence regions of several values. Here the
+noise of each actuator is an autoregression, a few numbers each, and the p x p covariance follows
+from these.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 from pteron.kernels import Array
 
 _LAGS = 5
-"""Rows over which noise is compared with itself, once its correlation with the next is taken out;
-the parallel filter leaves little beyond them."""
+"""Order of the autoregression, after the correlation of neighbouring rows is taken out: the
+parallel filter leaves little beyond it."""
 
 _MOST_REFLECTION = 0.5
-"""Largest reflection coefficient at these lags: what is left is nearly white."""
+"""Largest reflection coefficient of that autoregression: what is left is nearly white."""
 
 _ROUNDS = 3
 """Rounds in which the noise is found anew, corrected for the fit's leverage."""

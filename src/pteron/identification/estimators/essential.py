@@ -12,6 +12,7 @@ from pteron.identification.estimators.estimate import Estimate
 from pteron.identification.observation import Observations
 
 LEVEL = 0.05
+"""Usual level of the test."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from pteron.identification.observation import Observations
 from pteron.kernels import Array
 
 _LAGS = 20
+"""Lags of the residuals' autocorrelation that are tested."""
+
 _LEVEL = 0.01
 """Chance at which white residuals would be called coloured."""
 

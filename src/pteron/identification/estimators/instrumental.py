@@ -19,6 +19,7 @@ from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
 
 _NAME = "instrumental"
+"""The method's name in its estimate."""
 
 _SETTLED = 1e-3
 """Change of a value, in standard deviations, and of the noise, relative, that does not matter."""
@@ -27,7 +28,8 @@ _DEGREE = 5
 """Degree of the spline through every other sample."""
 
 Instruments = Observations | Callable[[Array], Observations]
-"""Observations of states without the noise of those to be solved; or what makes them of values."""
+"""Observations at states whose noise is independent of that in the observations to solve; or a
+function that makes them from values."""
 
 
 def instrumental(

@@ -1,4 +1,4 @@
-"""Maximum likelihood where positions are noisy as well as forces."""
+"""Maximum likelihood: values and motion together, where positions are noisy as well as forces."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from pteron.identification.signals.derivatives import Curve
 from pteron.kernels import Array
 
 _NAME = "likelihood"
+"""The method's name in its estimate."""
+
 _RENEWED = 2
 """Iterations that compute the forces' slopes anew: they change with the motion only a little."""
 
@@ -30,7 +32,8 @@ _STEPS = (1e-5, 1e-3, 1e-1)
 """Steps of the differences by position, rate and acceleration: m and s."""
 
 _LEAST_NOISE = 1e-6
-"""Least noise of an actuator, relative to the largest: one without equations has none."""
+"""Least noise of an actuator, relative to the largest: an actuator without equations would have
+none."""
 
 _MOST = 20_000
 """Coefficients of the motion that are fitted at once."""

@@ -1,4 +1,4 @@
-"""Least squares through a QR factor that is built block by block."""
+"""Least squares through a QR factor that is built block by block, so that memory stays small."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which a combination of values is not excited."""
 
 _TAKES_PART = 0.05
-"""Share in an unseen combination that makes a value one of those it concerns."""
+"""Share of a value in a combination that is not excited, from which messages name the value."""
 
 _PLAIN = 1e5
 """Condition number of W up to which W R^-1 is orthonormal to some ten digits."""

@@ -1,4 +1,4 @@
-"""Base parameters of a regressor that is only known as numbers."""
+"""Independent columns of a regressor that is given as numbers: base parameters of any robot."""
 
 from __future__ import annotations
 

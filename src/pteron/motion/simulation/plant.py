@@ -18,6 +18,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 Method = Literal["rk4", "dop853"]
+"""Runge and Kutta's method with fixed steps, or SciPy's DOP853, which chooses its steps."""
 
 _STABLE = 2.0
 """Runge and Kutta's method of fourth order is stable up to a decay of 2.78 within a step."""

@@ -1,4 +1,4 @@
-"""A machine under a controller, or under given forces, from sample to sample."""
+"""`simulate`: a machine's motion under a controller, or under given forces, sample by sample."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ STEP = 1e-4
 """Length of the integration's steps, s, where none is given and friction allows it."""
 
 PERIOD = 1e-3
-"""Between two samples where no controller says it, s."""
+"""Time between two samples where no controller says it, s."""
 
 _POSES = 64
-"""Poses of a motion at which the step that friction allows is asked for."""
+"""Poses of a motion at which the longest stable step under friction is computed."""
 
 _MOST = 10_000_000
 """Samples that a simulation may have."""
 
 _STATE = ("start, pose", "start, velocity")
+"""Names in messages of the two parts of a start."""
 
 
 @runtime_checkable

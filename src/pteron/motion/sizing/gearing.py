@@ -36,6 +36,7 @@ class Span(NamedTuple):
 
 
 NONE = Span(math.inf, 0.0)
+"""No ratio."""
 
 
 def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tuple[float, float]:

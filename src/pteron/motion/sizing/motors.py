@@ -23,6 +23,7 @@ _SLUGGISH = 30.0
 hundreds to tens of thousands."""
 
 _NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
+"""Names of the numbers of a motor, in the columns of a file too."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Time laws of piecewise constant acceleration, and their averages over a window."""
+"""Time laws s(t) of piecewise constant acceleration, and their moving averages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The path of a pick-and-place cycle as a function of its length."""
+"""The path of a pick-and-place cycle as a function of its arc length."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ _EDGE = 1e-3
 """Share of a cycle's move, at each end, that counts as a straight line."""
 
 _NODES = 2001
+"""Nodes between which the arc length is interpolated."""
 
 
 class CyclePath:

@@ -1,6 +1,6 @@
-"""Joint rates and drive forces along a curve of poses, and the largest speed within limits.
+"""Joint motion and drive forces along a curve of poses, and the largest speed within limits.
 
-Along a curve x(p) the drives' forces are c + a p'' + b p'^2, and what friction needs: dry friction
+Along a curve x(p) the drives' forces are c + a p'' + b p'^2, and what friction takes: dry friction
 by the sign of the joint's motion, viscous friction by its speed.
 """
 
@@ -22,11 +22,13 @@ from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.tool import Curve, tool_motion
 
 _ROUNDING = 1e-12
+"""Relative excess over a drive's limit that counts as rounding."""
 
 _CREEP = 1e-30
 """Rate that stands for a joint that reverses, with either sign."""
 
 _HALVINGS = 50
+"""Bisections for the place where a joint reverses."""
 
 _WORDS = {
     "speed": ("moves at up to", "{unit}/s"),

@@ -12,10 +12,13 @@ _VALLEYS = 3
 """Number of a measure's lowest local minima that are refined."""
 
 _FINER = 33
+"""Points of a round of the refinement."""
+
 _ZOOMS = 4
-"""Points and rounds of the refinement: a round narrows the interval 16 times."""
+"""Rounds of the refinement: each narrows the interval 16 times."""
 
 _HALVINGS = 50
+"""Bisections for the first place below a bound."""
 
 
 def least_along(

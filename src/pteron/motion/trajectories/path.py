@@ -31,7 +31,7 @@ _SHARP = -0.9
 """Cosine between the directions before and after a corner below which the platform stops there."""
 
 _STRAIGHT = 1.0 - 1e-12
-"""Cosine above which the path counts as straight there."""
+"""Cosine between those directions above which the path counts as straight there."""
 
 
 @runtime_checkable

@@ -1,4 +1,4 @@
-"""A motion from a table: of poses, or of joint coordinates that the platform follows."""
+"""A motion from a table of poses over time, or of joint coordinates that the platform follows."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ TIME = "t"
 """The column of the time, s."""
 
 _DEGREE = 5
+"""Degree of the interpolating spline."""
 
 
 def replay(

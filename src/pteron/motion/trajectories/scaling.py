@@ -1,4 +1,4 @@
-"""The largest pick-and-place cycle that a machine can do."""
+"""The largest pick-and-place cycle that a machine can do, as a multiple of the standard one."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ TURN = np.pi / 3.0
 """Turn of the platform on its way across in the full cycle, rad."""
 
 _DIRECTIONS = 12
+"""Horizontal directions of the cycle that are tried."""
+
 _SAMPLES = 501
 """Poses checked on the path out; the path back is the same."""
 

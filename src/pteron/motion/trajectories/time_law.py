@@ -1,4 +1,4 @@
-"""Time laws: a path or a curve traversed in a given duration, or the shortest within limits."""
+"""Motions along a path or a curve in a given duration, or in the shortest one within limits."""
 
 from __future__ import annotations
 
@@ -25,16 +25,18 @@ _MOST = 10_000_000
 """Samples that a motion may have."""
 
 _LOOK = 2001
-"""Samples of a motion at which the shortest time for it is decided."""
+"""Points of a motion from which its shortest duration is computed, and at which a given one is
+checked."""
 
 KEPT = 1.0 + 1e-9
 """Share of a limit up to which it counts as kept: rounding."""
 
 _FINER = 10
-"""Points at which a motion is checked, over its samples."""
+"""Points at which a finished motion is checked, for each of its samples."""
 
 _TRIES = 8
-"""Most times that a motion is slowed until it keeps its limits: rounding aside once or twice."""
+"""Most times that a motion is slowed until it keeps its limits; but for rounding, once or twice
+suffice."""
 
 
 def shortest(

@@ -37,10 +37,10 @@ from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
 
 _GRID = 400
-"""Intervals of a stretch."""
+"""Grid intervals along a stretch between two rests."""
 
 _EVEN = 0.3
-"""Share of the grid's spacing that is even."""
+"""Share of the grid that is spaced evenly."""
 
 _PASSES = 4
 """Passes over a stretch, each with tighter limits where the pass before exceeds one."""

@@ -1,4 +1,4 @@
-"""Polynomials in time from rest to rest."""
+"""Time laws from rest to rest that are polynomials of the fifth or the seventh degree."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motion of the tool's centre point from that of the platform, and the inverse."""
+"""Motion of the tool's centre point from that of the platform, and the other way round."""
 
 from __future__ import annotations
 
