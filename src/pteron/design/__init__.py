@@ -1,4 +1,4 @@
-"""The best dimensions: searches over a machine's geometry, with proofs of their results."""
+"""Design: searches for a machine's best dimensions, with proofs of their results."""
 
 from typing import TYPE_CHECKING
 

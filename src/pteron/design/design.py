@@ -1,4 +1,4 @@
-"""One design: the machine with some values of the variables, and its quantities."""
+"""One design of a search: the machine with some values of the variables, and its quantities."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from pteron.manipulator.manipulator import told_legs
 from pteron.renamed import former_attribute
 
 _NONE = 1e-9
-"""Smaller changes, in m or without unit, are left out."""
+"""Smaller changes, in m or without unit, count as none."""
 
 
 @dataclass(frozen=True)

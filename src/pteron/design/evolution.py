@@ -1,4 +1,4 @@
-"""Generations of designs, and the best of them: by pymoo, which is an extra."""
+"""Evolutionary search with pymoo, an optional extra: generations of designs, the best of them."""
 
 from __future__ import annotations
 

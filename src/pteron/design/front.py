@@ -1,4 +1,4 @@
-"""The front of a search: the designs that no other one betters in every objective."""
+"""The Pareto front of a search: the designs that no other one betters in every objective."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Front:
     evaluated : int
         Number of designs it was found among.
     kept : int
-        Number of of them keep all that is asked.
+        How many of them keep all that is asked.
     """
 
     task: Task

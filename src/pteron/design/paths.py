@@ -12,8 +12,13 @@ from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 
 _WRITTEN = re.compile(r"(-?)legs(?:\[([\d\s,]*)\])?\.(\w+)(?:\.(\w+))?")
+"""Pattern of a path: sign, legs, key, component."""
+
 _GEOMETRIC = ("point", "direction", "length", "number")
+"""Roles of keys that a search may vary."""
+
 _SHAPE = 'a path such as "legs.platform_point" or "legs[1,3].guide_point.x"'
+"""Example of a path for messages."""
 
 
 @dataclass(frozen=True)

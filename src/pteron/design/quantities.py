@@ -1,4 +1,4 @@
-"""Quantities by which designs are compared: a table with units and meanings."""
+"""Quantities by which designs are compared, such as size or margins, with units and meanings."""
 
 from __future__ import annotations
 

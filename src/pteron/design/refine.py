@@ -1,4 +1,4 @@
-"""A design made better by gradients: one objective, while the others and what is asked are held."""
+"""Refinement of a design by gradients: one objective improves, everything else asked is kept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The poses of a required workspace: a box, a cube or a cylinder at some orientations."""
+"""Sample poses of a required workspace: a box, a cube or a cylinder at some orientations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a search: a page in Markdown, its figures as plain data, and files of robots."""
+"""The report of a search: a page in Markdown, its figures as data, and the designs' files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The steps of a fit: how a recording is preprocessed, its observations, and the estimate."""
+"""The steps of a fit: preprocessing of a recording, its observations, checks, and the estimate."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ METHODS = (*ESTIMATORS, "instrumental", "likelihood")
 """Names of the estimators that `identify` knows."""
 
 _EXPLAINED = 0.2
-"""Error relative to the forces that joints in another order must undercut three times to be called
-the right ones, where those of the log have no pose."""
+"""Error of a fit, over the forces, below which joints in another order count as the right ones
+where those of the log have no pose."""
 
 _LOOK = 12_000
-"""Rows that are tried in other orders."""
+"""Rows, at most, in which other orders of joints are tried."""
 
 _MOST = 10.0
-"""Largest ratio of the noise of two recordings."""
+"""Largest ratio of the noise of two recordings that weights take into account."""
 
 _NOISELESS = 1e-10
 """Residuals, relative to the forces, that are rounding."""

@@ -1,4 +1,4 @@
-"""`identify`: from logs to parameters, a model of real bodies, and a verdict."""
+"""`identify`: from logs to identified parameters, a model of real bodies, and a verdict."""
 
 from __future__ import annotations
 

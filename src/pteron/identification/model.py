@@ -1,4 +1,4 @@
-"""The model that is linear in what is identified: base parameters, friction, offsets, payload."""
+"""The model that identification fits: linear in base parameters, friction, offsets and payload."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ Passive = Literal["none", "shared", "each"]
 """Viscous friction in the passive joints: none, one coefficient a kind of joint, or one each."""
 
 _PROBES = 200
+"""Random states at which columns are tested for dependence."""
+
 _DEPENDENT = 1e-9
 """Residual of a column on those before it, relative to it, below which it depends on them."""
 

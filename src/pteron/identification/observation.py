@@ -25,7 +25,7 @@ from pteron.motion.trajectories.fourier import fourier_basis
 
 
 class LinearModel(Protocol):
-    """A model whose columns observations are made of: a `Model`, or one with more columns."""
+    """A model that is linear in its values: a `Model`, or one with more columns."""
 
     @property
     def robot(self) -> Manipulator:

@@ -1,4 +1,4 @@
-"""Whether values can be those of the machine, whatever the forces say: plausibility checks."""
+"""Plausibility of identified values: whether they can be the machine's, whatever the forces say."""
 
 from __future__ import annotations
 
@@ -23,23 +23,31 @@ from pteron.manipulator import Manipulator, parameters
 from pteron.reduction import BaseParameters, base_regressor
 
 _PROBES = 50
+"""Random poses at which kinetic energy must be positive."""
 
 _NO_FORCES = 1e4
+"""Standard deviation of a base parameter, over its usual size, beyond which the forces are not the
+machine's."""
+
 _MOST_UNSEEN = 0.5
-"""Share of the base parameters that a motion may leave unseen."""
+"""Largest share of the base parameters that a motion may leave unseen."""
 
 _FAR_ABOVE = 5.0
-"""Least residual, over the forces' noise, where the model is not the machine's."""
+"""Residuals, over the forces' noise, from which the model is not the machine's."""
 
 _FAR = 0.5
-"""Least difference from the drawn machine that is warned of, over a base parameter's usual size."""
+"""Difference from the drawn machine, over a base parameter's usual size, from which a warning is
+given."""
 
 _TOLD = 0.2
-"""Largest standard deviation, and spread, of ratios of values to those drawn that is told."""
+"""Largest standard deviation of a value, and spread of the ratios of values to drawn ones, for a
+common factor to be told."""
 
 _APART = 1.5
+"""Least common factor, or its inverse, that is a wrong scale rather than a bad drawing."""
+
 _FEWEST = 3
-"""Least factor in common, and of how many values, that is a scale rather than a bad drawing."""
+"""Least number of values with a factor in common."""
 
 _LEAST_SHARE = 0.02
 """Least usual size of a parameter, as a share of its body's mass and length."""

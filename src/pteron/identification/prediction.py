@@ -1,4 +1,4 @@
-"""Forces that were measured against forces that a model predicts, sample by sample."""
+"""Predictions of a model for a recording: measured against predicted forces, sample by sample."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ from pteron.identification.signals import Preprocessing, samples
 from pteron.kernels import Array
 
 _KEPT = 6000
-"""Samples that are kept to be looked at."""
+"""Samples, about, that are kept for pictures."""
 
 _STANDS_OUT = 7.0
 """Outlier threshold: distance of an error from those around it, over the noise."""
 
 _AROUND = 9
-"""Samples around an error, and it."""
+"""Samples of the window in which an error is compared with others."""
 
 _LEAST_NOISE = 1e-3
-"""Noise of a force, over its size, that counts as at least."""
+"""Least noise of a force, over its size."""
 
 _RARE, _FEW = 1e-3, 0.05
-"""Shares of outliers up to which they may be chance, and from which they are no exception."""
+"""Shares of outliers: up to the first they may be chance, from the second on they are no
+exception."""
 
 FRICTION = ("coulomb", "viscous", "stribeck", "offset")
+"""Kinds of values that are not the rigid bodies'."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Recordings: logs in memory, or files that are read in pieces, divided for fit and check."""
+"""Recordings: logs in memory, or files read in pieces, divided into parts to fit and to check."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
 _LOOKED_AT = 2_000_000
-"""Rows of a file read in pieces that tell how well a fit describes what it was fitted to."""
+"""Rows of a long file, at most, from which the errors of a fit to it are computed."""
 
 _END = int(np.iinfo(np.int64).max)
-"""Beyond the last row of every file: how many it has is known for certain when it has been read."""
+"""A row beyond the last one of every file: its number of rows is known only when it has been
+read."""
 
 _ROUNDINGS = 2.0
 """Largest error of stamps beside their clock's ticks, in the spacing of floats."""

@@ -29,9 +29,10 @@ from pteron.identification.verdict import Verdict, verdict_of
 from pteron.kernels import Array
 
 _LEAST_ROWS = 9
-"""Samples from which the noise of forces can be told without a model."""
+"""Least number of samples, from which the noise of forces can be found without a model."""
 
 _ESTIMATORS = (*ESTIMATORS, "instrumental")
+"""Estimators by name."""
 
 
 @dataclass(frozen=True)

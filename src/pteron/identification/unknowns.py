@@ -1,10 +1,10 @@
-"""Unknowns that the forces are not linear in: speeds of Stribeck's friction, and a delay.
+"""Unknowns in which the forces are not linear: speeds of Stribeck's friction, and a delay.
 
-Fs sign(q') exp(-(q'/v)^2) is linear in Fs and not in v. The speeds, and the delay of the forces for
-the positions, are those of least squares, all other values being projected out (variable
-projection). Speeds are first searched among columns of a row of them; then both are refined by
-Gauss's and Newton's steps, with the slopes of the forces as columns. What their uncertainty adds to
-that of the values comes with the steps.
+Fs sign(q') exp(-(q'/v)^2) is linear in Fs and not in v. The speeds v, and the delay of the forces
+against the positions, are found by least squares with all other values projected out (variable
+projection). Speeds are first searched on a grid; then both are refined by Gauss's and Newton's
+steps, with the slopes of the forces as columns. What their uncertainty adds to that of the values
+comes with the steps.
 """
 
 from __future__ import annotations
@@ -28,23 +28,26 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
 _SLOWEST, _FASTEST = 3e-3, 3.0
-"""Speeds between which they are searched, over each joint's root mean square."""
+"""Least and greatest speed of the search, over each joint's root mean square speed."""
 
 _COLUMNS = 24
+"""Speeds of the grid whose columns are computed."""
+
 _FINE = 200
-"""Speeds with a column of their own, and those that are tried, between them."""
+"""Speeds that are tried, with columns interpolated between those."""
 
 _ROUNDS = 8
-"""Times that the joints are gone through one by one, and steps on exact columns, at most."""
+"""Most rounds through the joints one by one, and most steps on exact columns."""
 
 _CLEAR = 30.0
-"""Twice the logarithm of the likelihood, which a joint's fall must raise by as much to be seen."""
+"""Least increase of twice the log-likelihood for Stribeck's friction of a joint to count as
+seen."""
 
 _STEP = 0.5
-"""Largest step of a speed's logarithm."""
+"""Largest change of a speed's logarithm in a step."""
 
 _SETTLED = 0.02
-"""Step that no longer matters, in standard deviations."""
+"""Step, in standard deviations, below which the iteration ends."""
 
 _ROUNDING = 1e-9
 """Step that never matters: s, or of a speed's logarithm."""

@@ -1,4 +1,4 @@
-"""Whether a model can be trusted, from what it was not fitted to and from what residuals show."""
+"""The verdict on a model, how far to trust it: by its errors on held-out data and its residuals."""
 
 from __future__ import annotations
 
@@ -17,29 +17,34 @@ from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
+"""The grades of a verdict, best first."""
 
 AT_THE_FLOOR = 1.5
-"""Held-out error over the noise floor up to which noise is all there is."""
+"""Held-out error, over the noise floor, up to which it is all noise."""
 
 DROWNED = 50.0
-"""Held-out error in percent beyond which nothing has been explained, whatever the noise."""
+"""Held-out error, percent, beyond which nothing has been explained, whatever the noise."""
 
 SMALL = 5.0
+"""Held-out error beyond the noise, percent of a force's standard deviation, up to which a model is
+trusted."""
+
 LARGE = 15.0
-"""Percent of a force's standard deviation that the model misses beyond the noise."""
+"""The same error beyond which a model is not trusted."""
 
 CYCLE = 3.0
-"""Largest error of a pick-and-place cycle that is trusted, percent of its forces."""
+"""Error in a pick-and-place cycle, percent of its forces, up to which a model is trusted."""
 
 _LOWER = (0.7, 0.5)
-"""Cut-offs that are tried too, over that of the whole recording."""
+"""Lower cut-offs that are tried too, over that of the whole recording."""
 
 FAR = 5.0
-"""Standard deviations beyond which values that no real bodies have are not trusted."""
+"""Distance from values of real bodies, in standard deviations, beyond which values are not
+trusted."""
 
 _SEEN = 0.5
-"""Percent of the forces by which those of the nearest real bodies differ, from which that counts:
-without noise standard deviations are next to nothing."""
+"""Difference of the nearest real bodies' forces, percent, from which that distance counts: without
+noise standard deviations are next to nothing."""
 
 _HIDDEN: dict[str, tuple[str, str]] = {
     "gain": (

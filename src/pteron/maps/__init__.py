@@ -1,7 +1,6 @@
-"""Work on many poses, or many designs: in chunks, here or on a cluster, and never twice.
+"""Maps of performance indices over grids of poses, and sweeps of any function over many chunks.
 
-A map says what indices of performance are over a grid of poses, and which of them serve; a sweep is
-the same for any function.
+Work is done in chunks, here or on a cluster, and what is finished is never computed twice.
 """
 
 from pteron.arguments import check_arguments

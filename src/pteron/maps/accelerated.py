@@ -1,4 +1,4 @@
-"""Maps computed by JAX: one function of the axes' values, compiled once for all chunks."""
+"""Maps computed by JAX, on its accelerator if any, by one function compiled for all chunks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maps as NumPy's archives: the arrays, and what they are of as JSON."""
+"""Maps as NumPy archives (.npz): arrays of indices and axes, and the grid and machine as JSON."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from pteron.maps.grid import Grid
 from pteron.maps.map import Map
 
 _ABOUT, _STATUS = "about", "status"
+"""Names of the arrays beside indices and axes."""
 
 
 def write_archive(given: Map, target: Path) -> Path:

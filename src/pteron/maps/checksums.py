@@ -1,4 +1,4 @@
-"""Checksums by which what is read is known to be what was written."""
+"""Checksums of a map's data and arrays, by which damage to a file is noticed."""
 
 from __future__ import annotations
 

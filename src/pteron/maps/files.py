@@ -15,6 +15,7 @@ from pteron.maps.surfaces import checked_surfaces, surface_bytes
 from pteron.maps.table_file import read_map_table, write_map_table
 
 _TABLES = (".csv", ".parquet")
+"""Endings of tables."""
 
 
 def save_map(given: Map, path: str | Path) -> Path:

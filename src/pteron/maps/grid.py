@@ -1,4 +1,4 @@
-"""Grids of poses: the ranges of coordinates that vary, and the values of the others."""
+"""Grids of poses: coordinates that vary in equal steps, and fixed values of the others."""
 
 from __future__ import annotations
 
@@ -23,12 +23,14 @@ from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose
 
 _POINTS = {1: 400, 2: 200, 3: 100, 4: 40}
-"""Along each axis, by how many there are: about as much as a picture shows."""
+"""Points along each axis, by the number of axes, where none is given: about as much as a picture
+shows."""
 
 _TURNS = 5
 """Orientations of which the bounding boxes are taken together, where the angle varies."""
 
 _HUGE = float_info.max
+"""The largest finite number."""
 
 _CHUNK = 1 << 17
 """Poses of a chunk at most: a second's work or less, and a megabyte of each index."""

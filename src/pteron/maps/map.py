@@ -1,4 +1,4 @@
-"""A map: indices of performance over a grid of poses, and whether each pose is in reach."""
+"""A map: performance indices over a grid of poses, and whether each pose is in reach."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Indices over a grid of poses: computed chunk by chunk, by whom and into what one asks for."""
+"""`map_index`: performance indices over a grid of poses, chunk by chunk, here or elsewhere."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from pteron.maps.sweep import cores, sweep
 from pteron.shapes import Workers
 
 Engine = Literal["auto", "jax"]
+"""The kernels of `pteron.kernels.choice`, or JAX."""
 
 _BLOCK = 1 << 14
 """Poses in one call of a kernel: what it reads and writes stays in the processor's cache."""

@@ -1,4 +1,4 @@
-"""Plans of stores: a store is resumed by the plan that it was made with, and by no other."""
+"""Plans of stores: data on all that results depend on, by which a store is resumed, or refused."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ It is raised where a number of them changes.
 """
 
 _LONG = 40
+"""Characters of a text that a message shows whole."""
+
 _MANY = 2
 """Most differences that are listed of each part of a plan."""
 

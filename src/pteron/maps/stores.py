@@ -27,7 +27,11 @@ from pteron.maps.plan import expect_same
 from pteron.platforms.coordinates import COORDINATES
 
 _CHECKSUM = "checksum"
+"""Name of the array of the chunks' checksums."""
+
 _STATUS = "status"
+"""Name of the array that says whether poses are in reach."""
+
 _NOT_COMPUTED = -128
 """`status` where no chunk has been written: no pose is taken for one that serves."""
 

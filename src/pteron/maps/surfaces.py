@@ -1,7 +1,7 @@
-"""Surfaces of a map in three axes: the reach's, and those of equal value, for files that are drawn.
+"""Surfaces of a map in three axes: of the reach, and of equal values, for files that are drawn.
 
 The triangles are those of marching cubes (T. Lewiner et al., Journal of Graphics Tools 8(2) (2003)
-1-15), between poses that serve; the reach's surface is where its margin is zero.
+1-15), between poses in reach and in limits; the reach's surface is where its margin is zero.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from pteron.kernels import Array
 from pteron.maps.map import MARGIN, Map, headed
 
 ENDINGS = (".vtk", ".vtu", ".ply", ".stl")
-"""Endings of files that hold surfaces; what a surface's value is, STL does not say."""
+"""Endings of files that hold surfaces; STL does not hold the value that a surface belongs to."""
 
 _SHARES = (0.25, 0.5, 0.75)
-"""Shares of the poses that serve, by their value, which surfaces part by default."""
+"""Quantiles of an index at which its surfaces are by default."""
 
 _BEYOND = 1e-9
-"""Metres: outside of the grid nothing is in reach, so that the reach's surface is closed."""
+"""Minus the margin that places outside of the grid get, m: so the reach's surface is closed."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 """Sweeps: the same work on many chunks, here, in processes of this computer, or on a cluster.
 
-Chunks are numbered by a plan that depends on nothing but what is asked for. What a chunk gives is
-written, whole or not at all, by whoever has computed it. So a worker or a client that is killed
-loses what it was at and nothing else, a chunk that is computed twice is written twice alike, and
-the result does not depend on who computed what. Who computes a chunk, and again after a worker is
-gone, is `dask.distributed`'s business.
+Chunks are numbered by a plan that depends on nothing but the task. The process that has computed a
+chunk writes it, whole or not at all. So a process that is killed loses its present chunk and
+nothing else, a chunk that is computed twice is written twice alike, and the result does not depend
+on who computed what. `dask.distributed` decides who computes a chunk, and again after a worker is
+gone.
 """
 
 from __future__ import annotations
@@ -37,9 +37,10 @@ _GONE = 60.0
 """Seconds in which a cluster without any worker may get another."""
 
 _AGAIN = "what is finished is kept: run it again"
+"""Advice at the end of errors."""
 
 _AHEAD = 4
-"""Chunks for each thread that a cluster is given at once; a sweep may have millions."""
+"""Chunks for each thread that a cluster is given at a time: a sweep may have millions."""
 
 
 class Store(Protocol[_Written]):

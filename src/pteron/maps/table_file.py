@@ -1,4 +1,4 @@
-"""Maps as tables: a row a pose, found again by its coordinates whatever the rows' order is."""
+"""Maps as tables (.csv, .parquet): a row a pose, which may be read back in any order of rows."""
 
 from __future__ import annotations
 
@@ -21,11 +21,14 @@ from pteron.tables import Table, listed, read_table, write_table
 from pteron.workspace import BEYOND_LIMITS
 
 _STATUS = "status"
+"""Column that says whether a pose is in reach."""
+
 _CHECKSUMS = ("pteron.sha256", "pteron.sha256.again")
-"""Keys of the checksum in a Parquet file's metadata: two, so that one damaged place is harmless."""
+"""Keys of the checksum in a Parquet file's metadata: two, so that damage to one of them is
+harmless."""
 
 _WRITER = "ARROW:schema"
-"""Key that files of data frames have; where it is missing, the metadata are damaged."""
+"""Key that every file of a data frame has; where it is missing, the metadata are damaged."""
 
 _EQUAL = 1e-6
 """Greatest difference of a coordinate's steps, over a step, for tables with few digits."""

@@ -1,4 +1,4 @@
-"""A folder of Parquet files, one for each chunk of a sweep, as readers of data sets expect it."""
+"""Results of a sweep as a folder of Parquet files, one a chunk, that data-set readers open."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     import polars as pl
 
 _PLAN = "plan.json"
+"""File with the plan of the sweep."""
+
 _ENDING = ".parquet"
+"""Ending of the chunks' files."""
 
 
 class TableStore:

@@ -1,4 +1,4 @@
-"""Condition numbers of a motion's stacked base regressor."""
+"""Condition numbers of a motion's base regressor: how well its forces show the parameters."""
 
 from __future__ import annotations
 

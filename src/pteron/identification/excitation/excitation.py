@@ -25,7 +25,7 @@ from pteron.kinematics import assembly_mode
 from pteron.tables import write_table
 
 _SLOWER = 5.0
-"""Factor by which slow passages, at their fastest, are slower than the trajectory."""
+"""Factor by which slow passages are slower than the trajectory, where they are fastest."""
 
 
 @dataclass(frozen=True)

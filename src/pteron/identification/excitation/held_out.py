@@ -20,14 +20,16 @@ from pteron.motion import pick_and_place
 from pteron.motion.trajectories.cycle import Cycle, moves
 
 _LEAST_CYCLES = 4
+"""Least number of cycles."""
+
 _LEAST_DURATION = 10.0
-"""Least number of cycles, and least time that they take together, s."""
+"""Least time that the cycles take together, s."""
 
 _DIRECTIONS = 12
-"""Directions across that are tried, all round."""
+"""Horizontal directions of a cycle that are tried, all round."""
 
 _SAMPLES = 4000
-"""Samples of a cycle at which limits are looked at."""
+"""Samples of a cycle at which limits are checked."""
 
 _CLEAR = 1e-4
 """Safety margin of a limit at those samples, over its size."""

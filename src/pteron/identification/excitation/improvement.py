@@ -1,4 +1,4 @@
-"""Improvement of starts in stages, until they keep their limits between samples too."""
+"""Improvement of random motions in stages, until they keep their limits between samples too."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from pteron.identification.excitation.search_program import Setting, minimised
 from pteron.kernels import Array
 
 _NEAR = 0.5
-"""Share of a limit's size above which its margin at the start leaves it unwatched until it
-is violated: it would cost time."""
+"""A limit whose margin at the start is above this share of its size is left out until it is
+violated: it would cost time."""
 
 _CHECKED = 200
 """Samples in a period of the highest harmonic in which violations are sought."""

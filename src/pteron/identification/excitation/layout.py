@@ -1,4 +1,4 @@
-"""Layout of a motion's file for a controller: columns, units, and the dialect of CSV."""
+"""Layout of the file by which a controller gets a motion: columns, units, dialect of CSV."""
 
 from __future__ import annotations
 
@@ -24,8 +24,13 @@ Contents = Literal["all", "joints", "poses"]
 """Contents of a file beside time: everything, the joint coordinates, or the poses."""
 
 _PER_UNIT: dict[str, float] = {**PER_SECOND, "mm": 1e3, "um": 1e6, "deg": 180.0 / math.pi}
+"""How many of a unit make one SI unit."""
+
 _MOST_SAMPLES = 10_000_000
+"""Samples that a file may have."""
+
 _ROUNDING = 1e-6
+"""Share of a sample that counts as rounding."""
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
-"""Lead-in and lead-out: the exciting motion sets off from rest, and comes to rest, on its own path.
+"""Lead-in and lead-out: an exciting motion starts from rest, and comes to rest, on its own path.
 
 The machine goes along the closed curve of the periodic motion from the first sample to the last;
-only how fast it does so changes. Its places are thus those of the periodic motion, and with them
-all limits of the geometry. The phase s sets off smoothly, s' = 0 ... 1 over some periods: then
-q' = p' s' and q'' = p'' s'^2 + p' s'', of which the last part is small if the lead is long. Forces
-of rigid bodies are those at rest times 1 - s'^2, those of the motion times s'^2, and what s'' adds:
-since the motion keeps its limits at rest too, long enough leads keep them as well.
+only its speed along the curve changes. Its poses are thus those of the periodic motion, and with
+them all limits of the geometry are kept. The phase s starts smoothly, s' = 0 ... 1 over some
+periods: then q' = p' s' and q'' = p'' s'^2 + p' s'', of which the last part is small if the lead is
+long. Forces of rigid bodies are those at rest times 1 - s'^2, those of the motion times s'^2, and
+what s'' adds: since the motion keeps its limits at rest too, long enough leads keep them as well.
 """
 
 from __future__ import annotations
@@ -28,21 +28,24 @@ from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import quintic
 
 _LENGTHS = (1, 2, 4, 8)
-"""Periods that a lead takes, the first that will do: a whole number ends where it began. One has
-sufficed for every machine of the catalog."""
+"""Periods that a lead takes, tried in turn: a whole number ends where it began. One has sufficed
+for every machine of the catalog."""
 
 _PHASES = 48
 """Phases that are tried for the end of the lead-in."""
 
 _COARSE = 40
+"""Samples in a period of the highest harmonic at which leads are compared."""
+
 _FINE = 800
-"""Samples in a period of the highest harmonic: for the choice, and for the proof."""
+"""Samples in a period of the highest harmonic at which the chosen lead is checked."""
 
 _CLEAR = 1e-4
-"""Safety margin of a limit there, over its size; the periodic motion keeps twice that."""
+"""Safety margin of a limit at those samples, over its size; the periodic motion keeps twice
+that."""
 
 _TRIED = 4
-"""Phases of a length that are looked at finely, the best ones."""
+"""Phases of a length that are checked, the best ones."""
 
 
 class Lead(NamedTuple):

@@ -26,7 +26,7 @@ UNITS = {
 """The limits by name, and the units of their margins: those of the joint."""
 
 PER_JOINT = ("speed", "acceleration", "force")
-"""Those that may be given for each joint."""
+"""Limits that may be given for each joint."""
 
 _SPEED = 1.0
 """Speed limit of joints whose drives have none, m/s or rad/s."""

@@ -1,4 +1,4 @@
-"""Margins of a motion to its limits at its tightest instants."""
+"""Margins of a motion to its limits, each at the instant where it is least."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from pteron.identification.logs.description_file import description_text
 from pteron.tables import check_output, table_bytes
 
 _BESIDE = "-held-out", "-slow"
+"""Endings of the files beside the motion's: cycles held out for validation, and slow passages."""
 
 
 def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, Path, Path]:

@@ -1,4 +1,4 @@
-"""The movement protocol: the motion of platform and joints at any instant."""
+"""The protocol of a movement: an object that gives the motion of platform and joints at times."""
 
 from __future__ import annotations
 

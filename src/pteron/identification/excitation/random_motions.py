@@ -1,4 +1,4 @@
-"""Random Fourier motions, each as large as the limits allow: the yardstick of optimised ones."""
+"""Random Fourier motions, each as large as the limits allow: starts of the search for good ones."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ _COARSE = 50
 """Samples in a period of the highest harmonic while the scale is sought."""
 
 _COARSE_CLEAR = 2e-3
-"""Safety margin there, over the limit's size, so that the finer check seldom fails."""
+"""Safety margin at the coarse samples, over a limit's size, so that the finer check seldom
+fails."""
 
 _SPREAD = 0.2
 """Distance of random centers from home, over the size of the working space."""
@@ -41,8 +42,14 @@ _RESOLUTION = 0.1
 """Share of the shrinkage to which the scale is then refined."""
 
 _HALVINGS = 12
+"""Most times that a random center is moved halfway home because it does not keep the limits at
+rest."""
+
 _BISECTIONS = 14
+"""Bisections for the largest scale."""
+
 _DOUBLINGS = 12
+"""Most doublings of the scale until a limit is violated."""
 
 
 def random_excitation(

@@ -1,4 +1,4 @@
-"""`optimal_excitation`: random motions are drawn, the best improved, the best of those returned."""
+"""`optimal_excitation`: random motions are drawn, the best are improved, the best is returned."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ from pteron.reduction import BaseParameters, base_parameters
 from pteron.shapes import Seed, Workers
 
 _MOST_WORKERS = 4
+"""Processes, at most, where their number is not given."""
 
 _DRAWING = 0.3
 """The share of the time after which no more random motions are drawn."""
@@ -41,12 +42,12 @@ _FIRST = 0.6
 """The share of the time left that the first round may take."""
 
 _ONE_OF = 2
-"""One of so many starts, the best after the first round, goes on to the second."""
+"""One in so many starts, the best after the first round, goes on to the second."""
 
 _SHORT = 0.2
-"""The share of a column's length in random motions below which it counts as short. By columns of
-length 1 alone a motion that all but rests in some direction would be as good as one that moves:
-that of a Delta with a shaft went straight up and down, and left the shaft's values open."""
+"""Share of a column's length in random motions below which the column counts as short. By columns
+scaled to length 1 alone a motion that all but rests in some direction would be as good as one that
+moves: that of a Delta with a shaft went straight up and down, and left the shaft's values open."""
 
 _SEEN = 0.1
 """The share of the progress that the random motions are."""

@@ -40,6 +40,7 @@ _BACK_OFF = 1e-3
 """Share of its size by which the program keeps every limit clear at its samples."""
 
 _ITERATIONS = 200
+"""Most iterations."""
 
 _SETTLED = 1e-6
 """Decrease of the measure, a logarithm, below which a step is not worth it."""

@@ -17,8 +17,11 @@ from scipy.optimize import nnls  # type: ignore[import-untyped]
 from pteron.kernels import Array
 
 _SHRINK, _GROW = 0.25, 2.0
+"""Factors by which the trust region's radius changes."""
+
 _POOR, _GOOD = 0.1, 0.7
-"""Shares of the decrease that was promised: the trust region shrinks below, and grows above."""
+"""Actual over predicted decrease of the cost: below the first the trust region shrinks, above the
+second it grows."""
 
 _SMALLEST = 1e-7
 """Radius at which nothing more can be gained."""
@@ -27,16 +30,16 @@ _DAMPED = 0.2
 """Share of the model's own curvature that an update of it keeps at least (Powell)."""
 
 _PENALTY = 2.0
-"""Weight of a violation over the sum of the multipliers, at least: then it never pays."""
+"""Least weight of a violation, over the sum of the multipliers: then a violation never pays."""
 
 _DEAREST = 1e6
-"""Weight above which violations are made no dearer."""
+"""Greatest weight of violations."""
 
 _MENDED = 0.9
-"""Share to which a weight twice as large must bring a violation, to be worth it."""
+"""Share to which doubling the weight must reduce a violation, to be worth it."""
 
 _FELT = 1e-3
-"""Curvature that is felt, over that which bends a step as long as the radius."""
+"""Least curvature, over the gradient divided by the radius, that the model counts."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Fault isolation: faults of logs and machines that a fit's residuals show, and what they spoil."""
+"""Fault isolation: faults of logs or machine that a fit's residuals show, and their effects."""
 
 from typing import TYPE_CHECKING
 

@@ -1,7 +1,8 @@
-"""Columns that faults of a log, or of a machine, add to its forces F = W beta.
+"""Columns of the regressor for faults of a log or of a machine, such as delayed forces.
 
 A small fault adds its size times a column that the fit itself tells: a delay of the forces, for
-one, adds its time times minus their derivative. `FaultColumns` puts them behind the model's.
+one, adds its time times minus their derivative. `FaultColumns` puts such columns behind the
+model's.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _STRIBECK = (0.05, 0.15, 0.4)
 """Speeds at which friction may fall, over each joint's root mean square: all are tried."""
 
 _DRY = ("coulomb", "stribeck")
-"""Terms that jump where a joint turns."""
+"""Kinds of terms that jump where a joint turns round."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The reference cycle: a pick-and-place cycle as fast as a log's motion, to tell errors by."""
+"""The reference cycle that faults are weighed on: pick-and-place as fast as a log's motion."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from pteron.manipulator import Manipulator
 from pteron.motion import Motion, pick_and_place
 
 _SAMPLES = 201
+"""Samples of the cycle."""
 
 _MOVES = 0.02
 """Share of a joint's largest rate below which its dry friction is uncertain, so that samples do

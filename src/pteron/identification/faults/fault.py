@@ -1,4 +1,4 @@
-"""A fault that the residuals of a fit show: its name, its size, and the sentence a person reads."""
+"""A fault that the residuals of a fit show: its name, its size, a sentence about it."""
 
 from __future__ import annotations
 
@@ -28,15 +28,17 @@ give, friction or offsets that drift, friction that grows with the load, frictio
 """
 
 _SHIFT = 1.0
+"""Change of a value by a fault, in standard deviations, above which the fault matters."""
+
 _CYCLE = 1.0
-"""Standard deviations of a value, and percent of a cycle's forces, above which a fault matters."""
+"""Error in a reference cycle's forces, percent, above which a fault matters."""
 
 _HALF_STEP = 0.6
 """Steps of the log up to which a delay is one of sampling: a force that is held from one sample to
 the next belongs to the instant between them."""
 
 _CYCLE_OF_SAMPLING = 3.0
-"""Percent of a cycle's forces above which such a delay matters all the same."""
+"""Percent of a reference cycle's forces above which a delay of sampling matters all the same."""
 
 _CLEAREST = {
     "geometry": "Lengths or points of the geometry are off, most clearly in",

@@ -1,4 +1,4 @@
-"""A motion with a fit's forces, and how these change with the machine: lengths, gravity, joints."""
+"""A log's motion with a fit's forces, and their slopes by lengths, gravity and joint positions."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from pteron.kernels.targets import compile
 from pteron.manipulator import Manipulator, parameters
 
 _STEP = 1e-6
-"""Change over which forces are differenced: m, rad, or a share of a joint's range."""
+"""Step of difference quotients of forces: m, rad, or a share of a joint's range."""
 
 _FEWEST = 8
-"""States at which costly columns are worked out, at least."""
+"""Least number of states at which columns that take long are computed."""
 
 
 def lengths_of(robot: Manipulator) -> list[tuple[int, int]]:

@@ -32,14 +32,15 @@ from pteron.kernels import Array
 from pteron.renamed import former_attribute
 
 _ROWS, _MORE = 20_000, 100_000
-"""Rows of all logs that are looked at, those in which the joints move most; and where these are too
-little motion."""
+"""Rows of all logs that are searched, those in which the joints move most; and how many where these
+show too little motion."""
 
 _EXACT = 1e-7
-"""Residuals, over the forces, that tell of rounding and of how columns are differenced."""
+"""Residuals, over the forces, below which they are rounding and show no faults."""
 
 _POINTS = 8
-"""States in a period of the fastest frequency, between which costly columns are interpolated."""
+"""States in a period of the highest frequency at which columns that take long are computed; between
+them they are interpolated."""
 
 _MOTION = 0.3
 """Share of the band that the motion's own forces are in."""

@@ -1,4 +1,4 @@
-"""The search for faults that residuals show: columns of faults are taken in, the clearest first."""
+"""The search for faults that residuals show: columns of faults join the fit, the clearest first."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from pteron.identification.plausibility import CLEAR, WANTED
 from pteron.kernels import Array
 
 _CHANCE = 1e-6
-"""Probability that a fault is named where there is none, each."""
+"""Probability that a fault is named where there is none, for each fault."""
 
 _SEEN = 1e-3
-"""Share of a mixture of columns that the model's cannot make, from which it counts."""
+"""Part of a mixture of columns that the model's columns cannot make, as a share, from which it
+counts."""
 
 _AS_WELL = 0.7
 """Share of the clearest fault's statistic with which one of fewer sizes is taken in its place."""
@@ -33,19 +34,20 @@ _ENOUGH = 2
 """Equations for each value, from which residuals tell of more values."""
 
 _BESIDE = 0.1
-"""Share of the first fault's statistic that another one has at least."""
+"""Least statistic of a further fault, as a share of the first one's."""
 
 _LENGTH = 0.01
-"""Usual error of a length, over the legs' size: larger ones are another fault, told badly."""
+"""Usual error of a length, over the legs' size: a larger one is more likely another fault."""
 
 _MOSTLY = 0.5
 """Share of what lengths explain that errors of the usual size explain too, at least."""
 
 _TIMES = 3.0
-"""Friction that falls with speed, over the dry friction that is left, beyond which it is none."""
+"""Greatest friction that falls with speed, over the dry friction that is left, for a fault to be
+that."""
 
 _MOST = 3
-"""Faults that are named at most."""
+"""Faults that are found at most."""
 
 _NOISELESS = 1e-9
 """Noise of a force, over that of the noisiest, that counts as at least."""

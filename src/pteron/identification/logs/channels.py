@@ -1,4 +1,4 @@
-"""Channels that stop: dead ones are refused; clipped or frozen ones are said."""
+"""Channels that stop during a log: dead ones are refused, clipped or frozen ones are findings."""
 
 from __future__ import annotations
 
@@ -11,18 +11,26 @@ from pteron.errors import DataError
 from pteron.identification.logs.log import Finding, Kind
 
 _CLIPPED_ROWS = 3
+"""Rows for which a force holds its extreme value, in each of the stretches that tell of
+clipping."""
+
 _CLIPPED_RUNS = 2
-"""A force is clipped that holds its extreme for this many rows, this many times."""
+"""Stretches from which on a force counts as clipped."""
+
 _FROZEN_ROWS = 1000
+"""Rows for which a channel stays, and beyond which it counts as frozen if a joint moves."""
+
 _MOVED = 0.01
-"""A channel is frozen that stays for over so many rows while another joint moves by this share of
-its span."""
+"""Share of its span by which a joint must move meanwhile."""
 _RESTED = 10.0
-"""Factor by which others may move farther while a channel rests at an end of the log: a motion sets
-off slowly, and not with all joints at once."""
+"""Factor on that share at the beginning and the end of a log: a motion starts slowly, and not with
+all joints at once."""
+
 _ROUNDING = 1e-9
+"""Difference from a declared limit that counts as rounding, over the limits' size."""
 
 Values = NDArray[np.float64]
+"""Values of a channel, or of all joints, row by row."""
 
 
 @dataclass

@@ -33,15 +33,25 @@ _DATES: dict[str, TimeFormat] = {
     "": "hh:mm:ss",
 }
 """Formats of dates, by their pattern; with slashes the month may come first too."""
+
 _DATE = ("YYYY", "MM", "DD")
+"""Parts of a date."""
+
 _MONTH_FIRST: TimeFormat = "MM/DD/YYYY hh:mm:ss"
+"""The American format."""
+
 _TEXT = (
     r"^(?:(\d+)[-./](\d+)[-./](\d+)[T ] ?)?(\d\d?):(\d\d):(\d\d)(?:[.,:](\d{1,9}))?"
     r" ?([AaPp][Mm])?(?:[Zz]|([+-]\d\d):?(\d\d))?$"
 )
 """A time as text: date, clock, fraction, half of the day, and zone."""
+
 _DAY = 86_400
+"""Seconds in a day."""
+
 _NANO = 1_000_000_000
+"""Nanoseconds in a second."""
+
 _EXACT = 1 << 53
 """Whole numbers beyond which floats have gaps: they are counted from the first row's."""
 

@@ -12,9 +12,10 @@ from pteron.identification.logs.names import called, means
 from pteron.tables import declaration, listed
 
 _LONGEST = 60
-"""A name longer than this is in no example."""
+"""Characters of a name beyond which it is not shown as an example."""
 
 _STEMS = ("t", "rho", "theta", "force", "torque", "payload")
+"""Documented words that column names begin with."""
 
 
 class Wanted(NamedTuple):

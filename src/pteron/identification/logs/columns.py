@@ -1,4 +1,8 @@
-"""A log's columns in a file, with their units: declared, documented or taken by name."""
+"""Which columns of a file hold which part of a log, and in which units.
+
+Columns are those declared in the description, else the documented ones, else those whose names say
+what they hold.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ from pteron.manipulator import Manipulator
 from pteron.tables import Table, listed
 
 _ONCE = ("rho", "theta", "force", "torque")
-"""Words for columns of which a leg has one."""
+"""Documented words of columns of which a leg has one."""
 
 
 class Columns(NamedTuple):

@@ -25,6 +25,8 @@ from pteron.tables import Dialect
 from pteron.toml import fault_lines, told
 
 TimeUnit = Literal["s", "ms", "us", "ns", "100 ns"]
+"""Units of time stamps."""
+
 TimeFormat = Literal[
     "hh:mm:ss",
     "YYYY-MM-DD hh:mm:ss",
@@ -33,15 +35,29 @@ TimeFormat = Literal[
     "MM/DD/YYYY hh:mm:ss",
 ]
 """Formats of times as text; fractions of a second may follow each."""
+
 LengthUnit = Literal["m", "mm", "um"]
+"""Units of sliders' positions and of poses."""
+
 AngleUnit = Literal["rad", "deg"]
+"""Units of cranks' positions and of poses."""
+
 ForceUnit = Literal["N", "N m", "A", "V", "%"]
+"""Units of forces: newtons at a slider, newton metres at a crank, or amperes, volts or per cent of
+a drive."""
+
 MotorUnit = Literal["turns", "counts"]
 """Units of positions at the motor: its turns, or the counts of its encoder."""
+
 JointUnit = Literal["m", "mm", "um", "rad", "deg", "turns", "counts"]
+"""All units that joint positions may have."""
 
 _ROUNDING = 1e-12
+"""Share of an inertia that counts as rounding."""
+
 _OF_DRIVES = ("A", "V", "%")
+"""Units of forces that need gains to become newtons."""
+
 _Class = TypeVar("_Class", bound=type)
 
 

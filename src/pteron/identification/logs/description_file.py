@@ -1,4 +1,4 @@
-"""The TOML file beside a log: found, read, written, and completed by what a refusal asks for."""
+"""The TOML file beside a log that describes it: how it is found, read, written and completed."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ from pteron.legs.kind import ActuatedJoint
 from pteron.toml import read_toml, table_keys, validated
 
 _ABSENT = "no such file; it should describe a log"
+"""The message where there is no such file."""
+
 _OF_A_MANIPULATOR = {"platform", "legs"}
+"""Keys by which a file is known to describe a machine, not a log."""
+
 _WHOLE = ("csv", "payload")
-"""Tables that fill a value of their own."""
+"""Tables of the file that become one value each of the description."""
 
 _MOST = 8
-"""Refusals that are gone through, at most."""
+"""Refusals of a log, at most, whose advice is followed in turn to complete its file."""
 
 
 def find_description(log_path: str | Path) -> Path | None:

@@ -1,4 +1,4 @@
-"""A log: the recorded motion of a machine, in SI units; joined, divided, and the gaps in it."""
+"""A log, the recorded motion of a machine in SI units; logs joined, divided, and their gaps."""
 
 from __future__ import annotations
 
@@ -17,18 +17,20 @@ from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.shapes import PerCoordinate, PerJoint, Series
 
 _WIDE = 1.5
-"""Usual steps in a step of time, beyond which a sample may be missing."""
+"""Length of a time step, in usual steps, beyond which a sample may be missing."""
 
 _SURELY = 2.5
-"""Beyond which one is, however uneven the stamps are."""
+"""Length beyond which a sample is surely missing, however uneven the stamps are."""
 
 _AROUND = 16
-"""Rows on each side whose usual place tells the two apart."""
+"""Rows on each side that tell a missing sample from an uneven stamp in between."""
 
 _LATER = 0.5
-"""Usual steps by which all that follows a gap is later, at least."""
+"""Usual steps, at least, by which all rows after a missing sample come later."""
 
 _ARRAYS = ("time", "joints", "forces", "pose", "payload")
+"""Fields of a log with a row for each sample."""
+
 _Phases = Int[np.ndarray, "*batch"]
 
 

@@ -10,6 +10,8 @@ import re
 from typing import NamedTuple
 
 _DRIVE = {"a": "A", "v": "V", "%": "%"}
+"""Units of drives, by their spelling in small letters."""
+
 UNITS = {
     "s": {"s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "ns": "ns", "100 ns": "100 ns"},
     "m": {"m": "m", "mm": "mm", "um": "um", "µm": "um"},
@@ -20,9 +22,14 @@ UNITS = {
 """Spellings of the units, in small letters, by the SI unit of what they measure."""
 
 _POSITION = ("position", "actpos", "actposition", "actualposition", "istposition", "istlage")
+"""Words that controllers write for positions."""
+
 RATED = ("acttorque", "actualtorque", "istmoment", "istdrehmoment")
 """Words for torques, which drives write in per cent, per mille or N m: their unit must be said."""
+
 _EFFORT = ("effort", "actcurrent", "actualcurrent", "iststrom", *RATED)
+"""Words that controllers write for forces, torques and currents."""
+
 _WORDS: dict[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp", "zeit"),
     "rho": ("rho", "q", "s", "joint", *_POSITION),
@@ -37,16 +44,19 @@ CURRENTS = ("current", "i", "actcurrent", "actualcurrent", "iststrom")
 _SPELLED = "|".join(re.escape(one) for units in UNITS.values() for one in units if len(one) > 1)
 _SPELLED += "|(?-i:[smANV%°])"
 """Units without brackets: a last single letter is one only as it is usually written."""
+
 _UNIT = (
     rf"(?P<tail>(?:[ _]*[\[(] *(?P<inside>[^\])\d][^\])]*?) *[\])]"
     rf"|[ _](?P<behind>{_SPELLED})|/(?P<under>{_SPELLED}))?)"
 )
+"""Pattern of a unit at the end of a name."""
+
 _NUMBERED = re.compile(
     rf"(?P<path>(?:.*?[./])??)[%_]*(?P<word>[a-z][a-z _]*?)"
     rf"(?P<place>[ _]?(?:\[(?P<index>\d+)\]|(?P<number>\d+)))?{_UNIT}",
     re.IGNORECASE,
 )
-"""A word with its number behind, such as ``Rho_1 (mm)`` or ``field.position0``."""
+"""Pattern of a name with a number in it."""
 _OF_AXIS = re.compile(
     r"(?P<path>.*?)(?:axis|achse|joint|drive|motor|leg|slider|crank)"
     r"(?P<place>[ _]?[\[(]?(?P<index>\d+)[\])]?)[ _./:]+(?:.*[./])?"

@@ -1,6 +1,6 @@
-"""Faults that columns show by themselves: a force that never changes, encoders that wrap, limits.
+"""Faults of single columns of a log: constant forces, encoders that wrap, drives at their limit.
 
-Logs that are read from files are looked at as they are read (`channels`), those in memory here.
+Logs in memory are checked here; those read from files, as they are read, in `channels`.
 """
 
 from __future__ import annotations
@@ -14,28 +14,30 @@ from pteron.identification.logs.log import Log, gaps
 from pteron.identification.logs.spikes import LONGEST
 
 _STRONGEST = 1e9
-"""Force that no actuator has, N."""
+"""Largest force that a cell may hold, N."""
 
 _SPAN = 0.9
-"""Share of a joint's span that it jumps by where its encoder wraps."""
+"""Least jump where an encoder wraps, as a share of the joint's span."""
 
 _STILL = 0.1
-"""Largest step beside such a jump, over it: a joint that is as fast as that does not wrap."""
+"""Largest of all other steps, over the jump: a joint that is as fast as that does not wrap."""
 
 _ALIKE = 0.02
-"""Largest difference between a turn and the jumps of one encoder, over the jump."""
+"""Largest difference between the jumps of one encoder, or between a jump and a turn, over the
+jump."""
 
 _TIES = 1e-9
-"""Difference of two forces, over their span, below which they are one."""
+"""Difference of forces, over their span, below which they count as equal."""
 
 _LEAST = 0.005
-"""Share of the samples at an extreme from which a force is at its limit."""
+"""Least share of the samples at the extreme value, for a force to be at its limit."""
 
 _LEVEL = 8.0
-"""Factor by which the next value is rarer: a round top of a coarse channel has it half as often."""
+"""Least number of samples at the extreme value, over those at the next value: at the round top of a
+coarsely recorded channel this is about 2."""
 
 _MOVES = 0.02
-"""Speed, over the joint's largest, from which a force that stays is not that of a joint at rest."""
+"""Speed, over the joint's largest, above which the joint counts as moving."""
 
 
 def check_forces(

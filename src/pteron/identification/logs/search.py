@@ -1,4 +1,4 @@
-"""The search for columns: declared ones, documented ones, or those that are called alike."""
+"""The search for a log's columns by name: declared ones, documented ones, or similar names."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pteron.identification.logs.names import (
 from pteron.tables import declaration, listed
 
 _NO_UNIT = ("", "-", "1", "none")
-"""Cells of a line of units that hold none."""
+"""Cells of a line of units that stand for no unit."""
 
 
 class Group(NamedTuple):

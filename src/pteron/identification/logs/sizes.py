@@ -1,4 +1,4 @@
-"""Units compared with the machine: joints, poses and time steps that cannot be its own."""
+"""Checks of a log's units: joints, poses and time steps that the machine cannot have."""
 
 from __future__ import annotations
 
@@ -18,13 +18,23 @@ from pteron.manipulator import Manipulator
 from pteron.tables import declaration
 
 _BEYOND = 3.0
-"""Largest coordinate, over the machine's size; encoders have their own zero."""
+"""Largest coordinate, over the machine's size: encoders have their own zero."""
+
 _TURNS = 4.0 * math.pi
+"""Largest coordinate of a joint that makes few turns, rad."""
+
 _LONGEST_STEP = 0.2
+"""Longest time between samples, s."""
+
 _LIKELY = (("ms", 1e2), ("us", 5e4))
-"""Units of steps that are too long for seconds, each with what is too long for it."""
+"""Units suggested for steps that are too long in seconds, each with the step beyond which it is
+unlikely too."""
+
 _STANDSTILL = 1e-3
+"""Share of its span below which a joint that travels farthest suggests a wrong unit."""
+
 _SMALLER = ((1e3, "mm"), (1e6, "um"))
+"""Units suggested for lengths that are too large in metres."""
 
 
 class Bound(NamedTuple):

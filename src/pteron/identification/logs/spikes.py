@@ -15,7 +15,7 @@ MARGIN = 64
 _WINDOW = 21
 """Differences whose median is the motion's own: the jumps of a group are fewer than half."""
 _USUAL = 20.0
-"""Least jump, over the 95th percentile of differences beside the motion's own."""
+"""Least jump, over the 95th percentile of differences, beside the motion's own."""
 _SHARE_OF_JOINT, _SHARE_OF_FORCE = 0.01, 0.5
 """Least jump, as a share of a channel's span; friction and stops make forces jump."""
 _FASTER = 3.0
@@ -34,12 +34,18 @@ _RESTS, _MOVES = 0.1, 0.2
 """Largest travel of joints at rest, and least in motion, as a share of their usual one."""
 _MOST = 0.01
 """Largest share of the rows that is left out: where spikes are more, they are no exception."""
+
 _SPAN = (1.0, 99.0)
+"""Percentiles between which a channel's usual values lie."""
+
 _TOLD = 5
-"""Groups whose rows are named."""
+"""Groups of spikes whose rows a message names."""
 
 Values = NDArray[np.float64]
+"""Values of a channel, row by row."""
+
 Mask = NDArray[np.bool_]
+"""Whether each row counts."""
 
 
 def joint_spikes(values: Values) -> Mask:

@@ -1,4 +1,4 @@
-"""The time stamps of a log, checked piece by piece: they must rise; gaps and jitter are said."""
+"""Checks of a log's time stamps, piece by piece: they must rise; gaps and jitter are findings."""
 
 from __future__ import annotations
 

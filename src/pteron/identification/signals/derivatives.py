@@ -1,10 +1,10 @@
-"""Differentiators: how measured positions become positions, rates and accelerations.
+"""Differentiators: from measured positions to smooth positions, rates and accelerations.
 
-`whole` says that one takes a log as a whole, and not in blocks; `edge` is how many rows it loses at
-each end of a block; `differentiated` is a block's motion without at least so many, at the forces'
-own instants: those of the samples less the forces' `delay`, s; `curve` is the log's motion as a
-curve; above the frequency `fastest`, Hz, nothing of the positions is left. The band is that of the
-parallel filter, Hz.
+There are three: Fourier series, central differences, and splines. `whole` says whether one takes a
+log as a whole, not in blocks; `edge` is how many rows it loses at each end of a block;
+`differentiated` is a block's motion, at the forces' own instants: those of the samples less the
+forces' `delay`, s; `curve` is the log's motion as a curve; above the frequency `fastest`, Hz,
+nothing of the positions is left. The band is that of the parallel filter, Hz.
 """
 
 from __future__ import annotations
@@ -36,13 +36,17 @@ LOST = 4
 """Samples at each end that have no central difference."""
 
 _FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+"""Central difference of eighth order for the first derivative."""
+
 _SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
+"""The same for the second derivative."""
 
 EVEN = 1e-3
 """Deviation from even steps, in steps, that is a matter of how stamps were written."""
 
 _DEGREE = 7
-"""The sixth power of sampling is left in a spline's second derivative."""
+"""Degree of splines: the error of the second derivative falls with the sixth power of the
+sampling."""
 
 _SPLINE_SETTLING = 20.0
 """Knots at a block's ends that feel where it ends; the feeling halves from each to the next."""

@@ -1,4 +1,4 @@
-"""Noise and its filters: its size, the positions' low-pass filter, the parallel filter."""
+"""Filters against noise: the size of noise, the positions' low-pass filter, the parallel filter."""
 
 from __future__ import annotations
 
@@ -21,18 +21,24 @@ MEDIAN_SIZE = 0.6744897501960817
 """Median size of a standard normal variable."""
 
 SETTLING = 6.0
-"""Time that a block's ends need to settle, in periods of the cut-off: 1e-6 of a step is left."""
+"""Time that a filter needs at a block's ends, in periods of the cut-off: 1e-6 of a step is left."""
 
 _DIFFERENCE = 8
-"""Order of the differences: what a smooth motion leaves falls with this power of its sampling."""
+"""Order of the differences that show noise: what a smooth motion leaves in them falls with this
+power of its sampling."""
 
 _GRID_LOOK = 20_000
+"""Samples in which an encoder's step is sought."""
+
 _ON_GRID = 1e-3
 """Deviation from a multiple of the step, in steps, that is rounding of the numbers."""
 
 _ORDER = 4
+"""Order of the Butterworth filter."""
+
 _HIGHEST = 0.2
-"""Share of the sampling rate beyond which a filter would take nothing worth its edges."""
+"""Largest cut-off, as a share of the sampling rate: beyond it a filter takes too little to be worth
+its edges."""
 
 _MARGIN = 20.0
 """Factor on the motion's own bandwidth beyond which what shows is noise of another colour."""
@@ -42,7 +48,10 @@ _REPEATED = 1.3
 machine moves so, and shifts the values; what it leaves of the noise averages out."""
 
 _POSITION_POWER = 0.9999
+"""Share of the positions' power that is within the motion's bandwidth."""
+
 _CANDIDATES = 40
+"""Cut-offs that are compared."""
 
 _CORRELATED = 12870.0 / 4900.0
 """Variance of a sum over the spectrum, over that of independent powers: of Hann's window squared,

@@ -14,17 +14,17 @@ from pteron.kernels import Array
 from pteron.motion.trajectories.fourier import FourierSeries, fourier_basis, row_blocks
 
 _MOST = 120
-"""Harmonics that are looked at."""
+"""Most harmonics."""
 
 _SIGNIFICANT = 5.0
-"""Standard deviations of noise above which a harmonic belongs to the motion: by chance, one in a
-million does."""
+"""Size of a harmonic, in standard deviations of noise, above which it belongs to the motion: by
+chance, one in a million does."""
 
 _SHARE = 0.4
-"""Harmonics in a period, for each sample in it, that are told from noise."""
+"""Harmonics, for each sample in a period, that can be told from noise."""
 
 _ROUNDING = 1e-15
-"""Noise relative to a signal's size that is rounding: harmonics below it are not looked for."""
+"""Noise, relative to a signal's size, that is rounding."""
 
 
 @dataclass(frozen=True)

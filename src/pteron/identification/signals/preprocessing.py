@@ -1,4 +1,4 @@
-"""The preprocessing of a log: choices of the user, and the plan that the data make of them."""
+"""The preprocessing of a log: filters and rates as the user chooses them, the rest by the data."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _LOOK = 120_000
 """Samples from which cut-offs are found."""
 
 _POWER = 0.999
-"""Share of the speed's power that says how fast a motion is."""
+"""Share of the speed's power within the bandwidth of a motion."""
 
 _HARMLESS = 0.2
 """Noise of the accelerations, relative to that of the forces, that adds next to nothing to it."""

@@ -1,4 +1,4 @@
-"""The part of a log that repeats: a periodic motion between lead-in and lead-out, and rest."""
+"""The part of a log that repeats: a periodic motion, without lead-in, lead-out and rest."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ from pteron.identification.signals.filters import position_noise
 from pteron.kernels import Array
 
 _NOISE = 6.0
-"""Positions that are apart by less than so many times their noise are the same."""
+"""Distance of two positions, in standard deviations of their noise, below which they are the
+same."""
 
 _ROUNDING = 1e-6
-"""They are so by less than this part of their span, too."""
+"""Distance, as a share of the joint's span, below which positions are the same whatever their
+noise."""
 
 _SPIKES = 10
-"""Samples in a row that may be elsewhere."""
+"""Samples in a row that may be elsewhere all the same."""
 
 _MOVES = 0.5
-"""Share of each joint's span that it goes through in the part: at rest all repeats."""
+"""Least travel in the part, as a share of each joint's span: at rest everything repeats."""
 
 _LONGER = 0.002
 """Part of a period by which the stretch is longer than one, at least: a motion that crosses its own

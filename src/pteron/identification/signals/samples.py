@@ -1,4 +1,4 @@
-"""A log as states and forces, sample by sample, in overlapping blocks and bounded memory."""
+"""States and forces at a log's samples, in overlapping blocks so that memory stays bounded."""
 
 from __future__ import annotations
 
