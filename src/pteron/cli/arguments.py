@@ -1,4 +1,4 @@
-"""Arguments and options that several subcommands share, and how they are read."""
+"""Arguments and options that several subcommands share, and functions that read them."""
 
 from __future__ import annotations
 

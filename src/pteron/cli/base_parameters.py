@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
 
 Format = Literal["text", "sympy", "latex", "booktabs", "json"]
+"""Forms in which base parameters are printed."""
 
 _COMMENTS = {"sympy": "#", "latex": "%", "booktabs": "%"}
-"""Signs before a comment."""
+"""Signs before a comment, by form."""
 
 
 def base(

@@ -27,6 +27,7 @@ TOLERANCE = 0.05
 _MAY_BE_SINGULAR = (
     "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."
 )
+"""A note under proofs without a least type-II measure."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Completion in the shell: machines, parameters, functions and indices; files it has itself."""
+"""Shell completion of arguments: machines and files, parameters, functions and indices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`pteron cycle`: a motion of the machine as a table, and what it asks of the drives."""
+"""`pteron cycle`: a motion of the machine, planned and written as a table, and its peak loads."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pteron.motion import Motion, MotionLimits
 
 Kind = Literal["adept", "line", "joints", "replay"]
+"""Kinds of motion: pick-and-place, straight line, motion of the joints, or one from a table."""
 
 _ROUNDING = 1e-6
 """Share of a limit by which a motion may exceed it without a note."""
@@ -35,6 +36,8 @@ _DENSE = 10
 """Moments per sample at which a motion's peaks are sought."""
 
 _way, _time, _limit = (partial(option, rich_help_panel=p) for p in ("Way", "Time", "Limits"))
+"""Makers of options, one for each section of the help."""
+
 _pose = partial(_way, metavar="POSE", show_default=False)
 _numbers = partial(_limit, metavar="NUMBERS")
 

@@ -1,4 +1,4 @@
-"""The destination of a result with figures and pictures: a file, a folder, a pipe or a person."""
+"""The destination of a result, `--out`: a folder, the file of a table, or standard output."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 _TABLES = (".csv", ".parquet")
+"""Endings of tables."""
 
 
 @dataclass(frozen=True)

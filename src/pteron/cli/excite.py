@@ -1,4 +1,4 @@
-"""`pteron excite`: a trajectory from which the inertial parameters can be identified."""
+"""`pteron excite`: an exciting trajectory, from which inertial parameters can be identified."""
 
 from __future__ import annotations
 
@@ -21,10 +21,12 @@ _MEASURES = {
     "type_ii": "type-II measure",
     "passive_clearance": "passive clearance (of half the range)",
 }
+"""Names of limits where those of the code will not do."""
 
 _motion, _limit, _search, _file = (
     partial(option, rich_help_panel=panel) for panel in ("Motion", "Limits", "Search", "File")
 )
+"""Makers of options, one for each section of the help."""
 
 
 def excite(

@@ -17,3 +17,4 @@ potential_energy reach regressor room squared_type_i type_ii type_ii_distances
 """
 
 FUNCTIONS = tuple(_NAMES.split())
+"""Names that `--function` takes."""

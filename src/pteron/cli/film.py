@@ -15,6 +15,7 @@ from pteron.errors import DataError
 _OUT = Option(
     *("--out", "-o"), help="The film: .mp4 (H.264) or .gif.", metavar="FILE", show_default=False
 )
+"""The option `--out`."""
 
 
 def film(

@@ -1,4 +1,4 @@
-"""`pteron identify`: from recorded motions to parameters, a model of real bodies, and a verdict."""
+"""`pteron identify`: from logs of motions to parameters, a model of real bodies, and a verdict."""
 
 from __future__ import annotations
 
@@ -22,17 +22,23 @@ if TYPE_CHECKING:
     from pteron.report.identification import Written
 
 _NARROW = 56
-"""Columns of a terminal below which tables are shortened: the page has all of it."""
+"""Columns of a terminal below which tables are shortened: the page has them whole."""
 
 _COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trustworthy": "red"}
+"""Colours of the grades of a verdict."""
 
 _TERMS = ("coulomb", "viscous", "offset")
+"""Terms of the model that `--without` may leave out."""
 
 
 Estimator = Literal["weighted", "ordinary", "huber", "total", "instrumental", "likelihood"]
+"""Names of estimators; like the types below a copy of the library's, which is slow to import."""
+
 Passive = Literal["none", "shared", "each"]
+"""Choices for friction in passive joints."""
+
 Derivatives = Literal["periodic", "central", "spline"]
-"""The library's own, which are slow to import."""
+"""Names of differentiators."""
 
 
 def identify(

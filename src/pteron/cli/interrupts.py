@@ -1,4 +1,4 @@
-"""Ctrl-C that gets through, wherever the program is when it comes."""
+"""Ctrl-C that is never lost, wherever the program is when it comes."""
 
 from __future__ import annotations
 

@@ -24,8 +24,10 @@ _LOOSE = (
     "legs: parallel rods whose bars turn on hinges of their own leave the platform free to tilt in "
     "every pose (constraint singularity): do legs share their hinges?"
 )
+"""A warning of `pteron check`."""
 
 _FAULTY = 2
+"""Exit code for a faulty file."""
 
 
 def catalog(json: Json = False) -> None:

@@ -34,8 +34,13 @@ from pteron.cli.workspace import workspace
 from pteron.errors import PteronError
 
 _USER_ERROR = 2
+"""Exit code for a user's error."""
+
 _INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
 _PIPE_CLOSED = 1
+"""Exit code where a program that reads the output has ended."""
 
 
 class CommandGroup(TyperGroup):

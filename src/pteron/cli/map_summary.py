@@ -1,4 +1,4 @@
-"""The summary of a map: data for a program, rows for a pipe, a table for a person."""
+"""The summary of a map for the command line: JSON data, rows for a pipe, a table for a person."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ _ALIKE = 1e-9
 """Relative difference below which the best and the worst value are one."""
 
 _AXIS = ("name", "unit", "least", "greatest", "count")
+"""Keys of an axis in the data."""
+
 _SUMMARY = ("best", "best_pose", "worst", "worst_pose", "mean", "median")
+"""Keys of an index in the data."""
 
 
 def map_data(

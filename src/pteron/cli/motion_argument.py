@@ -1,4 +1,4 @@
-"""Motions, poses and payloads that are given to a subcommand, with notes on unlikely values."""
+"""Motions, poses and payloads that a subcommand is given, read and checked."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from pteron.tables import Table
 
 _SLOW = 0.5
-"""s between samples: more is unlikely."""
+"""Time between samples above which a warning is given, s."""
 
 _UNLIKE = 3.0
-"""Greatest ratio of the ways of a motion by its poses and by its velocities."""
+"""Greatest ratio, or inverse of it, of a motion's length by its poses and by its velocities."""
 
 
 def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:

@@ -1,4 +1,4 @@
-"""Tables of a motion: its samples, and its peaks beside their limits."""
+"""Tables of a motion for the command line: its samples, and its peaks beside their limits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pteron.motion import Motion, Peak
 
 _BINDS = 0.98
-"""Share from which a limit is said to bind."""
+"""Share of a limit from which it is said to bind."""
 
 
 def peaks_table(found: Sequence[Peak]) -> Table:

@@ -1,4 +1,4 @@
-"""Motions that `pteron cycle` plans: the standard cycle, straight lines, motions of the joints."""
+"""Motions that `pteron cycle` plans: pick-and-place cycles, lines, motions of the joints."""
 
 from __future__ import annotations
 

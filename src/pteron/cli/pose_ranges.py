@@ -1,4 +1,4 @@
-"""Coordinates of poses as a person types and reads them: some held, some between two values."""
+"""Poses' coordinates as a person types them, such as z=0,phi=-1:1: fixed values and ranges."""
 
 from __future__ import annotations
 

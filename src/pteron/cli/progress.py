@@ -1,4 +1,4 @@
-"""The progress of long work, on standard error: a spinner, a bar, and how long each stage took."""
+"""Progress of long work, on standard error: a spinner, a bar, and the time of each stage."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 _SHORT = 0.05
-"""s below which a stage's time is left out."""
+"""Time below which a stage is not listed, s."""
 
 
 def is_watched() -> bool:

@@ -32,9 +32,10 @@ if TYPE_CHECKING:
     from pteron.motion import Motion, Simulation
 
 _ENDED = 1
-"""Exit code where the machine did not come to the end."""
+"""Exit code where the simulation ended before its time."""
 
 Name = Literal["computed-torque", "feed-forward", "pd", "adaptive", "adaptive-drives"]
+"""Names of controllers."""
 
 
 def simulate(

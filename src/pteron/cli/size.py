@@ -29,8 +29,10 @@ if TYPE_CHECKING:
     from pteron.motion import Fit, Sizing
 
 _OVERLOADED = 1
+"""Exit code where a drive is overloaded."""
+
 _BEST = 3
-"""Motors of each joint that a person is shown."""
+"""Motors shown for each joint, the best ones."""
 
 
 def size(

@@ -1,4 +1,4 @@
-"""The rows of a table that a subcommand works on in chunks, and the table of its results."""
+"""Rows of a table that a subcommand works through in chunks, and the table of its results."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ if TYPE_CHECKING:
     from pteron.tables import Table
 
 CHUNK = 50_000
-"""Rows served at once: enough to be fast, few enough for a progress bar."""
+"""Rows of a chunk: enough to be fast, few enough for a progress bar."""
 LONG = 200_000
 """Rows above which a progress bar is shown."""
 SHOWN_ROWS = 40
 """Most rows that a person is shown."""
 
 _DECIMALS = {"m": 6, "rad": 6, "N": 4, "N m": 4}
+"""Decimals printed, by unit."""
 
 
 @dataclass(frozen=True)

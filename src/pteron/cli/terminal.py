@@ -1,4 +1,4 @@
-"""Standard output, where results go as text, tables or JSON; and standard error, for notes."""
+"""Output of subcommands: text, tables or JSON to standard output, notes to standard error."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from typer import echo
 from pteron.atomic import plain as plain_data
 
 _PIECE = 1 << 16
+"""Characters written at a time."""
 
 _ANY_WIDTH = 10_000
-"""Columns: wider than any screen."""
+"""Columns of a table for a file or a pipe: wider than any screen."""
 
 
 def is_terminal() -> bool:

@@ -1,4 +1,4 @@
-"""`pteron view`: a machine in the browser, to be moved."""
+"""`pteron view`: a page in the browser on which a machine can be moved."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show_json
 
 _TICK = 0.5
-"""s between two looks for Ctrl-C, which some systems deliver only then."""
+"""Time between two checks for Ctrl-C, s: some systems deliver it only then."""
 
 
 def view(

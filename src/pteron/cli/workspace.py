@@ -1,4 +1,4 @@
-"""`pteron workspace`: maps of the reach and of indices of performance, and proofs by intervals."""
+"""`pteron workspace`: maps of the reach and of performance indices, and proofs by intervals."""
 
 from __future__ import annotations
 
@@ -24,17 +24,28 @@ if TYPE_CHECKING:
     from pteron.workspace import ReachVolume
 
 _PICTURES = (".png", ".svg", ".pdf")
+"""Endings of pictures."""
+
 _FILMS = (".mp4", ".gif")
+"""Endings of films."""
+
 _DATA = (".csv", ".parquet", ".npz", ".zarr")
+"""Endings of maps' data."""
+
 _SURFACES = (".vtk", ".vtu", ".ply", ".stl")
+"""Endings of surfaces."""
 
 _RIM = 0.04
 """Share of the reach's width that pictures show around it."""
 
 _FRAMES = 61
+"""Frames of a film where their number is not given."""
+
 _FILM_POINTS = 120
+"""Points along each axis of a film's pictures where their number is not given."""
 
 _DPI = 200.0
+"""Pixels an inch of pictures."""
 
 _INDEX = Option(
     "--index",
@@ -43,6 +54,7 @@ _INDEX = Option(
     autocompletion=indices,
     show_default="the distance to the end of the reach",
 )
+"""The option `--index`."""
 
 
 def workspace(

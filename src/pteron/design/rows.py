@@ -1,4 +1,4 @@
-"""Rows of a table of designs: the quantities that are asked for, and by how much each is missed."""
+"""Rows of a table of designs: quantities, and by how much each requirement is missed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 
 MISSES = "misses "
-"""Beginning of the names of columns that say by how much something asked is missed."""
+"""Beginning of the names of columns that say by how much a requirement is missed."""
 
 FAILED = 1e6
-"""Miss of a requirement by a design that is no machine, or has no such quantity."""
+"""Miss of all requirements by a design that is no machine, or has no such quantity."""
 
 ROUNDING = 1e-9
-"""A condition that is missed by no more is kept."""
+"""Miss that counts as none."""
 
 
 def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:

@@ -1,8 +1,8 @@
-"""`search`: generations of designs, the best of them improved by gradients, until the front stands.
+"""`search`: generations of designs, the best improved by gradients, until the front settles.
 
 Each generation is a sweep of its own (`pteron.maps.sweep`) into a folder of its own. A run that was
-ended asks the same designs again, finds those that were finished in the folder, and goes on: it
-ends in the same front as one that was not.
+interrupted and is started again evaluates the same designs, finds the finished ones in the folder,
+and goes on: it ends in the same front as a run that was not interrupted.
 """
 
 from __future__ import annotations

@@ -14,12 +14,16 @@ from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
 
 _ABSENT = "no such file; it should describe a search for a design"
+"""The message where there is no such file."""
 
 _ROUNDING = 1e-9
-"""A bound that is missed by a smaller share is kept."""
+"""Share of a bound by which it may be missed."""
 
 Positive = Annotated[Number, Field(gt=0.0)]
+"""A number above 0."""
+
 Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
+"""Least value of a measure that is 1 at best."""
 
 
 def _listed(given: Any) -> Any:

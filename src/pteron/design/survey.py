@@ -1,4 +1,4 @@
-"""`survey`: any number of designs spread evenly over the variables' ranges, streamed to Parquet."""
+"""`survey`: any number of designs, spread evenly over the variables' ranges, written to Parquet."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from pteron.manipulator import Manipulator
 from pteron.toml import told
 
 _STEP = 1e-6
-"""Share of a range over which the geometry's change is measured."""
+"""Step of difference quotients of the geometry, as a share of a variable's range."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
-"""Gymnasium environments: a machine with its drives, to reach poses or to follow a motion.
+"""Gymnasium environments for reinforcement learning: a machine reaches poses or follows a motion.
 
-`import pteron.environments` registers `pteron/Reach-v0`. Needs the extra `gymnasium`.
+Actions are the forces of its drives. `import pteron.environments` registers `pteron/Reach-v0`.
+Needs the extra `gymnasium`.
 """
 
 from pteron.extras import install_command

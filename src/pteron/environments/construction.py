@@ -1,4 +1,4 @@
-"""Construction of a machine's `World` from a user's arguments."""
+"""Construction of an environment's `World`, the machine and its task, from a user's arguments."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from pteron.motion import Motion, limits_of, longest_step
 from pteron.workspace import home_pose, pose_margins
 
 _STEP = 5e-4
-"""s; Runge and Kutta's method is then exact to some micrometres."""
+"""Length of the integration's steps, s: Runge and Kutta's method is then exact to some
+micrometres."""
 
 _LIVELY = 20.0
-"""m/s^2 that drives without `max_force` can give along every coordinate at once."""
+"""Acceleration, m/s^2, that drives without `max_force` can give along every coordinate at once."""
 
 _LEAST = 0.2
-"""Margin that starts and targets have."""
+"""Least margin of the poses at which episodes start and that are targets."""
 
 _SPREAD = 0.25
-"""Share of the longest leg within which starts and targets are from home."""
+"""Distance of these poses from home, at most, as a share of the longest leg."""
 
 
 def world_of(

@@ -1,4 +1,4 @@
-"""One machine as a Gymnasium environment."""
+"""`PteronEnv`: one machine as a Gymnasium environment."""
 
 from __future__ import annotations
 

@@ -17,6 +17,7 @@ from pteron.motion import Guide, joint_guides, joint_points
 from pteron.plots import robot_figure
 
 _POSES = 32
+"""Random starts by which the length of guides in pictures is chosen."""
 
 
 class EnvironmentPicture:

@@ -1,4 +1,4 @@
-"""The state of machines in an environment."""
+"""The state of an environment's machines: pose, velocity, target and clock."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pteron.kernels import Array
 
 Bools = NDArray[np.bool_]
+"""An array of truth values."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Many machines as one Gymnasium vector environment: they share each step's machine code."""
+"""`PteronVectorEnv`: many machines as one Gymnasium environment, stepped together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The dynamics of an environment for many machines at once: states, forces, reward, ends."""
+"""The dynamics of an environment, for many machines at once: starts, steps, rewards, ends."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from pteron.motion import Motion, advance
 from pteron.workspace import pose_margins
 
 LEVER = 0.1
-"""Length that counts as much as a radian in distances, m."""
+"""Length that counts as much as a radian in the distance of poses, m."""
 
 SPEED, TURN = 10.0, 100.0
-"""Largest speeds of the platform, m/s and rad/s: faster, and the episode ends."""
+"""Speeds of the platform, m/s and rad/s, above which an episode ends."""
 
 EFFORT = 0.01
 """Weight of the mean square of the action in the reward."""
@@ -31,7 +31,10 @@ ENDS = 0.02
 """Margin below which an episode ends."""
 
 _ANGLE = np.pi / 4.0
+"""Greatest angle of starts and targets from home, rad."""
+
 _DRAWS = 16
+"""Random poses drawn at a time for each start or target."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Pictures: each function takes arrays or results and returns a matplotlib Figure.
 
-Physics is asked elsewhere; nothing here touches pyplot's global state.
+Nothing here computes physics or touches pyplot's global state.
 """
 
 from pteron.arguments import check_arguments

@@ -30,15 +30,28 @@ from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
 Kind = TypeVar("Kind", bound=Hashable)
 
 LEG_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
+"""Colours of legs 1 to 4."""
+
 _LEG_STYLES = ("-", (0, (6, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1.5, 1.5)))
-"""Legs 1 to 4, in every picture and table: colour alone does not survive every printer."""
+"""Line styles of legs 1 to 4, in every picture: colour alone does not survive every printer."""
 
 INK = "#1c2630"
+"""Text and main lines."""
+
 MUTED = "#66727f"
+"""Scales and secondary text."""
+
 GRID = "#d3dae1"
+"""Grid lines."""
+
 PAPER = "#fdfefe"
+"""Background."""
+
 REACH = "#3d6b8f"
+"""The reach of a machine."""
+
 WARNING = "#b3261e"
+"""Limits and faults."""
 
 _VARIABLES = {
     INK: "--ink",
@@ -49,6 +62,7 @@ _VARIABLES = {
     WARNING: "--warning",
     **{color: f"--leg{i + 1}" for i, color in enumerate(LEG_COLORS)},
 }
+"""CSS variables of the colours."""
 
 FONT_SIZE = 9.0
 """Points. Figures are about as wide as a phone's screen, so that text stays legible there."""

@@ -1,4 +1,4 @@
-"""The noise of residuals, and the certainty and correlations of identified parameters."""
+"""Pictures of an identification's certainty: residuals' noise, parameters' errors, correlations."""
 
 from __future__ import annotations
 
@@ -33,11 +33,13 @@ _CERTAIN = 1.96
 """Standard deviations from zero beyond which a value is not zero, at 95 %."""
 
 _LEVELS = 10
+"""Steps of the colour of a correlation."""
+
 _LEAST = 0.05
 """Least correlation that is drawn."""
 
 _REACH = 4.5
-"""Standard deviations to each side."""
+"""Width of a histogram to each side, in standard deviations."""
 
 
 def histogram_figure(residuals: Array) -> Figure:

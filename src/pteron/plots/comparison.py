@@ -1,4 +1,4 @@
-"""Measured against predicted forces, and their residuals."""
+"""Pictures that compare measured with predicted forces, over time and over speed."""
 
 from __future__ import annotations
 
@@ -29,12 +29,17 @@ from pteron.plots.canvas import (
 )
 
 _TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+"""Values that the scale of errors may name."""
 
 _COLUMNS = 360
 """Points of the curve over a whole recording, each the envelope of its samples."""
 
 _DOTS = 600
+"""Samples drawn as dots, about."""
+
 _BINS = 30
+"""Intervals of speed whose mean residual is drawn."""
+
 _FEWEST = 8
 """Least samples in a bin whose mean is drawn."""
 

@@ -32,10 +32,10 @@ from pteron.plots.canvas import (
 from pteron.plots.joint_columns import joints_of, named, rows
 
 _ROOM = 1.15
-"""The axes' half width over the largest value."""
+"""Half width of the axes over the largest value."""
 
 _FAR = 3.0
-"""Ratio of a limit to the largest use above which the picture leaves it out."""
+"""A limit above this many times the largest use is left out of the picture."""
 
 
 class Ability(NamedTuple):

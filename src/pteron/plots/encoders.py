@@ -22,9 +22,10 @@ _QUALITY = 7.0
 """FFmpeg's quality, of 10, at which lines on white stay sharp."""
 
 _SHORTEST = 2
-"""Hundredths of a second: browsers show shorter frames of a GIF slowly."""
+"""Least duration of a frame of a GIF, hundredths of a second: browsers show shorter ones slowly."""
 
 _PALETTE = 96
+"""Colours of a GIF."""
 
 _GIF_PIXELS = 6e8
 """Most pixels of a GIF's frames, all of which are held in memory."""

@@ -41,7 +41,7 @@ from pteron.plots.machine_figures import gravity_of
 from pteron.plots.space_axes import SpaceAxes
 
 _WIDTH = 6.4
-"""Of a frame, inches, whatever its pixels: letters grow with the frame."""
+"""Width of a frame, inches, whatever its pixels: letters grow with the frame."""
 
 _STRIP = 1.35
 """Height of the strip with the forces' curves, inches."""

@@ -1,4 +1,4 @@
-"""Films of a motion, as MP4 or GIF: the frames, and how fast they go."""
+"""Films of a motion, as MP4 or GIF files: their speed, size and length."""
 
 from __future__ import annotations
 
@@ -22,10 +22,14 @@ from pteron.plots.encoders import ENCODERS, Pixels, checked_encoder
 from pteron.plots.film_frames import frames
 
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+"""Speeds that are chosen from where none is given: 1 is real time."""
+
 _LEAST = 2.0
-"""Least length of a film, s, by which its speed is chosen."""
+"""Length, s, that the film has at least at the speed chosen."""
 
 _FPS = 30.0
+"""Frames a second where nothing else is asked."""
+
 _SIZES = (160, 3840)
 """Least and greatest side, pixels."""
 

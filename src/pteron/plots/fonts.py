@@ -1,4 +1,4 @@
-"""Letters that the usual font lacks: from another font of this machine, or in one warning."""
+"""Fonts for letters that the usual font lacks: another one of this machine, or else a warning."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ from pteron.plots.canvas import (
 from pteron.plots.joint_columns import joints_of, named, rows
 
 _ROOM = 75.0
-"""Degrees between singular orientations from which each is named in words."""
+"""Degrees between singular orientations from which on each is named in words."""
 
 
 def forces_figure(

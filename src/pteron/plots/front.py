@@ -1,4 +1,4 @@
-"""The front of a design search: the first objective over each of the others."""
+"""Picture of the front of a design search: its first objective over each of the others."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ from pteron.errors import DataError
 from pteron.plots.canvas import INK, LEG_COLORS, PAPER, blank, legend, plain_axes, spot
 
 _WIDE, _TALL = 5.4, 3.5
+"""Width and height of the figure with one panel, inches."""
+
 _PANEL = 2.4
-"""Inches of the figure, and of each further panel's height."""
+"""Height of each further panel, inches."""
 
 _MARKS = ("D", "s", "^", "v", "P")
+"""Marks of the designs that are pointed out."""
 
 
 def front_figure(

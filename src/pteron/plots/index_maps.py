@@ -1,4 +1,4 @@
-"""Maps of indices over poses: coloured within the reach, hatched by its causes outside it."""
+"""Pictures of maps of indices over poses: coloured in reach, outside it hatched by the cause."""
 
 from __future__ import annotations
 
@@ -35,9 +35,11 @@ from pteron.plots.canvas import (
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 _WIDTH = 5.0
-"""Inches: texts stay legible on a phone."""
+"""Of the figure, inches: texts stay legible on a phone."""
 
 _HATCHES = {BEYOND_LIMITS: "....", 1: "////", 2: "\\\\\\\\", 3: "xxxx", 4: "----"}
+"""Hatches by the status of a pose: beyond a limit, or out of reach of leg 1, 2, 3 or 4."""
+
 _WIDE = 20.0
 """Ratio of the greatest value to the median above which colours are logarithmic."""
 
@@ -45,6 +47,7 @@ _ALIKE = 1e-6
 """Relative difference below which two values look alike."""
 
 _TINY = 1e-12
+"""Added to the range of colours, so that it is not empty."""
 
 _LAST = 99.0
 """Percentile of the last colour where a few values are far off."""

@@ -1,4 +1,4 @@
-"""Maps of Jacobians over two coordinates: condition numbers, and singularities."""
+"""Pictures of the Jacobian over two coordinates: condition numbers, and singularities."""
 
 from __future__ import annotations
 
@@ -25,13 +25,16 @@ from pteron.plots.canvas import (
 )
 
 _LEVELS = np.array([1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0])
+"""Levels of the condition number, the same in every picture."""
 
 _NAMED = 6
 """Levels with lines and names: beyond, lines run together."""
 
 _WIDTH = 4.2
+"""Width of the figure, inches."""
+
 _MARGIN = 0.6
-"""Inches of the figure's width, and of the scales in its height."""
+"""Part of the figure's height for scales, inches."""
 
 
 def condition_figure(

@@ -1,4 +1,4 @@
-"""Columns of a figure's data, one a joint, and the joints' words and units for its labels."""
+"""Columns of the data of a picture, one a joint, and the joints' words and units for its labels."""
 
 from __future__ import annotations
 

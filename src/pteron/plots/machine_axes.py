@@ -1,4 +1,7 @@
-"""Axes on which a machine is drawn: lines, marks, faces and texts at points in space."""
+"""The abstract axes on which a machine is drawn: lines, marks, faces and texts at points in space.
+
+Those of pictures in space and in a plane are in `space_axes` and `plane_axes`.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ Style = str | tuple[float, tuple[float, ...]]
 
 
 class MachineAxes(ABC):
-    """Axes and the `things` on them, in the order in which they were drawn."""
+    """Axes of a figure, and the `things` drawn on them, in their order."""
 
     def __init__(self, axes: Any, *, small: bool) -> None:
         """Begin with nothing; `small` axes have thinner lines and smaller letters."""

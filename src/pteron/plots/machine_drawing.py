@@ -26,7 +26,7 @@ APART = 0.018
 """Half the distance of parallel rods, as a share of the machine's size: files do not say it."""
 
 _SQUARES = 10.0
-"""About so many squares of the grid are as long as the machine."""
+"""Squares of the grid, about, along the machine's size."""
 
 Box = tuple[float, float, float, float]
 """Left, bottom, width and height, as shares of a figure."""

@@ -1,4 +1,4 @@
-"""Figures of the machine: in one pose, or in several beside each other."""
+"""Pictures of the machine: in one pose, or in several beside each other."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from pteron.shapes import PoseLike
 from pteron.workspace import home_pose
 
 _WIDTH = 5.6
-"""Inches."""
+"""Width of a figure of one pose, inches."""
 
 _SPACE = 4.4
 """Height of a picture in space, inches."""
@@ -36,13 +36,13 @@ _PANEL = 2.4
 """Width of one picture beside others, inches."""
 
 _SQUARE = 0.9
-"""Height over width of one in space."""
+"""Height over width of one picture in space beside others."""
 
 _INSET = 0.02
-"""Share of its width that is free on each side of it."""
+"""Margin on each side of such a picture, as a share of its width."""
 
 _TITLE = 0.24
-"""Inches over a picture that its title takes."""
+"""Height of the title over a picture, inches."""
 
 
 def draw(

@@ -1,4 +1,4 @@
-"""Films through the last coordinate of a map of an index over three."""
+"""Films of a map over three coordinates, which go through the last coordinate."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ from pteron.plots.films import Film, checked_film, write_film
 from pteron.plots.index_maps import color_scale, map_panels
 
 _FPS = 10.0
+"""Frames a second where nothing else is asked."""
+
 _DPI = 160
+"""Pixels an inch."""
 
 
 def map_film(

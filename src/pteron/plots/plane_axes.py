@@ -16,14 +16,14 @@ from pteron.plots.canvas import nice_step, plain_axes
 from pteron.plots.machine_axes import MachineAxes
 
 _RIM = 0.06
-"""Rim around the drawing, as a share of its size."""
+"""Margin around the drawing, as a share of its size."""
 
 
 _APART = 0.4
-"""Inches between two numbers of a scale, at least."""
+"""Least distance between two numbers of a scale, inches."""
 
 _LEFT, _BELOW, _TOP = 0.62, 0.46, 0.1
-"""Inches of a box for the scales and their names, and free above the axes."""
+"""Inches for the scales and their names, left of and below the axes, and free above the axes."""
 
 
 class PlaneAxes(MachineAxes):

@@ -19,17 +19,19 @@ from pteron.plots.canvas import FONT_SIZE, legend
 from pteron.plots.fonts import no_word_of_glyphs, take_fonts
 
 Width = Literal["column", "page"]
+"""Names of usual widths."""
 
 WIDTHS: dict[str, float] = {"column": 3.5, "page": 7.16}
-"""Inches of a journal's column, and of both with what is between them."""
+"""Inches of a journal's column, and of its page: two columns and the gap between them."""
 
 _GAP = 3.0
-"""Pixels, 100 an inch, between two numbers of a scale, at least."""
+"""Least distance between two numbers of a scale, in pixels of 1/100 inch."""
 
 _PRINTED = 8.0
-"""Points of the letters in print."""
+"""Size of letters in print, points."""
 
 _NARROWEST, _WIDEST = 1.5, 40.0
+"""Least and greatest width, inches."""
 
 _METADATA: dict[str, dict[str, Any]] = {
     ".svg": dict.fromkeys(("Creator", "Date", "Format", "Type")),

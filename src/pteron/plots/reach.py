@@ -1,4 +1,4 @@
-"""Maps of the reach: slices of poses, coloured by the leg that ends it, or by a measure."""
+"""Pictures of slices through the reach: the margin inside, and the leg that ends it outside."""
 
 from __future__ import annotations
 
@@ -30,15 +30,16 @@ _BANDS = 4
 """Shades of the margin inside the reach."""
 
 _TENTHS = [tenth / 10.0 for tenth in range(10)]
+"""Levels of a measure's lines."""
 
 _TIE = 1e-9
-"""Metres."""
+"""Difference of two legs' margins that counts as none, m."""
 
 _SPECK = 2.0
-"""Cells of the grid below which a rim is not drawn."""
+"""Size, in cells of the grid, below which an outline is not drawn."""
 
 _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
-"""Legs 1 to 4: lines which coincide, as those of mirrored legs do, both show."""
+"""Styles of lines of legs 1 to 4: lines which coincide, as those of mirrored legs do, both show."""
 
 
 def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:

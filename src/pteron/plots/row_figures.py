@@ -1,4 +1,4 @@
-"""Figures with a row a name: values of parameters with their intervals, and counts."""
+"""Pictures with a row for each name: parameters' values with their intervals, and counts."""
 
 from __future__ import annotations
 
@@ -26,9 +26,13 @@ from pteron.plots.canvas import (
 )
 
 _WIDE = 5.4
+"""Width of the figure, inches."""
+
 _ROW = 0.185
+"""Height of a row, inches."""
+
 _HEAD = 0.5
-"""Inches of the figure, of each row, and of the scale below the rows of one unit."""
+"""Height of the scale below the rows of one unit, inches."""
 
 
 def parameters_figure(

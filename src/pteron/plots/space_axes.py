@@ -20,7 +20,7 @@ _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees, from which the machine is seen."""
 
 _MARGIN = 0.04
-"""Share of the figure on each side."""
+"""Margin on each side, as a share of the figure."""
 
 
 def upright(vertical: Array) -> Array:

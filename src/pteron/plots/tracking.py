@@ -1,4 +1,4 @@
-"""The tracking errors of a simulated machine."""
+"""Picture of the tracking errors of a simulated machine over time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pteron.plots.canvas import blank, groups_of, leg_curves, legend, stack, zer
 from pteron.plots.joint_columns import rows
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
+"""Factors and prefixes of units."""
 
 
 def tracking_figure(time: ArrayLike, error: ArrayLike, names: Sequence[str]) -> Figure:

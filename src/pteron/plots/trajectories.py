@@ -1,4 +1,4 @@
-"""Trajectories of the platform and of the joints over time, with their derivatives below."""
+"""Pictures of a trajectory over time, of the platform or of the joints, with its derivatives."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ from pteron.plots.canvas import blank, groups_of, leg_curves, leg_labels, legend
 from pteron.plots.joint_columns import joints_of
 
 _ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
+"""Endings of the units of a quantity and its derivatives."""
 
 _OF_POSE = ("pose", "velocity", "acceleration", "jerk", "snap")
+"""Names of the pose and its derivatives."""
+
 _OF_JOINTS = ("joint", "speed", "acceleration", "jerk", "snap")
+"""Names of a joint coordinate and its derivatives."""
 
 _WIDE, _TALL, _HEAD = 5.4, 1.35, 0.75
-"""Inches of the figure, of each row, and of what is above and below them."""
+"""Width of the figure, height of each row, and of what is above and below the rows, inches."""
 
 
 def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]) -> Figure:

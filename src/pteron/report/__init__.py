@@ -1,4 +1,4 @@
-"""Everything about a machine in one page, its motions in another, and the tables of their numbers.
+"""HTML reports: all about a machine on one page, or one of its motions.
 
 `write_report` has all that Pteron knows of a machine; `write_motion_page` shows one motion of it.
 """

@@ -1,4 +1,4 @@
-"""The contents of a report: all that Pteron knows of one machine, computed once."""
+"""The contents of the report on one machine, computed before its page is written."""
 
 from __future__ import annotations
 

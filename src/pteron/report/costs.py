@@ -1,4 +1,4 @@
-"""Operations of the dynamic model in each of its forms, complete and reduced.
+"""Numbers of operations of the dynamic model in each of its forms, complete and reduced.
 
 The paper says that its reduced model is about 41 % faster than the complete one. How much a
 reduction saves depends on the form: all of them stand side by side here, and their times in
@@ -18,6 +18,7 @@ _NAMES = {
     "regressor, J^-T last": "Eq. (15) as one graph, J^-T last",
     "factored": "factored inverse dynamics",
 }
+"""Names of the forms on the page."""
 
 
 @dataclass(frozen=True)

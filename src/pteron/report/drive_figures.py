@@ -1,4 +1,4 @@
-"""Pictures of what the drives of a machine do over a cycle."""
+"""Pictures of the drives of a machine over a cycle: force over speed, and power over time."""
 
 from __future__ import annotations
 

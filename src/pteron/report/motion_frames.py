@@ -1,4 +1,4 @@
-"""The machine in motion as plain data, which `view.js` draws in a page."""
+"""The frames of a machine's motion as plain data, which `view.js` draws on a page."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ from pteron.plots.machine_drawing import APART, base_outline
 from pteron.report.quantities import coordinate
 
 _A_SECOND = 60.0
-"""Frames a second of real time: as many as screens show."""
+"""Frames for a second of real time: as many as screens show."""
 
 _FEWEST, _MOST = 240, 2400
-"""Frames: a short motion may be slowed down, and the page of a long one may be sent by mail."""
+"""Least number of frames, as a short motion may be slowed down, and greatest, as the page of a long
+one may be sent by mail."""
 
 _DRAWN = 1000
-"""Samples of a line in a picture, about that many."""
+"""Samples, about, of a line in a picture."""
 
 _DECIMALS = 6
+"""Decimals of the data, m or rad."""
 
 _SAME = 1e-6
-"""Share of its size, and of its speed, by which the ends of a closed motion may differ."""
+"""Difference between the ends of a closed motion, as a share of its size, and of its speeds."""
 
 _LITTLE = 1e-3
-"""Least size, m or rad, and least speed, the same per s, of which that share is taken."""
+"""Least size (m, rad) and speed of which that share is taken."""
 
 
 @dataclass(frozen=True)

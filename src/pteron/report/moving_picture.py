@@ -1,4 +1,4 @@
-"""The moving picture of a page: its words, its speeds and its data."""
+"""The moving picture of a page: variables of its template, such as words, speeds and frames."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.report.quantities import coordinate, force
 from pteron.report.typeset import embedded, resource
 
 _SHORT = 3.0
-"""s: the eye does not follow a shorter motion in real time."""
+"""Duration, s, below which a motion is slowed down for the eye."""
 
 _PACES = (
     (0.0, 0.1, "10 % of real speed"),
@@ -26,6 +26,7 @@ _PACES = (
 """Least duration of a motion, s, speed of its playback, and name of the speed."""
 
 _ROUNDING = 1e-9
+"""Distance of two points, m, that counts as none."""
 
 
 def stage(

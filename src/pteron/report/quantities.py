@@ -13,8 +13,10 @@ from pteron.platforms.coordinates import coordinate as pose_coordinate
 from pteron.report.typeset import fixed
 
 _NARROW = "\u202f"
+"""The narrow space within a unit."""
+
 SYMBOLS = {"rho": "\u03c1", "theta": "\u03b8"}
-"""Letters for the coordinates of joints."""
+"""Greek letters of the joints' coordinates."""
 
 
 @dataclass(frozen=True)

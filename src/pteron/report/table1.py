@@ -43,6 +43,7 @@ RESTORED = frozenset({15, 21, 24})
 24 an axis): they stand here as the other rows and the symmetry of the machine determine them."""
 
 _TERM = re.compile(r"([+-]?)\s*([\d.]+)?\s*([A-Za-z]\w*)")
+"""Pattern of a term of a printed row: sign, coefficient, name."""
 
 
 @dataclass(frozen=True)

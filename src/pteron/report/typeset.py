@@ -1,4 +1,4 @@
-"""Numbers and templates of the pages."""
+"""Numbers typeset for the pages: significant digits, decimal places, minus signs, units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from pteron.platforms.coordinates import coordinate
 from pteron.templates import template as any_template
 
 _MINUS = "\u2212"
+"""The minus sign."""
+
 _NARROW = "\u202f"
+"""The narrow space within a unit."""
 
 
 def significant(value: float, digits: int = 3) -> str:

@@ -1,4 +1,4 @@
-"""`write_report` and `write_motion_page`: pages and their numbers, as files."""
+"""`write_report` and `write_motion_page`: a page and its numbers, written as files."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pteron.report.contents import Report
 
 _PAGES = (".html", ".htm")
+"""Endings of pages."""
 
 
 def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None = None) -> Path:

@@ -1,8 +1,8 @@
-"""Tables in CSV and Parquet files, read with care.
+"""Tables in CSV and Parquet files: read in blocks, checked, written whole or not at all.
 
-Rows are counted from 1 as data rows, as a person counts them, and messages name the line of the
-file too. A file is read a block of rows at a time. The cells of a CSV file are text until a number
-is asked for, so that columns which Pteron does not use are written back as they came.
+Messages count data rows from 1, as a person does, and name the line of the file too. The cells of a
+CSV file are text until a number is asked for, so that columns which Pteron does not use are written
+back as they came.
 """
 
 from pteron.tables.csv_file import CsvFile

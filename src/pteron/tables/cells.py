@@ -1,4 +1,4 @@
-"""The cells of a CSV file as a separator cuts them, and which separator makes them numbers."""
+"""A CSV file's cells as a separator cuts them, and the separator that makes numbers of most."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from typing import NamedTuple, get_args
 from pteron.tables.dialect import SEPARATORS, Decimal, Dialect, Separator
 
 _MOST = 0.5
-"""Share of a column's cells that are numbers or times, beyond which it is a column of these."""
+"""Share of numbers or times among its cells from which a column counts as one of these."""
 
 _NUMBER = r"[+-]?(?:\d+{0}?\d*|{0}\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
+"""Pattern of a number; {0} is the decimal sign."""
+
 _STAMP = r"(?:\d[\d./-]*[T ] ?)?\d\d?:\d\d:\d\d(?:[.,:]\d+)?(?: ?[AP]M|Z|[+-]\d\d:?\d\d)?"
+"""Pattern of a date and time."""
+
 _DATA = {
     sign: re.compile(f"{_NUMBER.format(re.escape(sign))}|{_STAMP}", re.IGNORECASE)
     for sign in (".", ",")
@@ -39,9 +43,9 @@ class Cut(NamedTuple):
     width: int
     """Cells of most records."""
     columns: tuple[int, ...]
-    """Those that hold numbers or times."""
+    """Columns that hold numbers or times."""
     matched: int
-    """Cells that are one."""
+    """Cells that are a number or a time."""
 
     def is_row(self, record: Record) -> bool:
         """Say whether all its numbers are numbers."""

@@ -1,4 +1,4 @@
-"""CSV files: a block at a time by Polars, or by record where it must be said what is wrong."""
+"""CSV files, read in blocks by Polars, or record by record to say what is wrong."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ from pteron.tables.table import Table, listed
 
 BLOCK = 16 << 20
 """Bytes read at a time: large enough for Polars to be fast, small beside any memory."""
+
 _HEAD = 1 << 20
+"""Bytes at the beginning of a file from which its layout is found."""
+
 _END = b"\nEOF"
 """A last line that marks the end, as TwinCAT Scope writes it."""
 

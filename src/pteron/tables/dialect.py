@@ -1,4 +1,4 @@
-"""Dialects of CSV: how a file is written, as far as somebody has declared it."""
+"""Dialects of CSV: separator, decimal sign, encoding and header lines, as far as declared."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import Literal
 from pteron.errors import DataError, shown
 
 Separator = Literal[",", ";", "\t", "|", " "]
+"""Characters between cells."""
+
 Decimal = Literal[".", ","]
+"""Decimal signs."""
 
 SEPARATORS: dict[Separator, str] = {
     ",": "commas",
@@ -18,7 +21,7 @@ SEPARATORS: dict[Separator, str] = {
     "|": "bars",
     " ": "blanks",
 }
-"""The separators that are known, each with its name."""
+"""The separators, each with its name."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Tables in CSV and Parquet files: read with care, written whole or not at all."""
+"""Opening, reading and writing of tables in CSV and Parquet files, by the file's ending."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ STANDARD_INPUT = "-"
 """The path that stands for CSV on standard input."""
 
 _LONGEST_PATH = 1000
+"""Characters of a path that a message shows."""
 
 
 def open_table(

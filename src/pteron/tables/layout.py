@@ -1,7 +1,7 @@
-"""The layout of a CSV file, found from its beginning: its dialect, where its rows begin, its names.
+"""The layout of a CSV file, found from its beginning: dialect, names, and where its rows begin.
 
-What cannot be known for certain is refused with what to declare, and nothing is guessed but the
-encoding of what is not UTF-8.
+What cannot be known for certain is refused with what to declare; nothing is guessed but the
+encoding of a file that is not UTF-8.
 """
 
 from __future__ import annotations
@@ -19,12 +19,17 @@ from pteron.tables.dialect import SEPARATORS, Dialect, declaration
 from pteron.tables.table import listed
 
 _LINES = 1000
-"""Lines looked at."""
+"""Lines of a file from which its layout is found."""
+
 _WITH_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+"""A number with a decimal comma."""
+
 _OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-"""A number that is another one where the comma marks thousands."""
+"""A number with a comma that would be another number if the comma separated thousands."""
 
 _ONE_UNIT = r"(?:[mkunµ]?(?:s|m|rad|deg|N|A|V|W|g|Hz)|sec|°C?|%|1|-)(?:\^?-?\d|[²³])?"
+"""Pattern of a unit, with a power or without."""
+
 _UNIT = re.compile(
     rf"(?P<open>[\[(])?{_ONE_UNIT}(?:[ ·*/]?{_ONE_UNIT})*(?(open)[\])])|\[.{{0,9}}\]"
 )
@@ -33,7 +38,7 @@ _UNIT = re.compile(
 _KEYS = {"SymbolName", "SymbolComment", "SampleTime[ms]", "Data-Type", "Unit", "NetID"}
 """First cells of lines above the data in an export of TwinCAT Scope; that of the names is Name."""
 _TICKS = 10**15
-"""Milliseconds since its start that no export lasts: such times are ticks of 100 ns."""
+"""Time stamps above this, in ms, must be ticks of 100 ns: no export lasts that long."""
 
 
 @dataclass(frozen=True)

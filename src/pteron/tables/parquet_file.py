@@ -1,4 +1,4 @@
-"""Parquet files, some rows at a time."""
+"""Parquet files, read in blocks of rows."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pteron.errors import DataError
 from pteron.tables.table import Table
 
 _ROWS = 262_144
+"""Rows of a block."""
 
 _UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 """Exceptions of Polars at damaged bytes; a panic is no `Exception`."""

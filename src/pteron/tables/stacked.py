@@ -1,6 +1,6 @@
-"""Variables that a file has one below another, as WinCC and CODESYS 3 write them, side by side.
+"""Logs of WinCC and CODESYS 3, which have variables one below another, put side by side.
 
-Only opening a table uses it; what it returns is a plain CSV file.
+Only the opening of a table uses this; the result is a plain CSV file.
 """
 
 from __future__ import annotations

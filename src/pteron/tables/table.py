@@ -14,6 +14,7 @@ from pteron.errors import DataError, shown
 from pteron.shapes import OnFailure
 
 _ROWS_AT_A_TIME = 10_000
+"""Rows converted to numbers at a time."""
 
 
 @dataclass(frozen=True)

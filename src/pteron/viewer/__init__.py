@@ -1,4 +1,4 @@
-"""A machine in the browser: seen in space, moved by sliders or by hand, with its forces."""
+"""The viewer: a machine in the browser, in space, moved by sliders or by hand, with its forces."""
 
 from pteron.arguments import check_arguments
 from pteron.viewer.view import Viewer, view

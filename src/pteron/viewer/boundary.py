@@ -18,20 +18,22 @@ LEAST_TYPE_I = 0.01
 """The type-I measure at the end of a leg's reach: forces still have most of their digits."""
 
 _ENDS = 2.0 * LEAST_TYPE_I
-"""The measure below which a leg stops the machine, on either side of the boundary."""
+"""Type-I measure below which a leg is said to have stopped the machine."""
 
 _ROUNDING = 1e-9
-"""m or rad by which a joint may be beyond its limit: a pose on it is within."""
+"""Distance of a joint beyond its limit that counts as rounding, m or rad."""
 
 _PIECES = 32
 """Pieces into which a path is divided in each round of the search for its end."""
 
 _ROUNDS = 5
+"""Rounds of the search for the end of a path."""
 
 _STEPS = 8
 """Pieces of a path of the joints, along each of which the platform is followed."""
 
 _SAME_JOINT = 1e-6
+"""Difference of a joint's coordinate from the wanted one that counts as none, m or rad."""
 
 
 def allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:

@@ -1,7 +1,8 @@
-"""A guard of the viewer's server: it answers its own pages only, by a name of this machine.
+"""A guard of the viewer's server: it answers requests of its own pages only.
 
-A browser lets any page ask any server for a socket, and a name that its owner points at 127.0.0.1
-makes a foreign page one of this machine's. Both stand in the request: in `Origin` and in `Host`.
+A browser lets any page open a socket to any server, and the owner of a name can make it point at
+127.0.0.1, so that a foreign page seems one of this machine's. Both show in a request: in its
+headers `Origin` and `Host`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     _Answer = Callable[[ServerConnection, Request], Response | None]
 
 _SERVES = threading.Lock()
+"""Held while a server is being guarded: one at a time."""
 
 
 def is_here(host: str) -> bool:

@@ -1,4 +1,4 @@
-"""The handle on the platform: arrows that move it, and a ring that turns it."""
+"""The handle on the platform in the viewer: arrows that move it, and a ring that turns it."""
 
 from __future__ import annotations
 

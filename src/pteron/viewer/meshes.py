@@ -1,4 +1,4 @@
-"""The few meshes of all bodies, as vertices (V, 3) and faces (F, 3)."""
+"""The meshes that all bodies are drawn with: cylinder, ball and cube."""
 
 from __future__ import annotations
 
@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 from pteron.kernels import Array
 
 Mesh = tuple[Array, NDArray[np.int64]]
+"""Vertices (V, 3), and faces (F, 3), the numbers of their vertices."""
 
 _SIDES = 12
+"""Sides of a cylinder, and meridians of a ball."""
+
 _RINGS = 7
+"""Rings of a ball's vertices, its poles included."""
 
 
 def cylinder(top: float = 1.0) -> Mesh:

@@ -1,4 +1,4 @@
-"""The controls beside the picture: each shows the machine's state, and sends changes of it."""
+"""The panel beside the viewer's picture: controls that show the machine's state and change it."""
 
 from __future__ import annotations
 
@@ -22,21 +22,23 @@ if TYPE_CHECKING:
     import viser
 
 Post = Callable[[str, Callable[[], object]], None]
-"""Sends an action to the viewer; of those under one name only the last counts."""
+"""Sends an action to the viewer, under a name: of several under one name only the last counts."""
 
 _STEP = 0.1
-"""mm or degrees."""
+"""Step of sliders, mm or degrees."""
 
 _SHORT = 0.01
-"""s: the step of the slider of time."""
+"""Step of the slider of time, s."""
 
 _NO_MODE = "none of them"
+"""The choice shown where the pose is in no assembly mode of the list."""
 
 _HELD = 0.2
-"""s for which a control that a person moves is left alone: an older answer would pull it back."""
+"""Time, s, for which a control that a person moves is not updated: an older answer would pull it
+back."""
 
 _SAME = 1e-6
-"""mm, degrees or s by which a slider may differ from its value."""
+"""Difference of a slider from its value that counts as none, mm, degrees or s."""
 
 
 class Panel:

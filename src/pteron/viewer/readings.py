@@ -1,4 +1,4 @@
-"""The readings of the panel: forces, condition number, and margins to singularities and limits."""
+"""Readings on the viewer's panel: forces, condition number, margins to singularities and limits."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ from pteron.viewer.state import ViewerState
 from pteron.workspace import pose_margins
 
 Level = Literal["far", "near", "close"]
+"""How far a pose is from what ends the work."""
 
 _NEAR = 0.3
+"""Margin, 1 at best, below which a pose is near what ends the work."""
+
 _CLOSE = 0.1
-"""Margins, of 1 at best, below which a pose is near, and close to, what ends the work."""
+"""Margin below which it is close to that."""
 
 
 @dataclass(frozen=True, eq=False)

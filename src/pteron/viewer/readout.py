@@ -1,4 +1,4 @@
-"""The readings of a machine as HTML for the panel: values with units, and colours with words."""
+"""The readings as HTML for the viewer's panel: values with units, colours with words."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _COLORS: dict[Level, tuple[str, str]] = {
     "near": ("#fbe8c6", "#7a4b00"),
     "close": ("#f8d7d4", "#8c1d14"),
 }
-"""Background and ink, of enough contrast for every eye; words say the same."""
+"""Colours of background and text, of enough contrast for every eye; words say the same."""
 
 PLACES = 2
 """Decimal places of a force."""

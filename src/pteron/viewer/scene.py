@@ -35,14 +35,19 @@ if TYPE_CHECKING:
     import viser
 
 _SCREW = 0.09
+"""Half the length of the arrow along a joint's axis, as a share of the machine's size."""
+
 _FORCE = 0.3
+"""Length of the arrow of the largest force, as such a share."""
+
 _FORCE_RADIUS = 0.011
-"""Lengths and radii of arrows, as shares of the machine's size; the largest force has the first."""
+"""Radius of arrows, as such a share."""
 
 _MOST = 2.0
-"""Longest arrow, in lengths of the force that its scale is made for."""
+"""Longest arrow, over the one of the force that the scale is made for."""
 
 _DOWN = 0.2
+"""Length of the arrow of gravity, as a share of the machine's size."""
 
 _NONE = 1e-9
 """m/s^2 below which there is no gravity."""

@@ -1,4 +1,4 @@
-"""The page's server: viser, quiet, on a port that is free, at the address that was asked for."""
+"""The viewer's server: viser, on a free port of the address asked for."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     import viser
 
 _TRIED = 100
-"""Ports that are tried, one after the other."""
+"""Ports that are tried in turn."""
 
 _MOST = 65535
+"""The largest port."""
 
 _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
+"""Error numbers for an address that is none of this machine's."""
 
 
 def serve(host: str, port: int, label: str) -> viser.ViserServer:

@@ -1,6 +1,6 @@
-"""The session of one viewer: a machine's state, the motion that plays, every action on them.
+"""The session of one viewer: a machine's state, the motion that plays, and every action on them.
 
-It knows nothing of a browser. All of it runs in one thread.
+It knows nothing of a browser, and runs in one thread.
 """
 
 from __future__ import annotations
@@ -35,14 +35,19 @@ from pteron.viewer.state import (
 from pteron.workspace import bounding_box
 
 SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "real time": 1.0, "2 x": 2.0}
-"""Names of a motion's speeds, and the seconds of it that one second shows."""
+"""Speeds of playback by name; 1 is real time."""
 
 STANDARD = "standard pick-and-place cycle"
+"""Name of the motion that is there without a file."""
 
 _DRAWN = 200
+"""Random poses by which the ranges of sliders are chosen."""
+
 _MARGIN = 0.08
+"""Share by which the range of poses is extended for sliders."""
+
 _RIM = 0.05
-"""Shares of a range by which sliders extend it: of the pose, and of the joints."""
+"""The same for joints."""
 
 
 class Session:

@@ -1,4 +1,4 @@
-"""A plane slice through the reach, as surfaces of the picture."""
+"""A plane slice through the reach, as coloured surfaces of the viewer's picture."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ POINTS = 111
 """Points along each side of a slice."""
 
 SERVES, BEYOND = "#2f7fc4", "#e0a030"
-"""Colours: in reach, and in reach but beyond a joint's limit."""
+"""Colours of poses in reach, and of those in reach but beyond a joint's limit."""
 
 NONE = "none"
+"""The choice of no slice."""
 
 
 def choices(robot: Manipulator) -> tuple[str, ...]:

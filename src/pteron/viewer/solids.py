@@ -1,4 +1,4 @@
-"""The machine in one pose as simple bodies: bars, balls and blocks, ready to be drawn together.
+"""The machine in one pose as bars, balls and blocks, for the viewer's picture.
 
 A bar is a cylinder from one point to another; all bars of a machine are copies of one mesh, and so
 are all balls and all blocks, so that a browser draws each kind at once.
@@ -25,17 +25,23 @@ _LINK, _ROD, _ARM, _GUIDE, _AXIS, _JOINT = 0.011, 0.006, 0.007, 0.008, 0.003, 0.
 """Radii as shares of the machine's size."""
 
 _AXLE = 0.03
+"""Half the length of a crank's axle, as such a share."""
+
 _FRAME = 0.13
-"""Half the length of a crank's axle, and the length of a frame's axis, as such shares."""
+"""Length of a frame's axes, as such a share."""
 
 _BLOCK = np.array([0.04, 0.04, 0.072])
-"""The sides of a slider's block, along its guide last."""
+"""Sides of a slider's block, as such shares, the one along its guide last."""
 
 
 _Bar = tuple[Array, Array, float, str]
+"""Ends, m, radius and colour."""
+
 _Ball = tuple[Array, float, str]
+"""Middle, m, radius and colour."""
+
 _Block = tuple[Array, Array, str]
-"""Ends or middle, m, radius or guide, and colour."""
+"""Middle, m, direction of the guide, and colour."""
 
 
 def rgb(color: str) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""The state of a machine in the viewer, as a value, and the state that follows each action."""
+"""The state of a machine in the viewer, an immutable value, and the state after each action."""
 
 from __future__ import annotations
 

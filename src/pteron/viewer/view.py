@@ -1,4 +1,4 @@
-"""`view`: a machine in the browser, to be moved."""
+"""`view`: serves a page in the browser on which a machine can be moved."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from pteron.viewer.slices import NONE, slice_meshes
 from pteron.viewer.state import ViewerState, stopped
 
 _FRAME = 1.0 / 30.0
-"""s between two pictures of a motion."""
+"""Time between two pictures of a motion, s."""
 
 _PANEL = 0.1
-"""s between two readings of a motion: nobody reads faster, and browsers are busy."""
+"""Time between two readings of a motion, s: nobody reads faster, and browsers are busy."""
 
 _SETTLED = 0.25
-"""s without an action after which slower results are shown."""
+"""Time without an action after which results that take longer are shown, s."""
 
 STANDARD_CYCLE = "adept"
 """The name of the standard pick-and-place cycle at the command line."""

@@ -1,4 +1,4 @@
-"""An identification as files: a page to read, its numbers, and the model of real bodies."""
+"""The report on an identification: a page to read, its numbers, the model file of real bodies."""
 
 from pteron.report.identification.values import Parameter, measured, parameter_rows
 from pteron.report.identification.write import Written, model_path, numbers, write_identification

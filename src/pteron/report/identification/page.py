@@ -1,4 +1,4 @@
-"""The page of an identification: one HTML file that needs nothing else."""
+"""The HTML page of the report on an identification: one file that needs no other."""
 
 from __future__ import annotations
 
@@ -31,8 +31,10 @@ from pteron.report.quantities import force, nouns
 from pteron.report.typeset import resource, significant, template
 
 _COMMAND = r"pteron [a-z]+ ROBOT(?: --[a-z-]+ [\w.]*\w)+"
+"""Pattern of a command of `pteron` in a text."""
 
 _CODE = r"<code>\g<0></code>"
+"""HTML of a command."""
 
 
 def page(result: Identification, model_file: str | None = None) -> str:

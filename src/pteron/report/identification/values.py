@@ -1,4 +1,4 @@
-"""The identified values and bodies one by one: how well each is known, and why some hardly are."""
+"""Rows of an identification's report: each value and body, how well it is known, and why."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STRONG = 0.95
 """Correlation from which two values can hardly be told apart."""
 
 _NORMAL = 1.959963984540054
-"""Standard deviations to each side that hold 95 %."""
+"""Half width of a 95 % interval of a normal variable, in standard deviations."""
 
 
 @dataclass(frozen=True)

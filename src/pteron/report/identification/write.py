@@ -1,4 +1,4 @@
-"""`write_identification`: the page, its numbers and the model file."""
+"""`write_identification`: the report's page, `identification.json` and the model file, written."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pteron.report.identification.contents import short_sources, shortened
 from pteron.report.write import checked_folder
 
 _SAFE = re.compile(r"[^\w.-]+")
+"""Characters that names of files do without."""
 
 
 @dataclass(frozen=True)
