@@ -39,7 +39,7 @@ _LARGEST = 2**63
 
 
 class Between(NamedTuple):
-    """The bounds of a number, which may be given themselves, as an annotation of its type hint."""
+    """The bounds of a number, both of them allowed, as an annotation of its type hint."""
 
     least: float
     most: float = math.inf

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Writing of files whole or not at all: where one fails, what was there before stays."""
 
 from __future__ import annotations
 

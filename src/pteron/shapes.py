@@ -1,8 +1,8 @@
-"""Names of array shapes, for the type hints of the public functions; and the failure modes.
+"""Names of array shapes, and of other arguments that recur, for the type hints of public functions.
 
 `...` are the batch axes, n the legs, m the pose coordinates (n = m), k the assembly modes and N the
-inertial parameters. SI units and radians; poses are ordered (x, y, z, phi), without z
-in a plane, without phi where the platform does not turn.
+inertial parameters. SI units and radians; poses are ordered (x, y, z, phi), without z in a plane,
+without phi where the platform does not turn.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ Workers = Annotated[int, Between(1, 1024)]
 
 @runtime_checkable
 class HasColumns(Protocol):
-    """A table: its columns have names, and are got by them."""
+    """A table with named columns, such as a DataFrame."""
 
     @property
     def columns(self) -> Any:
-        """The names."""
+        """Names of the columns."""
 
 
 Columns = HasColumns | Mapping[str, Any]

@@ -1,4 +1,4 @@
-"""Jinja templates of pages, tables and readings in HTML: strict, and escaped."""
+"""Loading of Jinja templates for HTML: undefined names are errors, values are escaped."""
 
 from __future__ import annotations
 

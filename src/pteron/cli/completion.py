@@ -28,12 +28,12 @@ def machines(incomplete: str) -> list[str]:
 
 
 def functions(incomplete: str) -> list[str]:
-    """Return the functions that can be exported and begin so."""
+    """Return the functions that can be exported, those whose names begin so."""
     return [name for name in FUNCTIONS if name.startswith(incomplete)]
 
 
 def indices(ctx: Context, incomplete: str) -> list[str]:
-    """Return the indices of performance that the machine that was named has, and begin so."""
+    """Return the performance indices of the machine named before, those whose names begin so."""
     from pteron.indices import INDICES, indices_of
     from pteron.manipulator import load
 

@@ -88,7 +88,8 @@ def export(
     drives has `feed_forward` as well: what the drives must give, with friction, and
     `joint_feed_forward`, the same from the motion of the joints. With --base they take what `pteron
     identify` found, as it lists it, and are called `feed_forward_base` and
-    `joint_feed_forward_base`. The others write one thing each, and take no options but --elbows.
+    `joint_feed_forward_base`. The others write one thing each, with no options but --elbows and
+    --json.
     """
     folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, linuxcnc)
     asked = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}

@@ -25,7 +25,7 @@ _SHARE = 0.1
 
 
 def joint_masses(robot: RobotLike) -> Array:
-    """Return the mass that each joint's force moves while the others are free, at light poses.
+    """Return the mass that each joint's force moves while the others are free, where it is light.
 
     It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. Of n joints whose stiffness is w^2
     times it, the squares of the natural frequencies have the mean w^2, so that none is above

@@ -18,7 +18,7 @@ _SLOWEST = 0.1
 
 
 def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] | None:
-    """Return a number or some, or refuse one that is not above zero."""
+    """Return a number, or one for each joint, after a check that each is above zero."""
     if value is None:
         return None
     several: object = value

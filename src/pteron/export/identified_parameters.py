@@ -42,7 +42,7 @@ class Identified:
 
     @classmethod
     def of(cls, robot: Manipulator) -> Identified:
-        """Return those of a machine as its file has it."""
+        """Return a machine's own base parameters, with the values of its file."""
         base = base_parameters(robot)
         return cls(robot, base, base.values(), _comments(base, base.expressions()))
 

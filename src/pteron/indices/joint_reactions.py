@@ -28,7 +28,7 @@ from pteron.shapes import OnFailure, PoseLike
 
 @dataclass(frozen=True)
 class Reactions:
-    """Forces and moments in the legs' joints: on the side of the platform, from that of the base.
+    """Forces and moments in the legs' joints, on the side of the platform from that of the base.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The executable behind the public functions: `numeric`, and the policy that chooses it."""
+"""`numeric`: the kernel behind a public function, on CasADi's virtual machine first, then in C."""
 
 from __future__ import annotations
 

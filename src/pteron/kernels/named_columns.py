@@ -1,4 +1,4 @@
-"""Tables given where an array is expected: its columns are picked by their names."""
+"""Tables given where an array is expected: their columns are picked by name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MANY = 12
 
 
 def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
-    """Return the columns of a table, in the order asked for; what is no table as it is.
+    """Return the columns of a table, in the order asked for; what is no table, unchanged.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ def evaluated(
     base: Selects | None = None,
     wrench: bool = False,
 ) -> _Outputs:  # type: ignore[type-var]
-    """Return the outputs of a function of the table, or the only one: what the caller declares.
+    """Return the outputs of a function of the table `kernels.functions.TABLE`, or its only one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A motion of the joints, followed by the platform in the assembly mode that it starts in."""
+"""Direct kinematics along a motion of the joints, in the assembly mode that it starts in."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _HALVINGS = 12
 def follow(
     robot: RobotLike, joints: JointsLike, start: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
-    """Return the poses of joints that move, in one assembly mode: that of a pose to start from.
+    """Return the poses along a motion of the joints, in the assembly mode of a pose to start from.
 
     From each pose a line through the last two leads near the next one, and Newton's steps onto it;
     where they do not converge the joints' step is halved. A mode ends where the machine is singular

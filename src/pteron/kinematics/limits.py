@@ -1,4 +1,4 @@
-"""Joints that have limits, actuated and passive, and where they are in a pose."""
+"""Joints that have limits, actuated and passive: their coordinates in a pose, and their limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pteron.shapes import PoseLike
 
 @dataclass(frozen=True)
 class LimitedJoint:
-    """A joint that has limits, and where it is in a pose.
+    """A joint that has limits, and its coordinate in a pose.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ def drawn_poses(
     *,
     limits: bool = True,
 ) -> Array:
-    """Return poses (count, m) in reach, as `random_poses` does, singular everywhere or not.
+    """Return poses (count, m) in reach, as `random_poses` does, also if all of them are singular.
 
     Raises
     ------

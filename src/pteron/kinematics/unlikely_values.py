@@ -18,14 +18,14 @@ _WOUND = 6.0 * np.pi
 
 
 def unlikely_length(robot: Manipulator) -> float:
-    """Return the size from which on a length of a pose or a part is rather one in mm, m."""
+    """Return the length, m, above which one of a pose or a part was rather given in millimetres."""
     return 10.0 * max(
         hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
     )
 
 
 def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -> tuple[str, ...]:
-    """Return what in poses or joint coordinates is likely in another unit, one line each.
+    """Return a line on each value of poses or joint coordinates that is likely in another unit.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ ALL = {MARGIN.name: MARGIN, **INDICES}
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of an index over the poses of a map that serve.
+    """Statistics of an index over the poses of a map that are in reach and within limits.
 
     Attributes
     ----------

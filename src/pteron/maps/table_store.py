@@ -26,8 +26,8 @@ _ENDING = ".parquet"
 class TableStore:
     """Results of a sweep as tables: each chunk gives the rows of one Parquet file.
 
-    Its name is the chunk's number and a checksum of the plan, the number and the file. One that is
-    not as it was written counts as not finished, so that it is computed again.
+    A file's name is the chunk's number and a checksum of the plan, the number and the file. A chunk
+    whose file is not as it was written counts as not finished, so that it is computed again.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Forces of the drives over their speeds, within their limits; and their power over time."""
+"""Pictures of drives: their forces over their speeds, within limits; and their power over time."""
 
 from __future__ import annotations
 

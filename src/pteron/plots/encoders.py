@@ -42,7 +42,7 @@ class Writer(Protocol):
 
 
 class Encoder(NamedTuple):
-    """A kind of file."""
+    """The encoder of one kind of file."""
 
     writer: Callable[[Path, tuple[int, int], float], Writer]
     """Takes its path, width and height in pixels, and frames a second."""

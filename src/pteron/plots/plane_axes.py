@@ -1,4 +1,4 @@
-"""Axes in the plane of a planar machine, which is seen along its normal."""
+"""Axes of pictures of a planar machine, in its plane, seen along the normal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Three-dimensional axes on which nearer things hide those farther away."""
+"""Axes of pictures in space, on which nearer things hide those farther away."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Certificates: the proof of a number of base parameters, in terms that a reader can check."""
+"""Certificates of a number of base parameters: the grounds it rests on, for a reader to check."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class NumericalRank:
 
 @dataclass(frozen=True)
 class Certificate(ABC):
-    """Root of the certificates.
+    """The root of the certificates: method, number of base parameters, number of columns.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ _FACTORED = 60
 
 
 def terms_of(kept: int, given: Shares) -> dict[int, Share]:
-    """Return the share of every column in the base parameter of a kept one, itself first."""
+    """Return the terms of a kept column's base parameter, columns with shares, itself first."""
     own: dict[int, Share] = {kept: Fraction(1)}
     return own | {j: given[j][kept] for j in sorted(given) if given[j].get(kept, 0) != 0}
 

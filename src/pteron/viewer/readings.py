@@ -26,7 +26,7 @@ _CLOSE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """The numbers of a state.
+    """The numbers that the panel shows for a state of the machine.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ many are lower than those next to a tube, in an order that is rounding's."""
 def failing_between(
     slopes: Callable[[Array], tuple[Array, ...]], axes: Sequence[Array], rows: Array
 ) -> Array:
-    """Return positions (H, k) between the points of a lattice where a row is below 0.
+    """Return positions (H, k) between the points of a lattice where a condition's row is below 0.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ _RIM = 1e-9
 
 
 class Shape(NamedTuple):
-    """A shape that is to be scaled: the points at which its gauge is at most half its edge."""
+    """A shape of variable size: the points at which its gauge is at most half its edge."""
 
     half: Array
     """Half the sides (k,) of the box that holds it where its edge is 2."""

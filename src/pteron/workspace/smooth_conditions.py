@@ -20,7 +20,7 @@ from pteron.workspace.conditions import Condition, conditions
 
 
 class SmoothConditions:
-    """The rows of a topology: all machines that differ in their geometry alone.
+    """The conditions as rows, for a topology: all machines that differ in their geometry alone.
 
     Parameters
     ----------

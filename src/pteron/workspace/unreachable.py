@@ -24,7 +24,7 @@ _TOUCH = 1e-6
 
 
 def nowhere(robot: Manipulator) -> ModelError:
-    """Return what is said of a machine that reaches no pose, or none within its joints' limits."""
+    """Return the error for a machine that reaches no pose, or none within its joints' limits."""
     pose, drawn = _deepest(robot)
     margin = numeric(robot, "reach")(pose)[0]
     if float(margin.min()) > _TOUCH:
@@ -43,7 +43,7 @@ def nowhere(robot: Manipulator) -> ModelError:
 
 
 def _deepest(robot: Manipulator) -> tuple[Array, Array]:
-    """Return the pose at which the leg that misses it most misses least, and random ones."""
+    """Return the pose whose least margin over the legs is greatest, and the random poses drawn."""
     center, radius = search_ball(robot)
     lengths = len(center)
     drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.freedom))

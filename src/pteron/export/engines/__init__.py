@@ -1,4 +1,4 @@
-"""Models for physics engines (MJCF, SDF, URDF, Pinocchio), made from a tree of cut chains."""
+"""Models for physics engines (MJCF, SDF, URDF, Pinocchio), made from one tree of bodies."""
 
 from typing import TYPE_CHECKING
 

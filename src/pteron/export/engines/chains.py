@@ -18,7 +18,7 @@ from pteron.manipulator import Manipulator
 
 @dataclass(frozen=True)
 class LegStance:
-    """A leg in a pose, or in K poses: then each vector is (K, 3).
+    """The joints and bodies of a leg in a pose; in K poses each vector is (K, 3).
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Coordinates of all joints of a cut mechanism (a `Tree`), for given poses of the platform."""
+"""Coordinates of all joints of the opened mechanism (a `Tree`), for poses of the platform."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class Link(NamedTuple):
 
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
-        """Its shapes: those of the body."""
+        """Shapes of the body; a light link has none."""
         return self.body.shapes if self.last else ()
 
 

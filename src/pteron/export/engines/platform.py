@@ -1,7 +1,7 @@
-"""The platform's bodies: what moves as one with P, parts that do not turn, gears, sliding halves.
+"""The platform's bodies in the opened mechanism: its main part, parts that do not turn, gears.
 
-The pieces have together the platform's mass, first moment and moment of inertia, as the equations
-take them (`Platform.joined`).
+Platforms that slide have two halves. The pieces have together the platform's mass, first moment and
+moment of inertia, as the equations take them (`Platform.joined`).
 """
 
 from __future__ import annotations

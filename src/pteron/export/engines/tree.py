@@ -1,4 +1,4 @@
-"""The cut mechanism: every leg and the platform as chains of bodies from the base.
+"""The opened mechanism: legs and platform as chains of bodies from the base, cut where they meet.
 
 Each leg is cut at its platform point, where its last body ends; the joints beyond are left out, as
 the platform's own chain says how it moves: it slides along the pose's lengths and turns by phi. Of

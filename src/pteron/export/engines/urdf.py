@@ -1,4 +1,4 @@
-"""URDF of the opened mechanism, and a closure file that says which points are one."""
+"""URDF of the opened mechanism, and a file beside it (YAML) that says how its loops close."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ _LEVELS, _RINGS, _DIRECTIONS = 200, 20, 24
 
 
 def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[float, float]:
-    """Return P's z at the bed, and how far from the axis it is good there: at most `reach`.
+    """Return P's z at the bed, and the radius about the axis that is good there: at most `reach`.
 
     It is at 0 where a machine can work at 0 and below the end stops; else it is the lowest level
     between two on which P goes far.

@@ -1,4 +1,4 @@
-"""Klipper's `delta`, as klippy/kinematics/delta.py and klippy/chelper/kin_delta.c compute it."""
+"""Klipper's kinematics `delta`, as its delta.py and chelper/kin_delta.c compute it."""
 
 from __future__ import annotations
 

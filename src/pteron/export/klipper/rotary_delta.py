@@ -1,4 +1,4 @@
-"""Klipper's `rotary_delta`, as its rotary_delta.py and chelper/kin_rotary_delta.c compute it."""
+"""Klipper's kinematics `rotary_delta`, as its rotary_delta.py and kin_rotary_delta.c compute it."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _SLOWER = 5.0
 
 @dataclass(frozen=True)
 class Start:
-    """The history of one start.
+    """One start of the search: a random motion, and the best that was made of it.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ _CHECKED = 200
 
 @dataclass(frozen=True)
 class Round:
-    """A round of the search."""
+    """A round of the improvement: its stages."""
 
     doublings: tuple[int, ...]
     """Sharpness of each stage's measure: the blunt one has wide valleys, the sharp one is all but

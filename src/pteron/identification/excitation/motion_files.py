@@ -18,7 +18,7 @@ _BESIDE = "-held-out", "-slow"
 
 
 def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, Path, Path]:
-    """Return where a motion, the one to be held out and slow passages go, if they can be written.
+    """Return the paths of a motion, held-out cycles and slow passages, if all can be written.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def write_motions(
 ) -> list[Path]:
     """Write motions and the descriptions of their logs, all of them or none.
 
-    Each is sampled so many times a second.
+    Each is sampled `rate` times a second.
     """
     files: dict[Path, bytes] = {}
     for path, (movement, description) in motions.items():

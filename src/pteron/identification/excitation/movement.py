@@ -38,7 +38,7 @@ class Movement(Protocol):
 def motion_of_platform(
     robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
 ) -> FullMotion:
-    """Return the state in a motion of the platform, (T, m) each."""
+    """Return the motion of platform and joints for a motion of the platform, (T, m) each."""
     # A slider's motion is finite out of the legs' reach too; that of the links is not.
     joints = unchecked(robot, "joint_coordinates", pose)
     rates = unchecked(robot, "joint_rates", pose, velocity)[0]

@@ -40,7 +40,7 @@ def lengths_of(robot: Manipulator) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class FittedMotion:
-    """States, and the forces of a fit there.
+    """States of a motion, and the forces of a fit at them.
 
     Parameters
     ----------

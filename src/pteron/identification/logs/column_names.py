@@ -30,7 +30,7 @@ class Wanted(NamedTuple):
 
 @dataclass
 class ColumnNames:
-    """The names of a file; those `taken` have a meaning already, those `needed` are documented."""
+    """A file's column names; those `taken` have a meaning already, the `needed` are documented."""
 
     names: tuple[str, ...]
     units: Mapping[str, str]

@@ -1,4 +1,4 @@
-"""The simulation's loop: at each sample forces are asked for, limited, delayed and integrated."""
+"""The loop of a simulation: at each sample forces are asked for, limited, delayed, integrated."""
 
 from __future__ import annotations
 

@@ -39,10 +39,10 @@ class Sensors:
 
 
 class Encoders:
-    """The encoders at work: what they told last is what rates are made of.
+    """Encoders during a simulation, with their last readings, from which they compute rates.
 
-    They count on where the angle of a crank that may go all the way round jumps by a turn: that of
-    such a one, `round_ones` (n,), is followed by the shorter way.
+    The angle of a crank that may go all the way round jumps by a turn: of such ones, `round_ones`
+    (n,), readings go on by the shorter way.
     """
 
     def __init__(

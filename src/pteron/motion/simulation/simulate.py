@@ -39,7 +39,7 @@ _STATE = ("start, pose", "start, velocity")
 
 @runtime_checkable
 class Controls(Protocol):
-    """A controller: how often it acts, and its law for the machine that it believes in."""
+    """A controller: its sampling period, and its law for a model of the machine."""
 
     @property
     def period(self) -> float:

@@ -21,7 +21,7 @@ _ROUNDING = 1e-9
 
 
 def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
-    """Return why the equations end at a state, (m,) each."""
+    """Return why the equations of motion cannot go on from a state, (m,) each."""
     if not np.abs(velocity).max() < _FAST:
         return (
             "the motion diverges: the controller is unstable, or the forces are far too large; "

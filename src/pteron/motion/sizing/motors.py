@@ -35,7 +35,7 @@ class Motor:
     name : str
         What it is called.
     rotor_inertia : float
-        Of its rotor, with what turns with it before the gear, kg m^2.
+        Inertia of its rotor, with what turns with it before the gear, kg m^2.
     rated_torque : float
         What it gives all the time, N m.
     peak_torque : float

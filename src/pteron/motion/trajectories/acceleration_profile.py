@@ -18,11 +18,11 @@ class Profile(NamedTuple):
     s: Array
     rate: Array
     gain: Array
-    """(K - 1,)"""
+    """Acceleration between nodes, (K - 1,)."""
 
     @classmethod
     def of(cls, grid: Array, squares: Array) -> Profile:
-        """Take x = s'^2 on a grid; before and after s rests."""
+        """Return the profile of x = s'^2 on a grid of s, at rest before and after."""
         rate = np.sqrt(np.maximum(squares, 0.0))
         spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
         time = np.concatenate([[0.0], np.cumsum(spans)])

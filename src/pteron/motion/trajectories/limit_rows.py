@@ -16,7 +16,7 @@ _SIDES = 16
 
 
 class LimitRows(NamedTuple):
-    """Limits as a u + b x + c + v sqrt(x) <= 1, (K, R) each, and x <= `most` (K,)."""
+    """Limits as a u + b x + c + v sqrt(x) <= 1, (K, R) each, and x <= `most`; u = s'', x = s'^2."""
 
     a: Array
     b: Array

@@ -1,4 +1,4 @@
-"""A curve of poses with a duration: it can be slowed as a whole."""
+"""A curve of poses traversed in a given duration, which can be made longer as a whole."""
 
 from __future__ import annotations
 
