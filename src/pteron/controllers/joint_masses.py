@@ -18,7 +18,8 @@ _POSES = 100
 """Random poses at which the masses are computed."""
 
 _LEAST = (0.1, 0.01)
-"""Least type-I and type-II measures of these poses, in turn: less where there are no such poses."""
+"""Least measure, of type I and of type II, of these poses, tried in turn: less where there are
+none."""
 
 _SHARE = 0.1
 """Share of the poses at which a joint's mass is less than the one returned."""

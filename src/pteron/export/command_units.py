@@ -14,8 +14,7 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
 Output = Literal["force", "torque", "percent"]
-"""What code returns for the drives: forces at the joints, torques at the motors, or per cent of
-these."""
+"""Units of commands: forces at the joints, torques of the motors, or per cent of rated torque."""
 
 DRIVEN = ("drive_forces", "feed_forward", "joint_feed_forward", *LAWS)
 """The functions whose forces are those of the drives."""

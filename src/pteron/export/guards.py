@@ -41,7 +41,7 @@ INPUT_POWER, _DIVISOR, _FACTOR = 6, -20, 30
 """Powers of ten: no input and no factor is larger, no divisor smaller."""
 
 _EXPONENT = "69.0"
-"""Largest exponent of e: its power is below 10^30."""
+"""Exponents of e below it have powers smaller than 10^`_FACTOR`."""
 
 _ZERO = "0.0"
 """Zero as LREAL."""

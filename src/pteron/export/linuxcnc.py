@@ -29,10 +29,10 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms import Platform
 
 _MILLIMETRES = 1000.0
-"""LinuxCNC's unit of length, a metre's."""
+"""LinuxCNC's unit of length, how many in a metre."""
 
 _DEGREES = 180.0 / math.pi
-"""LinuxCNC's unit of angles, a radian's."""
+"""LinuxCNC's unit of angles, how many in a radian."""
 
 _LONGEST = 26
 """Characters of a module's name before "kins": rtapi.h has 31 in all (RTAPI_NAME_LEN)."""

@@ -19,7 +19,8 @@ _DOUBLINGS = 12
 """2^12 = 4096."""
 
 _DEGREE = 11
-"""Of the Taylor polynomial: at 709 / 4096, about 0.17, the terms beyond are below 1e-17 of it."""
+"""Degree of the Taylor polynomial: at 709 / 4096, about 0.17, its other terms are below 1e-17 of
+it."""
 
 _MOST = 709.0
 """The largest |x|, as exp(710) overflows; an x beyond it is replaced by it."""

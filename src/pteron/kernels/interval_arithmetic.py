@@ -29,7 +29,7 @@ Bound = Any
 """An array (B,), or a number that serves the whole batch."""
 
 Mask = NDArray[np.bool_] | None
-"""None: no box."""
+"""For each box, whether something holds of it; None where it holds of no box."""
 
 _ULP = 2.0**-52
 """Share of itself by which a bound from + - * / or a root is widened."""

@@ -32,7 +32,8 @@ TARGETS: dict[str, type[Kernel]] = {
     "exact": Exact,
     "intervals": Boxed,
 }
-"""The targets by name."""
+"""What executes a function, by name: CasADi's virtual machine, Numba, C, JAX, fractions,
+intervals."""
 
 Grade = Literal["specialised", "parametric", "general"]
 """Numbers folded into the code: all of the machine's, its geometry and gravity, or none."""

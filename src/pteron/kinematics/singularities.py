@@ -1,4 +1,7 @@
-"""Type-II singularities: where the actuators, held still, no longer hold the platform."""
+"""Type-II singularities, where the actuators, held still, no longer hold the platform.
+
+Here are the largest type-II measure of a machine, and the platform's singular angles.
+"""
 
 from __future__ import annotations
 

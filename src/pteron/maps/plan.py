@@ -1,4 +1,4 @@
-"""Plans of stores: data on all that results depend on, by which a store is resumed, or refused."""
+"""The plan of a store of results: all that they depend on, so that no other run goes on with it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from typing import Any
 from pteron.errors import OutputError, shown
 
 RESULTS = "0.1.0"
-"""The first version whose maps and searches have this one's numbers: it goes on with its stores.
-
-It is raised where a number of them changes.
-"""
+"""The first version of Pteron whose maps and searches give the same numbers as this one: their
+stores can be resumed. It is raised where a number of them changes."""
 
 _LONG = 40
 """Characters of a text that a message shows whole."""
@@ -24,7 +22,7 @@ _MANY = 2
 
 
 def expect_same(path: str | Path, found: Any, wanted: Mapping[str, Any]) -> None:
-    """Refuse a store whose plan is another one.
+    """Refuse to go on with a store whose plan is another one.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ _STATUS = "status"
 """Name of the array that says whether poses are in reach."""
 
 _NOT_COMPUTED = -128
-"""`status` where no chunk has been written: no pose is taken for one that serves."""
+"""`status` where no chunk has been written yet, so that no pose there counts as in reach."""
 
 
 class MemoryStore:

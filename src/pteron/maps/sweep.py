@@ -31,10 +31,10 @@ _WAIT = 10.0
 """Seconds after which a scheduler, or its first worker, is taken for absent."""
 
 _START = 300.0
-"""Seconds in which processes of a computer that has much else to do are started."""
+"""Seconds that processes of a busy computer may take to start."""
 
 _GONE = 60.0
-"""Seconds in which a cluster without any worker may get another."""
+"""Seconds that a cluster without any worker may take to get another."""
 
 _AGAIN = "what is finished is kept: run it again"
 """Advice at the end of errors."""

@@ -21,7 +21,7 @@ from pteron.tables import Table, listed, read_table, write_table
 from pteron.workspace import BEYOND_LIMITS
 
 _STATUS = "status"
-"""Column that says whether a pose is in reach."""
+"""Column that says whether a pose is in reach and within limits."""
 
 _CHECKSUMS = ("pteron.sha256", "pteron.sha256.again")
 """Keys of the checksum in a Parquet file's metadata: two, so that damage to one of them is

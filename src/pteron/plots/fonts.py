@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from pteron.errors import shown
 
 _NO_LETTERS = ("Last Resort", "STIXNonUnicode", "STIXSize", "cm")
-"""Families whose letters are boxes, or signs of mathematics in letters' places."""
+"""Families of fonts that are of no use: their letters are boxes, or signs of mathematics."""
 
 
 def take_fonts(figure: Figure) -> str:

@@ -35,7 +35,7 @@ from pteron.plots.canvas import (
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 _WIDTH = 5.0
-"""Of the figure, inches: texts stay legible on a phone."""
+"""Width of the figure, inches: texts stay legible on a phone."""
 
 _HATCHES = {BEYOND_LIMITS: "....", 1: "////", 2: "\\\\\\\\", 3: "xxxx", 4: "----"}
 """Hatches by the status of a pose: beyond a limit, or out of reach of leg 1, 2, 3 or 4."""

@@ -38,7 +38,7 @@ SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "real time": 1.0, "2 x": 2.0}
 """Speeds of playback by name; 1 is real time."""
 
 STANDARD = "standard pick-and-place cycle"
-"""Name of the motion that is there without a file."""
+"""Name of the standard cycle as people read it."""
 
 _DRAWN = 200
 """Random poses by which the ranges of sliders are chosen."""

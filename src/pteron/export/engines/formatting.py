@@ -19,13 +19,13 @@ _DIGITS = 15
 """Decimals written: beyond them is rounding. m, rad, or components of a unit vector."""
 
 COLORS = ("0.13 0.47 0.71 1", "0.84 0.37 0.05 1", "0.17 0.55 0.24 1", "0.55 0.35 0.64 1")
-"""Colours of the legs, in turn."""
+"""Colours of the legs, in turn: red, green, blue and opacity."""
 
 PLATFORM_COLOR = "0.78 0.66 0.21 1"
-"""Red, green, blue and opacity, here and below."""
+"""Colour of the platform."""
 
 BASE_COLOR = "0.45 0.46 0.48 1"
-"""The base is grey."""
+"""Colour of the base."""
 
 
 def number(value: float) -> str:

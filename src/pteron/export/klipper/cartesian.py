@@ -1,4 +1,4 @@
-"""Klipper's generic_cartesian: machines whose joints are linear in the pose.
+"""Sections of Klipper's generic_cartesian: for machines whose joints are linear in the pose.
 
 The formulas are those of klippy/kinematics/generic_cartesian.py, kinematic_stepper.py and
 klippy/chelper/kin_generic.c.

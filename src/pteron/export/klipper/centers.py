@@ -39,7 +39,7 @@ class Center:
 
     @classmethod
     def of(cls, machine: Machine, leg: int) -> Center | None:
-        """Return that of a leg, None if its platform point is not on a sphere, or P moves else."""
+        """Return the centre for a leg; None if P moves on no sphere while its joint is held."""
         q = ca.SX.sym("q")
         locus, offset = machine.legs[leg].locus(q), machine.platform.offsets[leg]
         if not isinstance(locus, Sphere):

@@ -1,9 +1,9 @@
-"""Klipper's configuration of a machine: generic_cartesian, delta or rotary_delta.
+"""Export of a Klipper configuration: of generic_cartesian, delta or rotary_delta kinematics.
 
-What Klipper computes is in its klippy/kinematics/ (generic_cartesian.py with kinematic_stepper.py,
-delta.py, rotary_delta.py) and klippy/chelper/ (kin_generic.c, kin_delta.c, kin_rotary_delta.c). It
-takes machines that move x, y and z alone: those whose joints are linear in the pose, and Deltas as
-regular as its own few numbers say.
+What Klipper, a printer firmware, computes is in its klippy/kinematics/ (generic_cartesian.py with
+kinematic_stepper.py, delta.py, rotary_delta.py) and klippy/chelper/ (kin_generic.c, kin_delta.c,
+kin_rotary_delta.c). It takes machines that move x, y and z alone: those whose joints are linear in
+the pose, and Deltas as regular as its own few numbers say.
 """
 
 from __future__ import annotations

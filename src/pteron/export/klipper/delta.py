@@ -1,4 +1,4 @@
-"""Klipper's kinematics `delta`, as its delta.py and chelper/kin_delta.c compute it."""
+"""Sections of Klipper's kinematics `delta`, as its delta.py and chelper/kin_delta.c compute it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Klipper's kinematics `rotary_delta`, as its rotary_delta.py and kin_rotary_delta.c compute it."""
+"""Sections of Klipper's kinematics `rotary_delta`, as its rotary_delta.py computes it."""
 
 from __future__ import annotations
 

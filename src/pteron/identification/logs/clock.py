@@ -24,7 +24,8 @@ _EPOCHS: tuple[tuple[float, float, TimeUnit], ...] = (
     (1.1e17, 1.5e17, "100 ns"),
     (2e17, 1e19, "ns"),
 )
-"""Between which numbers a date of our days lies, since 1970 or, in 100 ns, since 1601."""
+"""Least and greatest number that is a date of our days, and its unit: since 1970 or, in 100 ns,
+since 1601."""
 
 _DATES: dict[str, TimeFormat] = {
     r"\d{4}[-./]\d\d?[-./]\d\d?": "YYYY-MM-DD hh:mm:ss",

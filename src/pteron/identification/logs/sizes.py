@@ -31,7 +31,7 @@ _LIKELY = (("ms", 1e2), ("us", 5e4))
 unlikely too."""
 
 _STANDSTILL = 1e-3
-"""Share of its span below which a joint that travels farthest suggests a wrong unit."""
+"""Travel of the joint that moves most, over its span, below which the unit may be wrong."""
 
 _SMALLER = ((1e3, "mm"), (1e6, "um"))
 """Units suggested for lengths that are too large in metres."""

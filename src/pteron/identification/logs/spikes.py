@@ -19,11 +19,12 @@ _USUAL = 20.0
 _SHARE_OF_JOINT, _SHARE_OF_FORCE = 0.01, 0.5
 """Least jump, as a share of a channel's span; friction and stops make forces jump."""
 _FASTER = 3.0
-"""Least jump of a joint, in its differences nearby: a fast move is no jump."""
+"""Least jump of a joint, over its differences nearby: a fast move is no jump."""
 _BACK = 0.25
 """Largest distance from the motion after a spike, as a share of the largest in it."""
 _SUDDEN = 0.5
-"""Share of that distance that the first jump and the last have at least: an edge, not a slope."""
+"""Least first and last jump of a spike, as a share of its largest distance from the motion: an
+edge, not a slope."""
 _REVERSING = 0.05
 """Speed, as a share of a joint's usual one, below which friction may turn."""
 _BEYOND = 0.1

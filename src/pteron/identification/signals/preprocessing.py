@@ -45,7 +45,7 @@ _HARMLESS = 0.2
 """Noise of the accelerations, relative to that of the forces, that adds next to nothing to it."""
 
 _TOLERABLE = 0.5
-"""Likewise, up to which a cut-off above that of least error is worth it."""
+"""The same up to which a cut-off above that of least error is worth it."""
 
 _REPEATS = 0.02
 """Largest residual of a series, as a share of the span, of a motion that is said to repeat."""

@@ -24,7 +24,8 @@ from pteron.shapes import PoseLike, Poses
 from pteron.workspace import home_pose
 
 _REGULAR = 1e-3
-"""Next to a singularity the regressor grows without bound, and with it every error."""
+"""Least measure, 1 at best, of a state's distance from singularities: next to one the regressor
+grows without bound, and with it every error."""
 
 _LOOK = 1000
 """Samples of the measured pose that decide on the assembly mode."""
