@@ -1,4 +1,4 @@
-"""The summary of a map for the command line: JSON data, rows for a pipe, a table for a person."""
+"""The summary of a map of indices over poses: JSON data, rows for a pipe, a table for a person."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditio
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A search: its file, the machine that it begins with, and its variables.
+    """A search: its file, the machine that it begins with, and the variables.
 
     Attributes
     ----------

@@ -1,9 +1,10 @@
-"""A machine's geometry modulo a prime, as it is meant: decimals, and directions of unit length.
+"""A machine's geometry in exact arithmetic modulo a prime: decimals, and directions of length one.
 
 A number of a file is the decimal that it prints as, to a picometre. A direction's components are
-square roots of simple fractions, such as 0.6 or sqrt(3) / 2, whose squares sum to one; other
-directions are not recognised. A root of a product is the product of the primes' roots, so that any
-choice of these is a conjugate of the geometry that is meant: what is zero for one is for all.
+taken for square roots of simple fractions, such as 0.6 or sqrt(3) / 2, whose squares sum to one;
+other directions are not recognised. A root of a product is the product of the primes' roots, so
+that any choice of these is a conjugate of the geometry that is meant: what is zero for one is for
+all.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Maps computed by JAX, on its accelerator if any, by one function compiled for all chunks."""
+"""Maps of performance indices over poses, computed by JAX, on its accelerator if there is one.
+
+One function of the axes' values is compiled for all chunks.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maps as NumPy archives (.npz): arrays of indices and axes, and the grid and machine as JSON."""
+"""Maps of indices over poses as NumPy archives (.npz): arrays, and grid and machine as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maps in files: tables, NumPy archives, Zarr stores, and surfaces for programs that draw them."""
+"""Maps of indices over poses in files: tables, NumPy archives, Zarr stores, surfaces to draw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stores of a map's chunks: memory, or a Zarr store on a disk that all processes reach."""
+"""Stores of the chunks of a map of poses: memory, or a Zarr store on a disk all processes reach."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Surfaces of a map in three axes: of the reach, and of equal values, for files that are drawn.
+"""Surfaces from a map over three coordinates: of the reach, and of equal values of an index.
 
 The triangles are those of marching cubes (T. Lewiner et al., Journal of Graphics Tools 8(2) (2003)
-1-15), between poses in reach and in limits; the reach's surface is where its margin is zero.
+1-15), between poses in reach and in limits; the reach's surface is where its margin is zero. Files
+of them are drawn by other programs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The encoders of films: H.264 in MP4, and GIF."""
+"""Encoders that write films, picture by picture: H.264 in MP4 files, and GIF files."""
 
 from __future__ import annotations
 

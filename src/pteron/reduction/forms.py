@@ -1,4 +1,4 @@
-"""The dynamic model in every form that a claim of speed may mean, each as a kernel.
+"""The dynamic model in several forms, each a kernel, to compare what they cost.
 
 All return the same actuator forces. `regressor` is the paper's Eq. (15) times P as it is written,
 J^-T taken first or last, complete or reduced to the base parameters; `factored` is the inverse

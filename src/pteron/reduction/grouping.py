@@ -1,4 +1,7 @@
-"""A grouping of columns, the result of every method: those kept, and the shares of the others."""
+"""How a regressor's dependent columns join others: the grouping that gives the base parameters.
+
+Every method of `base_parameters` returns one: the columns kept, and the shares of the others.
+"""
 
 from __future__ import annotations
 

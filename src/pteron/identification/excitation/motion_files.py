@@ -1,4 +1,4 @@
-"""The files of an excitation: motions as tables, each with the TOML file that describes its log."""
+"""The files of an exciting motion: tables, each with the TOML file that will describe its log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The limits of a motion along a path as rows linear in s'' and s'^2, but for friction."""
+"""Limits of a motion along a path s: inequalities linear in s'' and s'^2, but for friction."""
 
 from __future__ import annotations
 
