@@ -1,4 +1,4 @@
-"""Search for columns of a log that are exchanged or of flipped sign: fits with them mended."""
+"""Search for columns of a log that are exchanged or of flipped sign: fits with these put right."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The exponential in straight-line arithmetic, the same bits on every float64 target.
+"""The exponential in straight-line arithmetic: the same bits on the targets `vm`, `c` and `numba`.
 
 A call of the C library's `exp` keeps a compiler from turning a loop into vector code, as one of its
 `sin` does (see `sincos`). Here a polynomial gives E(r) = exp(r) - 1 at r = x / 4096, and twelve

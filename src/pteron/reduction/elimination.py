@@ -1,4 +1,4 @@
-"""Dependent columns by Gaussian elimination modulo a prime, and fractions from their residues."""
+"""Dependent columns of a matrix by Gaussian elimination modulo a prime; fractions from residues."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ Shares = dict[int, dict[int, Share]]
 
 @dataclass(frozen=True)
 class Grouping:
-    """Columns kept, in their original order, and the shares of the others on them."""
+    """Columns of a regressor that are kept, in their order, and the others' shares on them."""
 
     kept: tuple[int, ...]
     given: Shares
