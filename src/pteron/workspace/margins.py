@@ -70,8 +70,7 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
     robot = as_manipulator(robot)
     reach, measure, _, _ = numeric(robot, "reach")(pose)
     # A shaft without lengths reaches everywhere.
-    sizes = np.array([leg.size for leg in robot.legs])
-    type_i = np.divide(reach, sizes, out=np.nan_to_num(measure), where=reach < 0.0)
+    type_i = np.divide(reach, _leg_sizes(robot), out=np.nan_to_num(measure), where=reach < 0.0)
     type_ii = np.minimum(type_ii_sizes(robot, pose) / best_type_ii(robot), 1.0)
     low, high = joint_limits(robot)
     half = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
@@ -81,6 +80,11 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
     shares = np.fmin(shares, numeric(robot, "passive_room")(pose)[0])
     least = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
     return PoseMargins(type_i, type_ii, shares, least)
+
+
+@lru_cache(maxsize=64)
+def _leg_sizes(robot: Manipulator) -> Array:
+    return np.array([leg.size for leg in robot.legs])
 
 
 @lru_cache(maxsize=64)
