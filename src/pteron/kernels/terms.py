@@ -29,12 +29,15 @@ class TermGraph:
     def __init__(self) -> None:
         self.nodes: list[Node] = [()]
         self.numbers: dict[Node, int] = {}
+        self._constants: dict[int, float] = {}
 
     def add(self, *node: Any) -> int:
         """Return the number of a node, which is new or there already."""
         number = self.numbers.setdefault(node, len(self.nodes))
         if number == len(self.nodes):
             self.nodes.append(node)
+            if node[0] == "constant" and isfinite(node[1]):
+                self._constants[number] = node[1]
         return number
 
     def constant(self, c: float) -> int:
@@ -43,20 +46,20 @@ class TermGraph:
 
     def constant_of(self, value: int) -> float | None:
         """Return the number that a value is, None where it depends on inputs or is not finite."""
-        kind, *rest = self.nodes[abs(value)]
-        if kind != "constant" or not isfinite(rest[0]):
-            return None
-        return float(rest[0] if value > 0 else -rest[0])
+        c = self._constants.get(abs(value))
+        return c if c is None or value > 0 else -c
 
     def sum(self, values: Iterable[int]) -> int:
         """Return the value of a sum."""
-        constant, counts = 0.0, Counter[int]()
+        constant = 0.0
+        counts: dict[int, int] = {}
         for value in values:
-            c = self.constant_of(value)
+            k, sign = (value, 1) if value > 0 else (-value, -1)
+            c = self._constants.get(k)
             if c is None:
-                counts[abs(value)] += sign_of(value)
+                counts[k] = counts.get(k, 0) + sign
             else:
-                constant += c
+                constant += sign * c
         terms = []
         for k, count in counts.items():
             if count:
@@ -120,7 +123,7 @@ class TermGraph:
         order: dict[int, None] = {}
         stack = [abs(value) for value in roots]
         while stack:
-            waiting = [abs(v) for v in self.operands(stack[-1]) if abs(v) not in order]
+            waiting = [k for v in self.operands(stack[-1]) if (k := abs(v)) not in order]
             if waiting:
                 stack += waiting
             else:
@@ -132,7 +135,8 @@ class TermGraph:
         roots = list(roots)
         uses = Counter(abs(value) for value in roots)
         for k in self.order(roots):
-            uses.update(abs(v) for v in self.operands(k))
+            for v in self.operands(k):
+                uses[abs(v)] += 1
         return uses
 
     def rebuilt(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
