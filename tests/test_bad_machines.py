@@ -379,7 +379,9 @@ def test_rods_too_short_to_meet_are_named_with_what_they_lack(name, change, word
     )
 
 
-def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named():
+def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named(monkeypatch):
+    monkeypatch.setenv("PTERON_KERNELS", "auto")  # millions of poses are drawn
+
     def with_cone(axis, angle):
         first, *others = CATALOG["par4"].legs
         return replace(
@@ -399,7 +401,8 @@ def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named():
     assert pose_margins(narrow, home_pose(narrow)).least > 0.3
 
 
-def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are():
+def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are(monkeypatch):
+    monkeypatch.setenv("PTERON_KERNELS", "auto")  # millions of poses are drawn
     robot = CATALOG["3-rrr"]
     elbows = legs_of("3-rrr", lambda i, leg: replace(leg, elbow_limits=(3.0, 3.1)))
     with pytest.raises(ModelError, match=r"leg 1: elbow at .* rad of 3 to 3\.1, leg 2: elbow at "):

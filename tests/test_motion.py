@@ -8,7 +8,7 @@ import pytest
 from differences import along
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mechanisms import BATCH_SHAPES, CATALOG, MECHANISMS, NEAREST, random_machine, states
+from mechanisms import BATCH_SHAPES, CATALOG, MECHANISMS, NEAREST, gated, random_machine, states
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -36,8 +36,9 @@ MACHINES = {
     "upright five-bar": replace(CATALOG["five-bar"], gravity=(3.0, -9.0, 2.0)),
     "sliding": random_machine(0, "PRSSI"),
 }
-EVERY = pytest.mark.parametrize("name", NAMES)
-FAMILIES = pytest.mark.parametrize("name", MACHINES)
+SOME = ("quadrupteron", "tripteron, no gravity", "delta on a wall", "random PRR 0", "delta-4")
+SOME += ("3-rrr with a tool", "h4 with a tool", "upright five-bar", "sliding")
+FAMILIES = pytest.mark.parametrize("name", gated(MACHINES, SOME))
 LEAST = 0.2
 POINT = ("platform_point", "fixed_offset")
 

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 from differences import along as derivative
-from mechanisms import CATALOG, MECHANISMS, random_machine, states
+from mechanisms import CATALOG, MECHANISMS, NIGHTLY, gated, random_machine, states
 from typer.testing import CliRunner
 
 import pteron
@@ -250,8 +250,24 @@ def test_a_cycles_path_is_that_of_the_cycle(name):
         assert np.linalg.norm(off) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["quadrupteron-oblique +--+", "delta", "3-rrr", "random PRR 0"])
-@pytest.mark.parametrize("drive", [DRIVE, STRIBECK], ids=["viscous", "stribeck"])
+@pytest.mark.parametrize(
+    ("name", "drive"),
+    [
+        ("delta", DRIVE),
+        ("random PRR 0", DRIVE),
+        ("3-rrr", STRIBECK),
+        *(
+            pytest.param(*case, marks=NIGHTLY)
+            for case in (
+                ("quadrupteron-oblique +--+", DRIVE),
+                ("3-rrr", DRIVE),
+                ("quadrupteron-oblique +--+", STRIBECK),
+                ("delta", STRIBECK),
+                ("random PRR 0", STRIBECK),
+            )
+        ),
+    ],
+)
 def test_a_motion_takes_the_shortest_time_within_the_limits(name, drive):
     robot = driven(MACHINES[name], drive)
     path = line_path(robot, around(name), 0.01)
@@ -289,7 +305,9 @@ def test_peaks_are_those_of_the_motion():
     assert found[-2].size == pytest.approx(tool, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", CATALOG)
+@pytest.mark.parametrize(
+    "name", gated(CATALOG, ["quadrupteron", "delta", "delta-4", "five-bar", "3-rpr", "par4"])
+)
 def test_the_fastest_motion_keeps_every_limit_and_is_never_slower(name):
     robot = driven(CATALOG[name]) if sum(map(ord, name)) % 2 else CATALOG[name]
     cycle = pick_and_place(robot, home(name))
@@ -309,7 +327,7 @@ def test_the_fastest_motion_keeps_every_limit_and_is_never_slower(name):
 @pytest.mark.parametrize(("name", "strength"), [("five-bar", 1.2), ("3-rrr", 1.5), ("delta", 1.3)])
 def test_a_force_keeps_its_limit_where_a_joint_reverses_between_samples(name, strength):
     """There dry friction changes its sign: what was against the motion helps it."""
-    robot, pose = CATALOG[name], pteron.workspace.home_pose(CATALOG[name])
+    robot, pose = CATALOG[name], home(name)
     still = np.zeros(robot.freedom)
     held = max(float(np.abs(pteron.inverse_dynamics(robot, pose, still, still)).max()), 1.0)
     robot = driven(robot, pteron.Drive(coulomb=0.3 * held, viscous=0.02 * held))
