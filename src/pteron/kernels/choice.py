@@ -177,6 +177,13 @@ class Adaptive(VirtualMachine):
         self.call = self.tier.code.bound(self.fixed, self.checked)
         return self.call(*values, **fixed)
 
+    def _of_one_state(self, values: Sequence[Any]) -> Any:
+        begin = time.perf_counter()
+        found = super()._of_one_state(values)
+        if found is not None:
+            self.tier.missed(time.perf_counter() - begin)
+        return found
+
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         for start in range(0, batch, self._chunk):
             stop = min(start + self._chunk, batch)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
+from typing import Any
 
 import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.bodies.motion import Expression
 from pteron.kernels.exponential import straight
 from pteron.kernels.graph import Node, expression, function_like, graph_of
-from pteron.kernels.kernel import Array, ArrayKernel
+from pteron.kernels.kernel import Array, ArrayKernel, as_array
 from pteron.kernels.sincos import LIMIT, near
+
+_FLOAT = np.dtype(float)
 
 _BLOCK = 256
 """States in one call of the mapped function. Through a buffer CasADi reads NumPy's memory in
@@ -30,6 +36,32 @@ class VirtualMachine(ArrayKernel):
     def _lowered(self) -> ca.Function:
         return _lowered(straight(self.function))
 
+    @cached_property
+    def _held(self) -> threading.local:
+        return threading.local()
+
+    def checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Evaluate the kernel; plain arrays of one state take less than half the time of others."""
+        found = None if fixed else self._of_one_state(values)
+        return super().checked(*values, **fixed) if found is None else found
+
+    def _of_one_state(self, values: Sequence[Any]) -> Any:
+        """Return the outputs for plain arrays of one state; None where something else is given."""
+        if len(values) != len(self.inputs):
+            return None
+        for value, port in zip(values, self.inputs, strict=True):
+            plain = type(value) is np.ndarray and value.dtype == _FLOAT
+            if not plain or value.shape != port.shape:
+                return None
+        held: _OneState | None = getattr(self._held, "state", None)
+        if held is None:
+            held = self._held.state = _OneState(self)
+        for mine, value in zip(held.inputs, values, strict=True):
+            mine[...] = value
+        held.evaluate()
+        found = tuple([output.copy() for output in held.outputs])
+        return found[0] if len(found) == 1 else found
+
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         shared = tuple(i for i, port in enumerate(self.ports) if port.shared)
         function = self._lowered
@@ -38,6 +70,25 @@ class VirtualMachine(ArrayKernel):
             _sweep(_mapped(function, shared), inputs, outputs, range(0, whole, _BLOCK), _BLOCK)
         if whole < batch:
             _sweep(function, inputs, outputs, range(whole, batch), 1)
+
+
+class _OneState:
+    """A thread's memory for one state, which CasADi reads and fills in place."""
+
+    def __init__(self, kernel: VirtualMachine) -> None:
+        self._buffer, self.evaluate = kernel._lowered.buffer()
+        self.inputs: list[Array] = []
+        self._fixed: list[Array] = []
+        for i, port in enumerate(kernel.ports):
+            fixed = kernel.fixed.get(port.name)
+            array = np.zeros(port.shape)
+            if fixed is not None:
+                array[...] = as_array(fixed, port.name, port.shape)
+            (self.inputs if fixed is None else self._fixed).append(array)
+            self._buffer.set_arg(i, array.reshape(-1).data)
+        self.outputs = [np.zeros(port.shape) for port in kernel.outputs]
+        for i, array in enumerate(self.outputs):
+            self._buffer.set_res(i, array.reshape(-1).data)
 
 
 @lru_cache(maxsize=256)
