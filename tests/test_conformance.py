@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import casadi as ca
 import pytest
+import tilting
 from mechanisms import CATALOG, GATE, MACHINES, states
 
 from pteron.closures import conformance as of_closures
@@ -20,6 +21,12 @@ _LEGS = {
     for name, robot in CATALOG.items()
     for i, leg in enumerate(robot.legs, start=1)
 }
+_TILTED = [
+    leg
+    for motion in ("3T3R", "1T2R")
+    for seed in range(3)
+    for leg in tilting.machine(motion, tilting.LEGS[motion], seed)[0].legs
+]
 
 
 def legs_of(kind: str) -> list[str]:
@@ -30,9 +37,12 @@ def legs_of(kind: str) -> list[str]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_leg_conforms(kind):
     names = legs_of(kind)
-    assert names
+    tilted = [leg for leg in _TILTED if leg.type == kind]
+    assert names or tilted
     for seed, name in enumerate(names):
         assert faults(*_LEGS[name], seed=seed) == (), name
+    for seed, leg in enumerate(tilted):
+        assert faults(leg, seed=seed, tilts=True) == ()
 
 
 class Late(PRREquations):

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import tilting
 from mechanisms import CATALOG, GATE, MACHINES, NIGHTLY, random_machine
 from test_family import KINDS as MIXTURES
 
@@ -14,6 +15,8 @@ from pteron.legs import KINDS as LEGS
 from pteron.platforms import equations_class
 
 CHOSEN = [MACHINES[name] for name in GATE]
+TILTED = [tilting.machine(*case, 3)[0] for case in tilting.LEGS.items()]  # those of test_tilting
+CHOSEN += TILTED
 
 
 def served(robots):
@@ -23,6 +26,7 @@ def served(robots):
 
 def test_every_closure_is_there_under_each_platform_that_it_serves():
     every = [*CATALOG.values(), *MACHINES.values(), *(random_machine(0, k) for k in MIXTURES)]
+    every += TILTED
     assert served(CHOSEN) == served(every)
     assert {closure for closure, _ in served(CHOSEN)} == set(CLOSURES)
 

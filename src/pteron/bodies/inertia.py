@@ -1,10 +1,13 @@
-"""The inertia of a body about its reference point: of a slider, of a rod, of a body in a plane."""
+"""The inertia of a body about its reference point: slider, rod, body in a plane or in space."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pteron.bodies.vectors import number, numbers, positive
 from pteron.errors import ModelError
@@ -38,7 +41,7 @@ class Inertia(Protocol):
 def with_center(inertia: Inertia) -> dict[str, float]:
     """Return a body's values by kind, its centre of mass (m) in place of the first moments."""
     values = dict(zip(inertia.kinds, inertia.values, strict=True))
-    return values | {k: values[k] / values["m"] for k in ("mgx", "mgy") if k in values}
+    return values | {k: values[k] / values["m"] for k in ("mgx", "mgy", "mgz") if k in values}
 
 
 @dataclass(frozen=True)
@@ -168,3 +171,97 @@ class PlanarInertia(_TurningInertia):
     """
 
     kinds: ClassVar = ("m", "mgx", "mgy", "I")
+
+
+@dataclass(frozen=True)
+class SpatialInertia:
+    """The inertia of a body that turns about any axis, about its reference point, in its own frame.
+
+    Parameters
+    ----------
+    mass : float
+        Mass m, kg.
+    first_moment : tuple of float
+        (m gamma_x, m gamma_y, m gamma_z), kg m: mass times the position of the centre of mass.
+    inertia : tuple of float
+        (Ixx, Ixy, Ixz, Iyy, Iyz, Izz), entries of the inertia tensor **about the reference point**,
+        kg m^2; Ixy is minus the integral of x y dm.
+
+    Raises
+    ------
+    ModelError
+        If no real body has this inertia: about the centre of mass no moment of inertia may be
+        greater than the sum of the other two, nor below zero.
+
+    Examples
+    --------
+    >>> body = SpatialInertia.of_body(2.0, (0.0, 0.0, 0.1), (0.05, 0.0, 0.0, 0.05, 0.0, 0.04))
+    >>> body.first_moment
+    (0.0, 0.0, 0.2)
+    """
+
+    mass: float
+    first_moment: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float]
+
+    kinds: ClassVar = ("m", "mgx", "mgy", "mgz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", positive(self.mass, "mass", "kg"))
+        for name, count in (("first_moment", 3), ("inertia", 6)):
+            object.__setattr__(self, name, numbers(getattr(self, name), name, count))
+        whole = self.tensor
+        # Of second moments of mass about the reference point no less is real than of a point mass.
+        h = np.array(self.first_moment)
+        second = 0.5 * np.trace(whole) * np.eye(3) - whole - np.outer(h, h) / self.mass
+        size = max(float(np.abs(whole).max()), float(h @ h) / self.mass)
+        if np.linalg.eigvalsh(second).min() < -_ROUNDING * size or not np.trace(whole) > 0.0:
+            c = h / self.mass
+            least = self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+            own = [f"{v:.4g}" for v in np.linalg.eigvalsh(whole - least)]
+            raise ModelError(
+                f"inertia: {list(self.inertia)} kg m^2 belongs to no real body; with this mass and "
+                f"centre of mass its principal moments about that centre are {', '.join(own)} "
+                "kg m^2, of which none may be below 0 nor above the sum of the other two; is it "
+                "about the centre of mass? It must be about the reference point, as [Ixx, Ixy, "
+                "Ixz, Iyy, Iyz, Izz]"
+            )
+
+    @property
+    def tensor(self) -> NDArray[np.float64]:
+        """The inertia tensor about the reference point, (3, 3), kg m^2."""
+        xx, xy, xz, yy, yz, zz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    @classmethod
+    def of_body(
+        cls, mass: float, center_of_mass: Sequence[float], inertia: Sequence[float]
+    ) -> SpatialInertia:
+        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
+        mass = positive(mass, "mass", "kg")
+        x, y, z = numbers(center_of_mass, "center_of_mass", 3)
+        xx, xy, xz, yy, yz, zz = numbers(inertia, "inertia", 6)
+        return cls(mass, (mass * x, mass * y, mass * z), (xx, xy, xz, yy, yz, zz))
+
+    @classmethod
+    def of_values(cls, values: Sequence[float]) -> SpatialInertia:
+        """Build it from its ten parameters, in the order of its kinds."""
+        m, x, y, z, xx, xy, xz, yy, yz, zz = values
+        return cls(m, (x, y, z), (xx, xy, xz, yy, yz, zz))
+
+    @property
+    def center_of_mass(self) -> tuple[float, ...]:
+        """Position of the centre of mass in the body's frame, m."""
+        return tuple(h / self.mass for h in self.first_moment)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The ten parameters, in the order of its kinds."""
+        return (self.mass, *self.first_moment, *self.inertia)
+
+    def turned(self, rotation: NDArray[np.float64]) -> SpatialInertia:
+        """Return the same of a frame that is turned: a vector v of this one is R v in that."""
+        tensor = rotation @ self.tensor @ rotation.T
+        x, y, z = (rotation @ self.first_moment).tolist()
+        xx, xy, xz, yy, yz, zz = tensor[np.triu_indices(3)].tolist()
+        return SpatialInertia(self.mass, (x, y, z), (xx, xy, xz, yy, yz, zz))

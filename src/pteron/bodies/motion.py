@@ -27,6 +27,15 @@ def point_rows(rows: Expression) -> Expression:
     return ca.horzcat(rows, ca.SX(rows.shape[0], 3))
 
 
+class HeldPlane(NamedTuple):
+    """A plane of the base in which a leg keeps its platform point: normal . (c - point) = 0."""
+
+    normal: Expression
+    """Unit vector, (3, 1)."""
+    point: Expression
+    """(3, 1)."""
+
+
 class Turn(NamedTuple):
     """A turn about an axis that is fixed in the base frame, to second order."""
 
@@ -53,6 +62,11 @@ class RotationMotion(NamedTuple):
     """phi, of a platform with one axis."""
     hinge: Expression | None = None
     """The point about which it turns against a leg, (3, 1); None: the platform point."""
+
+    @property
+    def tilts(self) -> bool:
+        """Whether the platform turns about more axes than one."""
+        return len(self.turns) > 1
 
     def center(self, point: PointMotion) -> Expression:
         """Return the point about which the platform turns against the leg at a platform point."""

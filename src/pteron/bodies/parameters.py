@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-LENGTH_POWERS = {"m": 0, "mgx": 1, "mgy": 1, "I": 2}
+LENGTH_POWERS = {
+    **dict.fromkeys(("m",), 0),
+    **dict.fromkeys(("mgx", "mgy", "mgz"), 1),
+    **dict.fromkeys(("I", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"), 2),
+}
 """The kinds of inertial parameters, and the power of length in their unit: kg, kg m, kg m^2."""
 
 LEG_BODIES = ("p", "u", "l")
@@ -19,6 +23,7 @@ PLATFORM_KINDS = ("m", "mgx", "mgy", "I")
 PREFERENCE = (
     *(("m", "p"), ("mgx", "u"), ("mgy", "u"), ("I", "u"), ("mgx", "l"), ("mgy", "l"), ("m", "e")),
     *(("m", "l"), ("mgx", "e"), ("mgy", "e"), ("I", "e"), ("I", "l"), ("m", "u")),
+    *((kind, "e") for kind in ("mgz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
 )
 """Kinds and bodies of parameters, those that base parameters keep first in front, as Table 1."""
 
@@ -39,7 +44,8 @@ class Parameter:
     Parameters
     ----------
     kind : str
-        ``"m"`` (mass), ``"mgx"``, ``"mgy"`` (first moments m gamma_x and m gamma_y) or ``"I"``.
+        ``"m"`` (mass), ``"mgx"``, ``"mgy"`` (first moments m gamma_x and m gamma_y) or ``"I"``;
+        of a platform that tilts also ``"mgz"``, and ``"Ixx"`` .. ``"Izz"`` in place of ``"I"``.
     body : str
         ``"p"`` (slider), ``"u"`` (upper link or crank), ``"l"`` (lower link or rod), ``"e"``
         (platform).

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from pteron.bodies.inertia import PlanarInertia, RodInertia
+from pteron.bodies.inertia import PlanarInertia, RodInertia, SpatialInertia
 from pteron.errors import ModelError, shown
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
@@ -27,6 +27,7 @@ def _only_x(given: Any) -> Any:
 One = Annotated[tuple[Number], BeforeValidator(_only_x)]
 Two = tuple[Number, Number]
 Three = tuple[Number, Number, Number]
+Six = tuple[Number, Number, Number, Number, Number, Number]
 
 
 class Table(BaseModel):
@@ -59,15 +60,16 @@ class _Body(Table):
     mass: Number = Field(description="kg")
     center_of_mass: Any = None
     first_moment: Any = None
-    inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
+    inertia: Any = Field(description="about the origin, not the centre of mass, kg m^2")
 
-    kind: ClassVar[type[PlanarInertia] | type[RodInertia]]
+    kind: ClassVar[type[PlanarInertia] | type[RodInertia] | type[SpatialInertia]]
 
     @property
     def unit(self) -> Any:
         """A body that stands for one that cannot be."""
         kinds = self.kind.kinds
-        return self.kind.of_values([float(kind in ("m", "I")) for kind in kinds])
+        ones = ("m", "I", "Ixx", "Iyy", "Izz")
+        return self.kind.of_values([float(kind in ones) for kind in kinds])
 
     def inertia_of(self, key: str) -> Any:
         """Build the inertia; `key` goes before what an error names."""
@@ -92,6 +94,7 @@ class PlanarBody(_Body):
     """`{ mass, inertia, center_of_mass or first_moment }` of a body in a plane."""
 
     kind = PlanarInertia
+    inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
     center_of_mass: Two | None = Field(None, description=f"[x, y] {_CENTER}")
     first_moment: Two | None = Field(None, description=_MOMENT)
 
@@ -100,5 +103,18 @@ class RodBody(_Body):
     """The same of a rod, whose vectors have one component."""
 
     kind = RodInertia
+    inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
     center_of_mass: One | None = Field(None, description=f"[x] {_CENTER}")
     first_moment: One | None = Field(None, description=_MOMENT)
+
+
+class SpatialBody(_Body):
+    """The same of a body that turns about any axis."""
+
+    kind = SpatialInertia
+    inertia: Six = Field(
+        description="[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] of the tensor about the origin, not the centre "
+        "of mass, kg m^2; Ixy is minus the integral of x y dm"
+    )
+    center_of_mass: Three | None = Field(None, description=f"[x, y, z] {_CENTER}")
+    first_moment: Three | None = Field(None, description=_MOMENT)

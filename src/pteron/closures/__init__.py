@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from pteron.closures.closure import Closure
 from pteron.closures.constant_rows import ConstantRows
 from pteron.closures.three_loci import ThreeLoci
+from pteron.closures.tilting_loci import TiltingLoci
 from pteron.closures.turning_loci import TurningLoci
 from pteron.closures.two_loci import TwoLoci
 from pteron.legs.leg import LegEquations
 from pteron.platforms import PlatformEquations
 
-KINDS: tuple[type[Closure], ...] = (ConstantRows, ThreeLoci, TwoLoci, TurningLoci)
+KINDS: tuple[type[Closure], ...] = (ConstantRows, ThreeLoci, TwoLoci, TurningLoci, TiltingLoci)
 """The kinds of closures; the first that fits a machine's legs and platform serves it."""
 
 

@@ -17,7 +17,7 @@ from operator import mul
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.determinants import adjugate, determinant, solved_across
+from pteron.closures.determinants import determinant, solved, solved_across
 from pteron.legs.leg import LegEquations, LegMotion, Plane, Turned
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
@@ -44,7 +44,7 @@ class Closure(ABC):
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return F (n, K) with J^T F = wrench (m, K).
+        """Return F (n, K) with J^T F = wrench (m, K), along the platform's quasi-velocities.
 
         With J = B^-1 A, B being the divisors: F = B A^-T wrench.
         """
@@ -56,10 +56,9 @@ class Closure(ABC):
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
         """Return x (m, K) with J x = joints (n, K)."""
-        rows = plain_rows(platform, legs)
-        across = adjugate(rows)
         right = ca.vertcat(*(leg.divisor * joints[i, :] for i, leg in enumerate(legs)))
-        return ca.mtimes(across, right) / ca.mtimes(rows[0, :], across[:, 0])
+        quasi, volume = solved(plain_rows(platform, legs), right)
+        return platform.pose_rates(quasi / volume)
 
     @abstractmethod
     def poses(self, joints: Expression) -> Expression:
@@ -79,10 +78,16 @@ class Closure(ABC):
         """
         if any(leg.row.is_zero() for leg in legs):
             return ca.SX(0)  # a leg that moves nothing
-        return self.measure_of(plain_rows(platform, legs), [leg.wrench_size for leg in legs])
+        sizes = [leg.wrench_size for leg in legs]
+        return self.measure_of(platform, [leg.row for leg in legs], sizes)
 
-    def measure_of(self, rows: Expression, sizes: Sequence[Expression] | None = None) -> Expression:
-        """Return the type-II measure of the rows of A (n, m).
+    def measure_of(
+        self,
+        platform: PlatformMotion,
+        rows: Sequence[Expression],
+        sizes: Sequence[Expression] | None = None,
+    ) -> Expression:
+        """Return the type-II measure of the legs' rows (1, 6) against (c', omega).
 
         `sizes` are those of the legs' forces in space, or of their moments. Without them the rows
         are those of the legs' loci: unit forces on spheres and circles, unit moments, and the
@@ -98,7 +103,7 @@ class Closure(ABC):
             if self._in_line:  # no force has a moment
                 return ca.SX(0)
             greatest = greatest * self._lever
-        return determinant(rows) / (greatest * reduce(mul, sizes))
+        return determinant(against(platform, rows)) / (greatest * reduce(mul, sizes))
 
     @property
     def _lever(self) -> Expression:
@@ -138,6 +143,10 @@ def nan_below_zero(value: Expression) -> Expression:
 
 
 def plain_rows(platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-    """Return A (n, m), J's rows times their divisors."""
-    pairs = zip(legs, platform.matrices, strict=True)
-    return ca.vertcat(*(ca.mtimes(leg.row, matrix) for leg, matrix in pairs))
+    """Return A (n, m): J's rows, against the platform's quasi-velocities, times their divisors."""
+    return against(platform, [leg.row for leg in legs])
+
+
+def against(platform: PlatformMotion, rows: Sequence[Expression]) -> Expression:
+    """Return rows (n, m) against the quasi-velocities from the legs' (1, 6) against (c', omega)."""
+    return ca.vertcat(*(ca.mtimes(*pair) for pair in zip(rows, platform.matrices, strict=True)))

@@ -76,14 +76,19 @@ class ConstantRows(Closure):
     def modes(self) -> int:
         return 2 if self.turns else 1
 
-    def measure_of(self, rows: Expression, sizes: Sequence[Expression] | None = None) -> Expression:
+    def measure_of(
+        self,
+        platform: PlatformMotion,
+        rows: Sequence[Expression],
+        sizes: Sequence[Expression] | None = None,
+    ) -> Expression:
         """Return the measure, of N . j's sign, by which the columns of `poses` are told apart.
 
         Of a machine that is singular everywhere only rounding would be left: it is 0.
         """
         if self.rows.is_constant() and self.vanishes():
             return ca.SX(0)
-        return (-1 if self.turns else 1) * super().measure_of(rows, sizes)
+        return (-1 if self.turns else 1) * super().measure_of(platform, rows, sizes)
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]

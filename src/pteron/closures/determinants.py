@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import casadi as ca
@@ -10,12 +11,26 @@ from pteron.bodies.motion import Expression
 
 
 def determinant(m: Expression) -> Expression:
-    """Return the determinant of a matrix (2, 2) to (4, 4)."""
+    """Return the determinant of a matrix (2, 2) to (4, 4), or (6, 6)."""
+    if m.shape[0] == 6:
+        upper, lower = (_triples(ca.horzsplit(half)) for half in (m[:3, :], m[3:, :]))
+        return sum(
+            _sign((*three, *_others(three))) * volume * lower[_others(three)]
+            for three, volume in upper.items()
+        )
     return ca.mtimes(m[0, :], adjugate(m)[:, 0])
 
 
+def solved(m: Expression, right: Expression) -> tuple[Expression, Expression]:
+    """Return x (n, K) and d with m x = d right, d = det m."""
+    across = adjugate(m)
+    return ca.mtimes(across, right), ca.mtimes(m[0, :], across[:, 0])
+
+
 def adjugate(m: Expression) -> Expression:
-    """Return the adjugate of a matrix (2, 2) to (4, 4): its product with the matrix is det 1."""
+    """Return the adjugate of a matrix (2, 2) to (4, 4), or (6, 6): times the matrix it is det 1."""
+    if m.shape[0] == 6:
+        return _adjugate_of_six(m)
     if m.shape[0] == 2:
         return ca.vertcat(ca.horzcat(m[1, 1], -m[0, 1]), ca.horzcat(-m[1, 0], m[0, 0]))
     if m.shape[0] == 3:
@@ -28,7 +43,9 @@ def adjugate(m: Expression) -> Expression:
 
 
 def solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (n, K) and d with A^T x = d w, d = det A, for A's rows, n = 2 to 4, and w (n, K)."""
+    """Return x (n, K) and d with A^T x = d w, d = det A; for A's rows, n = 2 to 4 or 6."""
+    if rows.shape[0] == 6 and right.shape[1] == 1:
+        return _six_solved_across(rows, right)
     if right.shape[1] > 1 or rows.shape[0] == 2:
         across = adjugate(rows)
         return ca.mtimes(across.T, right), ca.mtimes(rows[0, :], across[:, 0])
@@ -68,3 +85,65 @@ def _cofactors(m: Expression, row: int, minors: dict[tuple[int, int], Expression
         minor = other[i] * minors[j, k] - other[j] * minors[i, k] + other[k] * minors[i, j]
         found.append((-1) ** (row + column) * minor)
     return ca.vertcat(*found)
+
+
+# Six rows: Laplace's expansion by three rows and three, whose minors are triple products.
+
+_Three = tuple[int, ...]
+
+
+def _triples(columns: Sequence[Expression]) -> dict[_Three, Expression]:
+    """Return the triple products of three-vectors, by their places in order."""
+    crosses = _crosses(columns)
+    return {
+        (i, j, k): ca.dot(crosses[i, j], columns[k])
+        for i, j, k in combinations(range(len(columns)), 3)
+    }
+
+
+def _crosses(columns: Sequence[Expression]) -> dict[tuple[int, int], Expression]:
+    pairs = combinations(range(len(columns)), 2)
+    return {(i, j): ca.cross(columns[i], columns[j]) for i, j in pairs}
+
+
+def _others(three: _Three) -> _Three:
+    return tuple(i for i in range(6) if i not in three)
+
+
+def _sign(order: Sequence[int]) -> int:
+    """Return the sign of a permutation."""
+    return (-1) ** sum(a > b for a, b in combinations(order, 2))
+
+
+def _adjugate_of_six(m: Expression) -> Expression:
+    """Return the adjugate: row c is the gradient of det m by column c."""
+    halves = [ca.horzsplit(half) for half in (m[:3, :], m[3:, :])]
+    crosses, triples = [_crosses(half) for half in halves], [_triples(half) for half in halves]
+    rows = []
+    for c in range(6):
+        slopes = [ca.SX(3, 1), ca.SX(3, 1)]
+        for i, j in combinations([k for k in range(6) if k != c], 2):
+            rest = _others((i, j, c))
+            for half, order in enumerate([(i, j, c, *rest), (*rest, i, j, c)]):
+                slopes[half] += _sign(order) * crosses[half][i, j] * triples[1 - half][rest]
+        rows.append(ca.vertcat(*slopes).T)
+    return ca.vertcat(*rows)
+
+
+def _six_solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
+    """Return x and d with A^T x = d w by Cramer's rule, with each minor computed once."""
+    vectors = ca.horzcat(rows.T, right)
+    upper, lower = (_triples(ca.horzsplit(half)) for half in (vectors[:3, :], vectors[3:, :]))
+
+    def volume(left_out: int) -> Expression:
+        """Return the determinant of six of the vectors, in order."""
+        kept = [k for k in range(7) if k != left_out]
+        total = ca.SX(0)
+        for three in combinations(range(6), 3):
+            other = _others(three)
+            a, b = (tuple(kept[k] for k in part) for part in (three, other))
+            total += _sign((*three, *other)) * upper[a] * lower[b]
+        return total
+
+    # With w in place of row i, put last: its sign is that of the way there.
+    return ca.vertcat(*((-1) ** (5 - i) * volume(i) for i in range(6))), volume(6)

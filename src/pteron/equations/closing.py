@@ -11,11 +11,12 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression, point_rows
-from pteron.closures.closure import nan_below_zero, plain_rows
-from pteron.closures.determinants import adjugate, determinant
+from pteron.closures.closure import against, nan_below_zero, plain_rows
+from pteron.closures.determinants import determinant, solved
 from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
-from pteron.legs.leg import Circle, Plane, Sphere, Turned
+from pteron.legs.leg import Circle, LegEquations, Plane, Sphere, Turned
+from pteron.platforms.motion import PlatformMotion
 
 _STEPS = 4
 """Newton's steps that a controller takes: they reach rounding from some hundredths of the size."""
@@ -65,7 +66,7 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
         if isinstance(locus, Sphere | Circle):
             origin, size = ca.mtimes(directions.T, locus.center - offset.still), locus.radius
     found = []
-    for locus, (a, b, still) in zip(loci, offsets, strict=True):
+    for leg, locus, (a, b, still) in zip(machine.legs, loci, offsets, strict=True):
         s = ca.mtimes(directions, origin) + still  # c = s + size v + a f_1 + b f_2
         w, m, h = ca.SX(1, 3), ca.SX(directions.shape[1], 3), ca.SX(1, 3)
         scale = ca.SX(1)
@@ -77,7 +78,7 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
             h[0] -= locus.offset
             scale = ca.norm_2(m[:, 0])
         else:
-            apart = _counted(machine, locus, s - locus.center)
+            apart = _counted(machine, leg, locus, s - locus.center)
             w[0] = size**2
             m = 2 * size * ca.mtimes(directions.T, ca.horzcat(apart, a, b))
             h = ca.mtimes(apart.T, ca.horzcat(apart, 2 * a, 2 * b))
@@ -89,10 +90,14 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
     return Rows(zeroth, first, second, origin, size)
 
 
-def _counted(machine: Machine, locus: Sphere | Circle, v: Expression) -> Expression:
+def _counted(
+    machine: Machine, leg: LegEquations, locus: Sphere | Circle, v: Expression
+) -> Expression:
     """Return what of a vector from a locus' center counts: for a circle its part in the plane."""
     if isinstance(locus, Sphere):
         return v
+    if leg.holds is not None:
+        return v - ca.mtimes(leg.holds.normal, ca.dot(leg.holds.normal, v))
     directions = machine.platform.directions
     return ca.mtimes(directions, ca.mtimes(directions.T, v))
 
@@ -103,17 +108,20 @@ class Misses(NamedTuple):
     lengths: Expression
     """(n, 1): m, or rad."""
     rows: Expression
-    """(n, m): their derivatives with respect to the pose."""
+    """(n, m): their derivatives along the platform's quasi-velocities."""
     relative: Expression
     """The largest, as a share of the terms that they are the differences of, of all legs."""
     arms: list[Expression | None]
     """Vectors from the centers of spheres and circles to the platform points, (3, 1) each."""
+    platform: PlatformMotion
+    own_rows: list[Expression]
+    """(1, 6) each: the legs' part of `rows`, against (c', omega)."""
 
     @property
     def step(self) -> tuple[Expression, Expression]:
         """Newton's step (m, 1) times the determinant of the rows, and the determinant."""
-        across = adjugate(self.rows)
-        return -ca.mtimes(across, self.lengths), ca.mtimes(self.rows[0, :], across[:, 0])
+        step, determinant = solved(self.rows, -self.lengths)
+        return self.platform.pose_rates(step), determinant
 
 
 def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
@@ -122,9 +130,7 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
     platform = machine.platform.motion(pose, rest, rest)
     lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(_NOTHING)]
     arms: list[Expression | None] = []
-    for leg, q, point, matrix in zip(
-        machine.legs, ca.vertsplit(joints), platform.points, platform.matrices, strict=True
-    ):
+    for leg, q, point in zip(machine.legs, ca.vertsplit(joints), platform.points, strict=True):
         locus, c = leg.locus(q), point.position
         arms.append(None)
         if isinstance(locus, Turned):
@@ -135,13 +141,13 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
             length, row = ca.dot(locus.normal, c) - locus.offset, point_rows(locus.normal.T)
             sizes.append(locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c)))
         else:
-            b = _counted(machine, locus, c - locus.center)
+            b = _counted(machine, leg, locus, c - locus.center)
             length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)
             row = point_rows(b.T / locus.radius)
             sizes.append(locus.radius + ca.norm_1(c) + ca.norm_1(locus.center))
             arms[-1] = b
         lengths.append(length)
-        rows.append(ca.mtimes(row, matrix))
+        rows.append(row)
     # The terms of all legs are the measure: those of a plane through the origin may all be zero.
     missed = [
         ca.fabs(length)
@@ -150,7 +156,8 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
     ]
     share = ca.mmax(ca.vertcat(*missed)) / ca.sum1(ca.vertcat(*sizes))
     largest = ca.mmax(ca.vertcat(share, *angles))
-    return Misses(ca.vertcat(*lengths), ca.vertcat(*rows), largest, arms)
+    whole = against(platform, rows)
+    return Misses(ca.vertcat(*lengths), whole, largest, arms, platform, rows)
 
 
 def newton_step(
@@ -184,7 +191,7 @@ def followed_step(machine: Machine, joints: Expression, pose: Expression, least:
         before, pose = divisor, pose + step / divisor
         missed = misses(machine, joints, pose)
         step, divisor = missed.step
-    measure = machine.closure.measure_of(missed.rows)
+    measure = machine.closure.measure_of(missed.platform, missed.own_rows)
     lost = nan_below_zero(_CLOSED - missed.relative)
     lost += nan_below_zero(_STEADY - ca.fabs(divisor / before - 1))
     # The last step's divisor vanishes where the measure is too small.

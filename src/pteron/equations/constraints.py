@@ -64,6 +64,8 @@ def constraint_measure(machine: Machine, state: State) -> Expression:
     It is the volume that the couples span, each of length 1 or less, over the largest: det R of as
     many couples as turns, with its sign, else the root of det R^T R.
     """
+    if machine.robot.platform.tilts:
+        return machine.platform.constraint(state.platform)
     rows = constraint_rows(machine, state)
     if rows is None:
         return ca.SX.nan()

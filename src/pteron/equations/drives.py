@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pteron.bodies.motion import Expression
 from pteron.equations.kinematics import jacobian
-from pteron.equations.lagrangian import mass_matrix, solve_positive_definite
+from pteron.equations.lagrangian import applied, mass_matrix, solve_positive_definite
 from pteron.equations.machine import Machine, State
 from pteron.equations.virtual_work import generalized_forces
 from pteron.legs import Drive, Stribeck
@@ -115,7 +115,7 @@ def drive_accelerations(
     state = machine.state(pose, velocity)
     rows = jacobian(state)
     own = drive_forces(drives, *joint_motion(state), smooth=True)
-    load = ca.mtimes(rows.T, forces - own) + wrench
+    load = ca.mtimes(rows.T, forces - own) + applied(machine, state, wrench)
     load -= generalized_forces(machine, state, parameters)
     mass = mass_matrix(machine, pose, parameters)
     mass += ca.mtimes(rows.T, ca.mtimes(ca.diag(drives.inertia), rows))

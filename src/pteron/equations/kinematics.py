@@ -108,7 +108,8 @@ def direct_position(machine: Machine, joints: Expression, *, reached: bool = Tru
 def jacobian(state: State) -> Expression:
     """Return J (n, m), Eq. (10): the legs' rows times their points' matrices."""
     pairs = zip(state.legs, state.platform.matrices, strict=True)
-    return ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, matrix) for leg, matrix in pairs))
+    rows = ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, matrix) for leg, matrix in pairs))
+    return state.platform.pose_rows(rows)
 
 
 def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
@@ -116,7 +117,8 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
     body = state.legs[i].bodies.get(letter)
     if body is None:
         return None
-    return ca.mtimes(ca.vertcat(body.velocity_row, body.turning_row), state.platform.matrices[i])
+    rows = ca.vertcat(body.velocity_row, body.turning_row)
+    return state.platform.pose_rows(ca.mtimes(rows, state.platform.matrices[i]))
 
 
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:

@@ -11,7 +11,7 @@ import casadi as ca
 from pteron.bodies import motion
 from pteron.bodies.motion import Expression
 from pteron.equations.kinematics import jacobian
-from pteron.equations.machine import Machine
+from pteron.equations.machine import Machine, State
 from pteron.equations.virtual_work import generalized_forces
 
 
@@ -32,7 +32,7 @@ def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> E
     for leg, bodies, matrix in zip(state.legs, legs, platform.matrices, strict=True):
         at_c = sum(motion.mass_matrix(body, bodies[k]) for k, body in leg.bodies.items())
         total = total + ca.mtimes(matrix.T, ca.mtimes(at_c, matrix))
-    return total
+    return platform.pose_rows(platform.pose_forces(total))
 
 
 def coriolis_matrix(
@@ -75,8 +75,13 @@ def forward_dynamics(
     """Return x'' with M x'' = J^T F + wrench - h."""
     state = machine.state(pose, velocity)
     bias = generalized_forces(machine, state, parameters)
-    load = ca.mtimes(jacobian(state).T, forces) + wrench - bias
+    load = ca.mtimes(jacobian(state).T, forces) + applied(machine, state, wrench) - bias
     return solve_positive_definite(mass_matrix(machine, pose, parameters), load)
+
+
+def applied(machine: Machine, state: State, wrench: Expression) -> Expression:
+    """Return the forces (m, 1) along the pose of a wrench that acts on the platform."""
+    return state.platform.pose_forces(machine.platform.applied(state.platform, wrench))
 
 
 def solve_positive_definite(matrix: Expression, right: Expression) -> Expression:

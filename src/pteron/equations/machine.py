@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import casadi as ca
 
@@ -40,6 +41,11 @@ class Machine:
         """Number of pose coordinates m."""
         return len(self.platform.coordinates)
 
+    @property
+    def wrench_size(self) -> int:
+        """Number of components of a wrench on the platform."""
+        return len(self.platform.wrench_columns) or self.freedom
+
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """The inertial parameters in the paper's order."""
@@ -54,14 +60,15 @@ class Machine:
             [ca.SX(list(getattr(leg, name))) for leg in robot.legs]
             for name in ("platform_point", "fixed_offset")
         )
-        return cls._made(robot, legs, frame, points, fixed, ca.SX(list(robot.gravity)))
+        more = {name: ca.SX(list(v)) for name, v in robot.platform.quantities.items()}
+        return cls._made(robot, legs, frame, points, fixed, more, ca.SX(list(robot.gravity)))
 
     @classmethod
     def symbols(cls, robot: Manipulator) -> tuple[Machine, Expression]:
         """Return the machines of a robot's topology in symbols, and the symbols as one vector.
 
         The vector holds the quantities of each leg, its platform point and fixed offset; then x0,
-        y0, k and gravity: the order of `numbers`.
+        y0, k, the platform's quantities and gravity: the order of `numbers`.
         """
         legs, points, fixed, vectors = [], [], [], []
         for i, leg in enumerate(robot.legs, start=1):
@@ -71,9 +78,10 @@ class Machine:
             legs.append(leg.equations(parts))
             vectors += [*parts.values(), points[-1], fixed[-1]]
         frame = [ca.SX.sym(name, 3) for name in ("x0", "y0", "k")]
+        more = {n: ca.SX.sym(n, len(v)) for n, v in robot.platform.quantities.items()}
         gravity = ca.SX.sym("gravity", 3)
-        machine = cls._made(robot, tuple(legs), frame, points, fixed, gravity)
-        return machine, ca.vertcat(*vectors, *frame, gravity)
+        machine = cls._made(robot, tuple(legs), frame, points, fixed, more, gravity)
+        return machine, ca.vertcat(*vectors, *frame, *more.values(), gravity)
 
     @classmethod
     def _made(
@@ -83,9 +91,11 @@ class Machine:
         frame: list[Expression],
         points: list[Expression],
         fixed: list[Expression],
+        more: dict[str, Any],
         gravity: Expression,
     ) -> Machine:
-        platform = equations_class(robot.platform)(frame, points, fixed)
+        more = {**more, "planes": [leg.holds for leg in legs]}
+        platform = equations_class(robot.platform)(frame, points, fixed, more)
         closure = kind_for([type(leg) for leg in legs], type(platform))
         assert closure is not None  # the manipulator has asked
         return cls(robot, legs, platform, closure(legs, platform), gravity)
@@ -132,6 +142,6 @@ def numbers(robot: Manipulator) -> list[float]:
         for quantity in leg.quantities:
             values += map(float, quantity.value)
         values += (*leg.platform_point, *leg.fixed_offset)
-    for vector in (*robot.platform.frame, robot.gravity):
+    for vector in (*robot.platform.frame, *robot.platform.quantities.values(), robot.gravity):
         values += vector
     return values

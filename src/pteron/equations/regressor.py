@@ -51,7 +51,7 @@ def terms(machine: Machine, state: State) -> Terms:
         ca.diag(ca.vertcat(*diagonal)),
         tuple(jacobians),
         tuple(matrices),
-        machine.platform.wrench_matrix(state.platform, machine.gravity),
+        state.platform.pose_forces(machine.platform.wrench_matrix(state.platform, machine.gravity)),
     )
 
 
@@ -71,5 +71,5 @@ def paper_regressor(machine: Machine, state: State) -> Expression:
 
     Omega holds what acts on the bodies, so that the forces which balance it carry a minus sign.
     """
-    bracket = generalized_regressor(machine, state)
+    bracket = state.platform.quasi_forces(generalized_regressor(machine, state))
     return -machine.closure.forces(bracket, state.platform, state.legs)

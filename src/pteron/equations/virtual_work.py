@@ -25,12 +25,13 @@ def inverse_dynamics(
 ) -> Expression:
     """Return the actuator forces F_a (n, K) for the columns of parameters (N, K), Eq. (13).
 
-    `wrench` (m, K) acts on the platform at P: a force and, where it turns, a moment about k. A mass
-    on a platform point moves with leg and platform: with `carried` it counts as the platform's.
+    `wrench` acts on the platform at P: a force and, where it turns, a moment about k, (m, K); where
+    it tilts force and moment, (6, K). A mass on a platform point moves with leg and platform: with
+    `carried` it counts as the platform's.
     """
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
-        load = load - wrench
+        load = load - machine.platform.applied(state.platform, wrench)
     return joints + machine.closure.forces(load, state.platform, state.legs)
 
 
@@ -41,13 +42,16 @@ def generalized_forces(machine: Machine, state: State, parameters: Expression) -
         state.legs, state.platform.matrices, ca.vertsplit(joints), strict=True
     ):
         total = total + ca.mtimes(ca.mtimes(matrix.T, leg.row.T / leg.divisor), force)
-    return total
+    return state.platform.pose_forces(total)
 
 
 def needed_forces(
     machine: Machine, state: State, parameters: Expression, carried: bool = True
 ) -> tuple[Expression, Expression]:
-    """Return what motion and gravity need at the joints (n, K), and of the platform (m, K)."""
+    """Return what motion and gravity need at the joints (n, K), and of the platform (m, K).
+
+    The latter along its quasi-velocities, which are those of the pose unless it tilts.
+    """
     legs, inertia = machine.moments(parameters)
     platform = state.platform
     needs = [

@@ -213,7 +213,7 @@ def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
 
 
 def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
-    wrench = v.get("wrench", ca.SX.zeros(m.freedom))
+    wrench = v.get("wrench", ca.SX.zeros(m.wrench_size))
     acceleration = lagrangian.forward_dynamics(
         m, v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
     )
@@ -241,7 +241,7 @@ def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
 
 
 def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
-    wrench = v.get("wrench", ca.SX.zeros(m.freedom))
+    wrench = v.get("wrench", ca.SX.zeros(m.wrench_size))
     given = v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
     acceleration = drives.drive_accelerations(m, *given, drives.Drives.of(v["drives"]))
     return {"acceleration": acceleration}

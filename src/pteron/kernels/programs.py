@@ -115,10 +115,10 @@ def bare(robot: RobotLike) -> Manipulator:
 
 @lru_cache(maxsize=256)
 def _bare(robot: Manipulator) -> Manipulator:
-    unit = {"m": 1.0, "mgx": 0.0, "mgy": 0.0, "I": 1.0}
+    ones = ("m", "I", "Ixx", "Iyy", "Izz")
 
     def plain(body: Any) -> Any:
-        return body.of_values([unit[kind] for kind in body.kinds])
+        return body.of_values([float(kind in ones) for kind in body.kinds])
 
     legs = tuple(
         replace(
@@ -208,6 +208,7 @@ def _program(
     selected = (constants or {}).get("selection", ca.SX.eye(0)).shape[1]
     sizes = {
         "parameters": len(machine.parameters),
+        "wrench": machine.wrench_size,
         "drives": len(Drives._fields) * machine.freedom,
         **control.input_sizes(what, machine.freedom, selected),
     }

@@ -240,4 +240,6 @@ def _layout(robot: Manipulator) -> tuple[Any, ...]:
         )
         for leg in robot.legs
     ]
-    return (robot.platform.motion, robot.platform.frame, robot.gravity, *legs)
+    platform = robot.platform
+    own = platform.motion, platform.frame, platform.angle_order, platform.second_axis
+    return (*own, robot.gravity, *legs)

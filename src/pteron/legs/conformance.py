@@ -7,7 +7,7 @@ do the work that their energy takes. No number is known beforehand.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import casadi as ca
 import numpy as np
@@ -23,6 +23,7 @@ from pteron.bodies.motion import (
     moments_of,
 )
 from pteron.bodies.vectors import Vector
+from pteron.legs.ball_end import every_axis
 from pteron.legs.kind import LegKind
 from pteron.legs.leg import Circle, LegEquations, LegMotion, Plane, Sphere
 from pteron.legs.protocol import breaches, point_in_reach
@@ -31,7 +32,7 @@ from pteron.legs.protocol import breaches, point_in_reach
 class _Moved:
     """A leg along c(t) and phi(t), with what holds of it at t = 0."""
 
-    def __init__(self, leg: LegKind, axis: Vector | None, seed: int) -> None:
+    def __init__(self, leg: LegKind, axes: Sequence[Vector], seed: int) -> None:
         rng = np.random.default_rng(seed)
         c, normal = point_in_reach(leg, seed), leg.plane_normal
         assert c is not None  # `breaches` has found one
@@ -41,10 +42,12 @@ class _Moved:
         self.leg = leg
         t = TIME
         self.point = PointMotion(ca.SX(ca.DM(c)) + dc * t + ddc * t**2 / 2, dc + ddc * t, ddc)
-        turns: tuple[Turn, ...] = ()
         phi, rate, growth = rng.normal(size=3)
-        if axis is not None:
-            turns = (Turn(ca.SX(ca.DM(list(axis))), rate + growth * t, ca.SX(growth)),)
+        moving = [(rate, growth), *rng.normal(size=(2, 2))]
+        turns = tuple(
+            Turn(ca.SX(ca.DM(list(axis))), first + second * t, ca.SX(second))
+            for axis, (first, second) in zip(axes, moving, strict=False)
+        )
         self.rotation = RotationMotion(turns, phi + rate * t + growth * t**2 / 2)
         omega = sum((turn.rate * turn.axis for turn in turns), ca.SX(3, 1))
         self.twist = ca.vertcat(self.point.velocity, omega)
@@ -55,7 +58,9 @@ class _Moved:
         self.inertia = {b: moments_of(kinds[b], ca.vertsplit(v)) for b, v in values.items()}
 
 
-def faults(leg: LegKind, axis: Vector | None = None, seed: int = 0) -> tuple[str, ...]:
+def faults(
+    leg: LegKind, axis: Vector | None = None, seed: int = 0, *, tilts: bool = False
+) -> tuple[str, ...]:
     """Return where a leg breaks the protocol, a line each; none where it keeps it.
 
     Parameters
@@ -66,6 +71,8 @@ def faults(leg: LegKind, axis: Vector | None = None, seed: int = 0) -> tuple[str
         That of a platform that turns against the leg; None for one that does not.
     seed : int
         Where the motion that is tried comes from.
+    tilts : bool
+        Whether the platform turns about any axis.
 
     Examples
     --------
@@ -74,9 +81,10 @@ def faults(leg: LegKind, axis: Vector | None = None, seed: int = 0) -> tuple[str
     >>> faults(pteron.load("delta").legs[0])
     ()
     """
-    if found := breaches(leg, axis):
+    axes: Sequence[Vector] = every_axis() if tilts else [axis] if axis is not None else []
+    if found := breaches(leg, axes):
         return found
-    at = _Moved(leg, axis, seed)
+    at = _Moved(leg, axes, seed)
     return (*_joints(at), *_bodies(at), *_forces(at), *_locus(at))
 
 

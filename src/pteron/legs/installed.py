@@ -12,16 +12,20 @@ from pteron.errors import ModelError
 from pteron.legs.kind import LegKind
 from pteron.legs.prr import PRR
 from pteron.legs.prrr import PRRR
+from pteron.legs.prs import PRS
 from pteron.legs.pss import PSS
 from pteron.legs.rpr import RPR
+from pteron.legs.rps import RPS
 from pteron.legs.rrr import RRR
+from pteron.legs.rrs import RRS
 from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
+from pteron.legs.ups import UPS
 
 GROUP = "pteron.legs"
 
 KINDS: dict[str, type[LegKind]] = {
-    kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU)
+    kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU, UPS, RPS, PRS, RRS)
 }
 """The kinds of legs that are loaded, by their key `type`; add another here."""
 

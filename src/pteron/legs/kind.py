@@ -203,8 +203,11 @@ class LegKind(ABC):
         """The normal of the plane in which a planar leg keeps its platform point; else None."""
         return None
 
-    def under(self, axis: Vector) -> Self:
-        """Return the leg with what it takes from the axis of its platform, where it has it not."""
+    def under(self, frame: Sequence[Vector]) -> Self:
+        """Return the leg with what it takes from its platform's frame, where it has it not.
+
+        `frame` is the platform's x, y and z at angles zero, in the base frame.
+        """
         return self
 
     @property

@@ -37,6 +37,7 @@ import casadi as ca
 from pteron.bodies.motion import (
     BodyMotion,
     Expression,
+    HeldPlane,
     Moments,
     PointMotion,
     RotationMotion,
@@ -207,6 +208,8 @@ class LegEquations(ABC):
     """Whether dq/dc does not depend on the pose, nor q on phi; see `closures`."""
     constant_row: Expression
     """dq/dc, (3, 1), where that is so."""
+    holds: HeldPlane | None = None
+    """The plane that it keeps its platform point in, of a leg that does so by itself."""
 
     @abstractmethod
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
+from pteron.legs.ball_end import ball_joint
 from pteron.legs.circles import quarter_turn
 from pteron.legs.leg import Joint
 
@@ -60,8 +61,12 @@ def last_joints(
 ) -> list[Joint]:
     """Return the revolute joint at the platform point, and one about each turn of the platform.
 
-    Where two have one axis they are one: its motion is under the first, the second has none.
+    Where two have one axis they are one: its motion is under the first, the second has none. Where
+    the platform tilts all of them are a ball joint.
     """
+    if rotation.tilts:
+        link = ca.mtimes(d, lower.row), d * lower.rate, d * lower.acceleration
+        return ball_joint(point.position, rotation, *link)
     ankle, at = Turning(*(-a for a in lower)), rotation.center(point)
     hinges = []
     for turn in rotation.turns:

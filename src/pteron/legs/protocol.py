@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 import casadi as ca
@@ -22,32 +22,32 @@ _ALIKE = 1e-9
 """Share of a row's size within which two rows are one."""
 
 
-def breaches(leg: LegKind, axis: Vector | None) -> tuple[str, ...]:
+def breaches(leg: LegKind, axes: Sequence[Vector]) -> tuple[str, ...]:
     """Return why a leg cannot be modelled, whoever wrote its kind: one line each.
 
-    `axis` is that of a platform that turns against the leg, or None.
+    `axes` are those about which the platform turns against the leg, perpendicular to each other.
     """
     if not leg.size > 0.0 and not leg.follows_angle:
         return (
             f"a {leg.type} leg has no size, {leg.size:g} m, to measure its reach by: give its kind "
             'a quantity of role "length", or a `size`',
         )
-    return _of_chain(leg, axis) if (type(leg), axis is None) not in _SOUND else ()
+    return _of_chain(leg, tuple(axes)) if (type(leg), len(axes)) not in _SOUND else ()
 
 
-_SOUND: set[tuple[type[LegKind], bool]] = set()
-"""Kinds whose chains were found to be in order, under platforms that turn or do not: a design's
+_SOUND: set[tuple[type[LegKind], int]] = set()
+"""Kinds whose chains were found to be in order, under platforms with so many axes: a design's
 search makes thousands of machines, and a chain's order does not depend on a leg's numbers."""
 
 
 @lru_cache(maxsize=64)
-def _of_chain(leg: LegKind, axis: Vector | None) -> tuple[str, ...]:
-    motion = _motion(leg, axis)
+def _of_chain(leg: LegKind, axes: tuple[Vector, ...]) -> tuple[str, ...]:
+    motion = _motion(leg, axes)
     if motion is None:
         return ()  # nowhere in reach, which is told where a pose is used
     found = (*_carried(leg, motion), *_driven(leg, motion))
     if not found:
-        _SOUND.add((type(leg), axis is None))
+        _SOUND.add((type(leg), len(axes)))
     return found
 
 
@@ -62,12 +62,12 @@ def point_in_reach(leg: LegKind, seed: int = 0) -> NDArray[np.float64] | None:
     return None
 
 
-def _motion(leg: LegKind, axis: Vector | None) -> LegMotion | None:
+def _motion(leg: LegKind, axes: Sequence[Vector]) -> LegMotion | None:
     """Return the leg's motion at rest at a random point in its reach."""
     point, rest = point_in_reach(leg), ca.SX(3, 1)
     if point is None:
         return None
-    turns = () if axis is None else (Turn(ca.SX(list(axis)), ca.SX(0), ca.SX(0)),)
+    turns = tuple(Turn(ca.SX(list(axis)), ca.SX(0), ca.SX(0)) for axis in axes)
     at_rest = PointMotion(ca.SX(ca.DM(point)), rest, rest)
     return leg.equations().motion(at_rest, RotationMotion(turns, ca.SX(0.3)))
 

@@ -114,9 +114,10 @@ class PRR(SlideLeg):
         angle = ca.atan2(ca.dot(link, across), ca.dot(link, ahead))
         return within("link", "rad", angle, self.elbow_limits, self.lower_length)
 
-    def under(self, axis: Vector) -> Self:
+    def under(self, frame: Sequence[Vector]) -> Self:
         if self.direction is not None:
             return self
+        axis = frame[2]
         perpendicular(self.slider_direction, axis, "slider_direction", "the plane's normal")
         return replace(self, direction=axis)
 

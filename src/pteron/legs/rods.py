@@ -9,6 +9,7 @@ import casadi as ca
 
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector, parallel
+from pteron.legs.ball_end import ball_joint
 from pteron.legs.cones import within_cone
 from pteron.legs.keys import Key
 from pteron.legs.leg import Joint, LegMotion, Passive
@@ -16,7 +17,11 @@ from pteron.legs.leg import Joint, LegMotion, Passive
 ROD_KEYS: dict[str, Key] = {
     "lower_length": Key("length", "ll, of the rod, m"),
     "rods": Key(
-        "count", "parallel rods, which keep their bars parallel; lower is their sum", default=2
+        "count",
+        "parallel rods, which keep their bars parallel; lower is their sum; 1 under a platform "
+        "that tilts",
+        default=2,
+        tilting=1,
     ),
     "bar_length": Key(
         "length",
@@ -127,7 +132,8 @@ def universal_joints(
 ) -> list[Joint]:
     """Return the universal joints at a rod's ends, tip and c: about d, and about d x n across it.
 
-    A hinge about each axis of the platform's rotation follows.
+    A hinge about each axis of the platform's rotation follows; where the platform tilts the joint
+    at c is a ball joint.
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 6) is
@@ -149,13 +155,20 @@ def universal_joints(
     if before is not None:
         knee = tuple(a - b for a, b in zip(about_d, before[3:6], strict=True))
     axis = across / size
+    ends = [Joint("R", d, tip, *knee), Joint("R", axis, tip, *about_e, body)]
+    if rotation.tilts:
+        rod = (
+            ca.mtimes(d, about_d[0]) + ca.mtimes(axis, about_e[0]),
+            alpha * d + beta * axis,
+            about_d[2] * d + about_e[2] * axis + alpha * beta * ca.cross(d, axis),
+        )
+        return [*ends, *ball_joint(c, rotation, *rod)]
     hinges = [
         Joint("R", turn.axis, rotation.center(point), turn.row, turn.rate, turn.acceleration)
         for turn in rotation.turns
     ]
     return [
-        Joint("R", d, tip, *knee),
-        Joint("R", axis, tip, *about_e, body),
+        *ends,
         Joint("R", axis, c, *(-a for a in about_e)),
         Joint("R", d, c, *(-a for a in about_d)),
         *hinges,

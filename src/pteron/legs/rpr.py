@@ -34,7 +34,11 @@ from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link
 RAM = ActuatedJoint("ram", "rho", "m", "force", "N")
 
 
-def _check_limits(limits: tuple[float, float]) -> None:
+RAM_LIMITS = Key("limits", "least and greatest length, m, above 0")
+
+
+def check_ram(limits: tuple[float, float]) -> None:
+    """Refuse a ram without a length."""
     if limits[0] <= 0.0:
         raise ModelError(f"limits: least length {limits[0]:g} m given; a ram is longer than 0")
 
@@ -97,7 +101,7 @@ class RPR(LegKind):
             example=[0.0, 0.0, 1.0],
         ),
         "elbow": Key("sign", "1: a ram has but one branch", default=1),
-        "limits": Key("limits", "least and greatest length, m, above 0"),
+        "limits": RAM_LIMITS,
         "upper": Key(
             "planar", "the cylinder: origin at guide_point, x along it to the platform", "u"
         ),
@@ -106,10 +110,10 @@ class RPR(LegKind):
         ),
     }
 
-    conditions = (Condition(("limits",), _check_limits),)
+    conditions = (Condition(("limits",), check_ram),)
 
-    def under(self, axis: Vector) -> Self:
-        return self if self.direction is not None else replace(self, direction=axis)
+    def under(self, frame: Sequence[Vector]) -> Self:
+        return self if self.direction is not None else replace(self, direction=frame[2])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

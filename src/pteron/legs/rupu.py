@@ -136,7 +136,8 @@ class RUPU(LegKind):
         Condition(("travel",), _check_travel),
     )
 
-    def under(self, axis: Vector) -> Self:
+    def under(self, frame: Sequence[Vector]) -> Self:
+        axis = frame[2]
         if self.direction is None:
             return replace(self, direction=axis)
         given = f"direction: {list(self.direction)}"

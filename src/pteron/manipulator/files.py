@@ -19,6 +19,7 @@ from pteron.legs.installed import kind_named, kind_names
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Bar, Geared, Platform
+from pteron.platforms.platform import TILTING
 from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
 
 _Built = TypeVar("_Built")
@@ -121,11 +122,14 @@ def explained(name_or_path: str | Path) -> str:
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
-    from pteron.manipulator.tables import MachineTable, PlatformTable
+    from pteron.manipulator.tables import MachineTable, TiltingMachineTable, platform_table
 
-    reading = _Reading()
-    machine = reading.table(MachineTable, document, "")
-    table = machine.platform or reading.rest(PlatformTable, document.get("platform"))
+    carried = document.get("platform")
+    motion = carried.get("motion") if isinstance(carried, dict) else None
+    tilts = motion in TILTING
+    reading = _Reading(tilts=tilts)
+    machine = reading.table(TiltingMachineTable if tilts else MachineTable, document, "")
+    table = machine.platform or reading.rest(platform_table(motion), carried)
     platform = table and reading.platform(table)
     radii = machine.radii and reading.built("radii.", lambda: Radii(**machine.radii.model_dump()))
     given = document.get("legs")
@@ -147,6 +151,8 @@ class _Reading:
     """The faults that were found so far: a file is told all of them at once."""
 
     faults: list[str] = field(default_factory=list)
+    tilts: bool = False
+    """Whether the machine's platform does."""
 
     def table(self, model: Any, given: object, prefix: str) -> Any:
         """Return a table as its model holds it; with its faults noted, what of it `rest` gives."""
@@ -190,12 +196,14 @@ class _Reading:
 
     def platform(self, table: Any) -> Platform | None:
         """Return the platform, or None; one with faults serves to check the legs, where it may."""
-        from pteron.manipulator.tables import PlatformTable
+        from pteron.manipulator.tables import PlatformTable, TiltingTable
 
         inertia = table.unit
         given = table.mass, table.inertia, table.center_of_mass or table.first_moment
-        if type(table) is PlatformTable or None not in given:
+        if type(table) in (PlatformTable, TiltingTable) or None not in given:
             inertia = self.built("platform.", lambda: table.inertia_of("")) or inertia
+        if self.tilts:
+            return self._tilting(table, inertia)
         bars = self.parts("bars", table.bars or [], Bar)
         geared = self.parts("geared", table.geared or [], Geared)
         if table.motion is None or table.axis is None:
@@ -224,6 +232,22 @@ class _Reading:
             )
         return None
 
+    def _tilting(self, table: Any, inertia: Any) -> Platform | None:
+        """Return a platform that tilts; one with faults serves to check the legs, where it may."""
+        given = {
+            "axis": table.axis or (0.0, 0.0, 1.0),
+            "x_axis": table.x_axis,
+            "angle_order": table.angles or "rpy",
+            "center": table.center,
+            "second_axis": table.second_axis,
+        }
+        more = {"limits": table.limits, "tool": table.tool or (0.0, 0.0, 0.0)}
+        whole = self.built("platform.", lambda: Platform(table.motion, inertia, **given, **more))
+        if whole is None:
+            with suppress(ModelError):
+                return Platform(table.motion, inertia, **given)
+        return whole
+
     def leg(self, i: int, given: object) -> LegKind | None:
         """Return leg i, from 1, or None; one with faults serves to check the machine."""
         from pteron.manipulator.tables import FORMER, leg_of, leg_table
@@ -248,6 +272,6 @@ class _Reading:
                     f"{prefix}{former}: the former name of {key}, which is given too; give one"
                 )
                 given = {k: v for k, v in given.items() if k != former}
-        leg, faults = leg_of(kind, self.table(leg_table(kind), given, prefix))
+        leg, faults = leg_of(kind, self.table(leg_table(kind), given, prefix), self.tilts)
         self.faults += [prefix + fault for fault in faults]
         return leg

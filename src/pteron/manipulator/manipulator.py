@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,14 +13,22 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.bodies.vectors import Vector, complement, parallel, vector
+from pteron.bodies.vectors import (
+    PARALLEL_TOLERANCE,
+    Vector,
+    complement,
+    dot,
+    parallel,
+    vector,
+)
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.protocol import breaches
 from pteron.manipulator.names import name_faults
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Platform
-from pteron.platforms.coordinates import COORDINATES, Unit
+from pteron.platforms.coordinates import Unit
+from pteron.platforms.platform import HeldPoint
 from pteron.toml import told
 
 _COINCIDENT = 1e-9
@@ -81,8 +89,9 @@ class Manipulator:
         legs = tuple(self.legs)
         if faults := faults_of(self.name, self.platform, legs):
             raise ModelError(told(faults), faults=faults)
-        legs = tuple(leg.under(self.platform.axis) for leg in legs)
+        legs = tuple(leg.under(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
+        object.__setattr__(self, "platform", _held(self.platform, legs))
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
     def __repr__(self) -> str:
@@ -149,7 +158,7 @@ class Manipulator:
             "pose": pose,
             "velocity": tuple(f"d{name}" for name in pose),
             "acceleration": tuple(f"dd{name}" for name in pose),
-            "wrench": tuple(COORDINATES[name].wrench for name in pose),
+            "wrench": self.platform.wrench_columns,
             "joints": joints,
             "joint_rates": tuple(f"d{name}" for name in joints),
             "joint_accelerations": tuple(f"dd{name}" for name in joints),
@@ -170,7 +179,8 @@ def faults_of(name: object, platform: Platform, legs: Sequence[LegKind | None]) 
     found += [f"leg {i}: {fault}" for i, leg in given.items() for fault in _misfits(platform, leg)]
     if found or len(given) < freedom:
         return found
-    return _loose(platform, [leg.under(platform.axis) for leg in given.values()])
+    under = [leg.under(platform.frame) for leg in given.values()]
+    return (_slack if platform.tilts else _loose)(platform, under)
 
 
 def _misfits(platform: Platform, leg: object) -> Iterator[str]:
@@ -178,7 +188,7 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
     if not isinstance(leg, LegKind):
         yield f"{type(leg).__name__} given, a leg expected"
         return
-    if leg.follows_angle and (platform.slides or not platform.turns):
+    if leg.follows_angle and (platform.slides or not platform.turns):  # nor where it tilts
         yield (
             f"a {leg.type} leg turns the platform, but this {platform.motion} platform does not "
             "turn; give it another leg or another motion"
@@ -190,13 +200,21 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
             "across it, so give 0"
         )
     try:
-        leg = leg.under(platform.axis)
+        leg = leg.under(platform.frame)
     except ModelError as error:
         yield str(error)
         return
-    yield from breaches(leg, platform.axis if platform.turns and not platform.slides else None)
+    if platform.tilts:
+        yield from _tilt_misfits(platform, leg)
+        return
+    yield from breaches(leg, platform.rotation_axes)
     normal = leg.plane_normal
-    if normal is not None and not platform.planar:
+    if normal is not None and len(leg.free_axes(None)) > 1:
+        yield (
+            f"a {leg.type} leg ends in a ball joint, under which a {platform.motion} platform "
+            'tilts; make the platform\'s motion "1T2R", or give it another leg'
+        )
+    elif normal is not None and not platform.planar:
         yield (
             f"a {leg.type} leg moves in a plane, which a {platform.motion} platform leaves; make "
             'the platform\'s motion "2T" or "2T1R", or give it another leg'
@@ -214,6 +232,59 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
                 f"pushes along the platform's axis {list(platform.axis)} alone, across the plane; "
                 "turn its direction"
             )
+
+
+def _tilt_misfits(platform: Platform, leg: LegKind) -> Iterator[str]:
+    """Yield why a leg cannot carry a platform that tilts."""
+    takes = "U-P-S, P-S-S and R-S-S legs with one rod"
+    if platform.motion == "1T2R":
+        takes = "R-P-S, P-R-S and R-R-S legs"
+    normal, free = leg.plane_normal, len(complement(leg.free_axes(None))) == 0
+    if any(leg.fixed_offset):
+        yield f"fixed_offset: a {platform.motion} platform tilts as one, and has none"
+    if not free and getattr(leg, "rods", 1) > 1:
+        yield (
+            f"rods: {getattr(leg, 'rods', 1)} parallel rods hold an angle, but a {platform.motion} "
+            "platform tilts; make it 1"
+        )
+    elif not free:
+        yield (
+            f"a {leg.type} leg keeps a platform from tilting, but a {platform.motion} platform "
+            f"tilts; it takes {takes}"
+        )
+    elif (normal is None) == (platform.motion == "1T2R"):
+        how = "does not keep its point" if normal is None else "keeps its point"
+        yield f"a {leg.type} leg {how} in a plane; a {platform.motion} platform takes {takes}"
+    elif normal is not None and abs(dot(normal, platform.axis)) > PARALLEL_TOLERANCE:
+        yield (
+            f"direction {list(normal)}: the plane across it does not stand upright; make it "
+            f"perpendicular to the platform's axis {list(platform.axis)}"
+        )
+    else:
+        yield from breaches(leg, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+def _slack(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
+    """Return why legs do not hold a platform that tilts, whatever its pose."""
+    normals = [leg.plane_normal for leg in legs if leg.plane_normal is not None]
+    if normals and all(parallel(normals[0], normal) for normal in normals[1:]):
+        return [
+            f"legs: the planes of all legs are parallel, across {list(normals[0])}, so that the "
+            "platform is free to move along them and to turn; turn the direction of one"
+        ]
+    return []
+
+
+def _held(platform: Platform, legs: Sequence[LegKind]) -> Platform:
+    """Return a platform with the planes in which its legs keep its points, if it is a tripod's."""
+    if platform.motion != "1T2R":
+        return platform
+    planes = [
+        HeldPoint(leg.plane_normal, leg.guide_point, leg.platform_point)
+        for leg in legs
+        if leg.plane_normal is not None
+    ]
+    return replace(platform, planes=tuple(planes))
 
 
 def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:

@@ -39,11 +39,15 @@ def text_of(robot: Manipulator) -> str:
     from pteron.manipulator.tables import leg_items
     from pteron.manipulator.writing import written
 
-    x, _, axis = robot.platform.frame
-    platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
-    platform |= {"tool": robot.platform.tool, **asdict(robot.platform.inertia)}
-    for name in ("slides", "limits", "bars", "geared"):
-        if given := getattr(robot.platform, name):
+    own = robot.platform
+    platform: dict[str, Any] = {"motion": own.motion, "axis": own.axis}
+    if own.x_axis is not None:
+        platform["x_axis"] = own.x_axis
+    if own.angle_order != "rpy":
+        platform["angles"] = own.angle_order
+    platform |= {"tool": own.tool, **asdict(own.inertia)}
+    for name in ("slides", "limits", "bars", "geared", "center", "second_axis"):
+        if given := getattr(own, name):
             platform[name] = given
     radii = {} if robot.radii is None else {"radii": asdict(robot.radii)}
     legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]

@@ -20,6 +20,7 @@ from pteron.bodies.tables import (
     PlanarBody,
     RodBody,
     Slider,
+    SpatialBody,
     Table,
     Three,
     Two,
@@ -30,7 +31,7 @@ from pteron.legs.cones import Cone
 from pteron.legs.drive import Drive, Stribeck
 from pteron.legs.keys import Key, KeyRole
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
-from pteron.platforms.platform import Motion
+from pteron.platforms.platform import TILTING, AngleOrder, Motion
 from pteron.toml import told
 
 
@@ -110,15 +111,16 @@ class DriveTable(Table):
 class _Motion(Table):
     motion: Motion = Field(
         description='"3T": x, y, z. "3T1R": also phi, about axis. "2T": x, y in the plane across '
-        'axis. "2T1R": also phi'
+        'axis. "2T1R": also phi. Tilting: "3T3R", "3R" and "2R" about center, "1T2R" of a tripod'
     )
     axis: Three = Field(
         (0.0, 0.0, 1.0),
-        description="k, which the platform turns about; the normal of a planar machine's plane",
+        description="k, which the platform turns about; the normal of a planar machine's plane; "
+        "the platform frame's z at angles zero",
     )
     x_axis: Three | None = Field(
         None,
-        description="the platform frame's x at phi = 0; needed unless axis is the base frame's z",
+        description="the platform frame's x at angles zero; needed unless axis is base frame's z",
         examples=[[1.0, 0.0, 0.0]],
     )
 
@@ -150,6 +152,39 @@ class PlatformTable(PlanarBody, _Motion):
     )
 
 
+class TiltingTable(SpatialBody, _Motion):
+    """`[platform]` that tilts: its body's origin is P, its frame turns by the pose's angles."""
+
+    angles: AngleOrder = Field(
+        "rpy",
+        description='of 3T3R and 3R, "rpy": R = Rz(yaw) Ry(pitch) Rx(roll). "xyz": R = Rx(rx) '
+        "Ry(ry) Rz(rz)",
+    )
+    center: Three | None = Field(
+        None,
+        description="of 3R and 2R: P, on the joint that the platform turns about, m",
+        examples=[[0.0, 0.0, 0.1]],
+    )
+    second_axis: Three | None = Field(
+        None,
+        description="of 2R: what beta turns about, at alpha = 0; alpha turns about axis",
+        examples=[[0.0, 1.0, 0.0]],
+    )
+    limits: list[Two] | None = Field(
+        None,
+        description="least and greatest of each angle, rad",
+        examples=[[[-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5]]],
+    )
+    tool: Three = Field(
+        (0.0, 0.0, 0.0), description="the tool's centre point in the platform frame, m"
+    )
+
+
+def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
+    """Return what a platform of a motion holds; one that is not known as if it did not tilt."""
+    return TiltingTable if motion in TILTING else PlatformTable
+
+
 class RadiiTable(Table):
     """`radii`: how thick the bodies are, as capsules round their centre lines."""
 
@@ -173,6 +208,12 @@ class MachineTable(Table):
     )
     platform: PlatformTable = Field(description="what the legs carry")
     legs: list[Any] = Field(description="one table for each freedom of the platform")
+
+
+class TiltingMachineTable(MachineTable):
+    """The same of a machine whose platform tilts."""
+
+    platform: TiltingTable = Field(description="what the legs carry")  # type: ignore[assignment]
 
 
 def _no_truth(given: Any) -> Any:
@@ -245,8 +286,12 @@ _ORDINARY: dict[KeyRole, Any] = {
 """Ordinary values in the place of those with a fault, while the rest of the machine is checked."""
 
 
-def leg_of(kind: type[LegKind], table: Any) -> tuple[LegKind | None, list[str]]:
+def leg_of(
+    kind: type[LegKind], table: Any, tilts: bool = False
+) -> tuple[LegKind | None, list[str]]:
     """Build a leg from its table, in which keys that must be given may be None.
+
+    `tilts` tells whether its platform does.
 
     Returns
     -------
@@ -258,6 +303,9 @@ def leg_of(kind: type[LegKind], table: Any) -> tuple[LegKind | None, list[str]]:
     """
     keys = kind.every_key()
     given = {name: getattr(table, toml_key(name, key)) for name, key in keys.items()}
+    if tilts:
+        own = {n: key.tilting for n, key in keys.items() if key.tilting is not None}
+        given |= {n: v for n, v in own.items() if n not in table.model_fields_set}
     given = {n: v for n, v in given.items() if v is not None or keys[n].default is None}
     values, refused = {}, {}
     for name, value in given.items():

@@ -81,10 +81,12 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
     def turn(v: Vector) -> Vector:
         return vector((matrix @ v).tolist(), "rotation")
 
-    x, _, axis = robot.platform.frame
+    legs = tuple(leg.turned(turn) for leg in robot.legs)
+    if robot.platform.second_axis is not None:  # its points are in the base frame, at angles zero
+        legs = tuple(replace(leg, platform_point=turn(leg.platform_point)) for leg in legs)
     return replace(
         robot,
-        platform=replace(robot.platform, axis=turn(axis), x_axis=turn(x)),
-        legs=tuple(leg.turned(turn) for leg in robot.legs),
+        platform=robot.platform.turned(turn),
+        legs=legs,
         gravity=turn(robot.gravity) if gravity else robot.gravity,
     )

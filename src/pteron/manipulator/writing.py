@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from pteron.bodies.tables import PlanarBody, Table
 from pteron.legs import KINDS
-from pteron.manipulator.tables import MachineTable, PlatformTable, leg_table
+from pteron.manipulator.tables import MachineTable, leg_table, platform_table
 
 _WIDTH = 110
 _COLUMN = 46
@@ -44,7 +44,9 @@ def written(
     lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]
     own = {key: value for key, value in document.items() if key not in ("platform", "legs")}
     lines += ["", *_block("", MachineTable, own, explained)]
-    lines += ["", *_block("platform", PlatformTable, document["platform"], explained)]
+    carried = document["platform"]
+    model = platform_table(carried["motion"])
+    lines += ["", *_block("platform", model, carried, explained)]
     told: set[str] = set()
     for i, leg in enumerate(document["legs"], start=1):
         kind = leg["type"]

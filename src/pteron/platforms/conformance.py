@@ -18,6 +18,9 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _POINTS = 3
 
+_SMALL = 0.3
+"""Size of the motion, SI units: a tripod does not tilt by much."""
+
 
 def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
     """Return where a platform breaks the protocol, a line each; none where it keeps it.
@@ -43,14 +46,17 @@ def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
         return [ca.SX(ca.DM(rng.normal(size=3) * (1.0, 1.0, high))) for _ in range(_POINTS)]
 
     frame = [ca.SX(ca.DM(list(axis))) for axis in platform.frame]
-    equations = kind(frame, points(platform.slides), points(False))
-    x, dx, ddx = (drawn(len(kind.coordinates)) for _ in range(3))
+    held = [ca.SX(ca.DM(list(plane.platform_point))) for plane in platform.planes]
+    own = held or points(platform.slides)
+    equations = kind(frame, own, points(False), platform.expressions())
+    x, dx, ddx = (_SMALL * drawn(len(kind.coordinates)) for _ in range(3))
     rates = dx + ddx * TIME
     motion = equations.motion(x + dx * TIME + ddx * TIME**2 / 2, rates, ddx)
     inertia = ca.vertsplit(ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kind.kinds)))))
+    quasi = motion.pose_rows(ca.SX.eye(len(kind.coordinates))) @ rates
     return (
-        *_motions(motion, rates),
-        *_forces(equations, motion, rates, drawn(3), inertia),
+        *_motions(motion, quasi),
+        *_forces(equations, motion, quasi, drawn(3), inertia),
     )
 
 

@@ -48,6 +48,14 @@ COORDINATES: dict[str, Coordinate] = {
     "y": Coordinate("m", "y", "fy"),
     "z": Coordinate("m", "z", "fz"),
     "phi": Coordinate("rad", "φ", "mk"),
+    "roll": Coordinate("rad", "roll", "mx"),
+    "pitch": Coordinate("rad", "pitch", "my"),
+    "yaw": Coordinate("rad", "yaw", "mz"),
+    "rx": Coordinate("rad", "rx", "mx"),
+    "ry": Coordinate("rad", "ry", "my"),
+    "rz": Coordinate("rad", "rz", "mz"),
+    "alpha": Coordinate("rad", "alpha", "ma"),
+    "beta": Coordinate("rad", "beta", "mb"),
 }
 """Every coordinate that some platform has, by name."""
 

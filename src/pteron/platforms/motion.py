@@ -8,8 +8,8 @@ which `platforms.equations_class` finds by the file's keys.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -25,6 +25,7 @@ from pteron.bodies.motion import (
     moments_of,
     needed_wrench,
 )
+from pteron.bodies.spatial import SpatialMotion
 from pteron.platforms.coordinates import are_angles
 
 
@@ -52,6 +53,46 @@ class PlatformMotion(NamedTuple):
     """The platform itself, its rows against (p', omega)."""
     matrix: Expression
     """(6, m): (p', omega) = matrix x'."""
+    spatial: SpatialMotion | None = None
+    """Its body where that turns about any axis."""
+    point_twists: tuple[Expression, ...] = ()
+    """(6, 6), one a leg, where it tilts: (c', omega) of the twist (v, omega) of P."""
+    angular: Expression | None = None
+    """E (k, k), of quasi-velocities that are E times the angles' rates, and the lengths' rates
+    before them: every x' above is then of quasi-velocities. None where those are the pose's."""
+
+    def pose_rows(self, rows: Expression) -> Expression:
+        """Return rows (j, m) against x' from rows against the quasi-velocities."""
+        if self.angular is None:
+            return rows
+        lengths = rows.shape[1] - self.angular.shape[0]
+        return ca.horzcat(rows[:, :lengths], ca.mtimes(rows[:, lengths:], self.angular))
+
+    def pose_forces(self, forces: Expression) -> Expression:
+        """Return forces (m, K) along the pose from those along the quasi-velocities."""
+        return self.pose_rows(forces.T).T
+
+    def pose_rates(self, quasi: Expression) -> Expression:
+        """Return x' (m, K) of quasi-velocities; not finite where the angles are singular."""
+        if self.angular is None:
+            return quasi
+        lengths = quasi.shape[0] - self.angular.shape[0]
+        rates = ca.mtimes(self._angular_inverse, quasi[lengths:, :])
+        return ca.vertcat(quasi[:lengths, :], rates)
+
+    def quasi_forces(self, forces: Expression) -> Expression:
+        """Return forces (m, K) along the quasi-velocities from those along the pose."""
+        if self.angular is None:
+            return forces
+        lengths = forces.shape[0] - self.angular.shape[0]
+        moments = ca.mtimes(self._angular_inverse.T, forces[lengths:, :])
+        return ca.vertcat(forces[:lengths, :], moments)
+
+    @property
+    def _angular_inverse(self) -> Expression:
+        a, b, c = ca.horzsplit(self.angular)
+        across = ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
+        return across.T / ca.dot(a, across[:, 0])
 
     def rotation_at(self, point: PointMotion, fixed: Expression) -> RotationMotion:
         """Return the rotation as the leg at a point sees it, whose fixed offset is given."""
@@ -67,12 +108,15 @@ class PlatformEquations(ABC):
     """The kinds of its inertial parameters."""
     slides: ClassVar[bool] = False
     """Whether phi slides what the legs carry, and does not turn it."""
+    wrench_columns: ClassVar[tuple[str, ...]] = ()
+    """The names of a wrench at P that acts on it; none where they are the coordinates' own."""
 
     def __init__(
         self,
         frame: Sequence[Expression],
         platform_points: Sequence[Expression],
         fixed_offsets: Sequence[Expression],
+        more: Mapping[str, Any] | None = None,
     ) -> None:
         self.frame, self.points, self.fixed = frame, platform_points, fixed_offsets
         x0, y0, k = frame
@@ -80,8 +124,11 @@ class PlatformEquations(ABC):
             Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
             for s, t in zip(platform_points, fixed_offsets, strict=True)
         ]
-        self.directions = ca.SX.eye(3) if "z" in self.coordinates else ca.horzcat(x0, y0)
-        """(3, 2) or (3, 3): along which the pose's lengths count; p = directions (x, y, ...)."""
+        along = {"x": x0, "y": y0, "z": k}
+        lengths = [along[name] for name in self.coordinates if name in along]
+        self.directions = ca.SX.eye(3) if len(lengths) == 3 else ca.horzcat(ca.SX(3, 0), *lengths)
+        """(3, l): along which the pose's lengths count; P is at directions (x, y, ...), where they
+        tell its place."""
 
     @classmethod
     def angles(cls) -> list[int]:
@@ -119,6 +166,18 @@ class PlatformEquations(ABC):
     def mass_moment(self, motion: PlatformMotion, inertia: Moments) -> Expression:
         """Return mass times centre of mass, (3, K), in the base frame."""
         return mass_moment(motion.body, inertia)
+
+    def applied(self, motion: PlatformMotion, wrench: Expression) -> Expression:
+        """Return the forces (m, K) of a wrench on it, whose rows are `wrench_columns`."""
+        return wrench
+
+    def constraint(self, motion: PlatformMotion) -> Expression:
+        """Return how well planes hold what the pose does not move: 1 at best, 0 if not at all."""
+        return ca.SX(1)
+
+    def held_rows(self, motion: PlatformMotion) -> Expression | None:
+        """Return the unit forces and moments (k, 6) of planes about P; None: no planes hold it."""
+        return None
 
     def carrying(self, inertia: Moments, masses: Sequence[Expression]) -> Moments:
         """Return the platform's inertia with masses (1, K), one a leg, on its points."""

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from functools import lru_cache
+from typing import Any, Literal, NamedTuple, get_args
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.bodies.inertia import PlanarInertia
+from pteron.bodies.inertia import PlanarInertia, SpatialInertia
+from pteron.bodies.motion import HeldPlane
 from pteron.bodies.vectors import (
     Vector,
     cross,
     interval,
     number,
+    parallel,
     perpendicular,
     positive,
     unit_vector,
@@ -21,18 +26,35 @@ from pteron.bodies.vectors import (
 )
 from pteron.errors import ModelError
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
+from pteron.platforms.kinds import equations_class
 from pteron.toml import told
 
-Motion = Literal["3T", "3T1R", "2T", "2T1R"]
+Motion = Literal["3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"]
 """3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion). 2T and
-2T1R: the same in the plane across its axis."""
+2T1R: the same in the plane across its axis. Platforms that tilt: 3T3R moves freely, 3R and 2R turn
+about a centre, on a ball joint or a universal joint, 1T2R is a tripod's."""
+
+AngleOrder = Literal["rpy", "xyz"]
+"""rpy: R = Rz(yaw) Ry(pitch) Rx(roll). xyz: R = Rx(rx) Ry(ry) Rz(rz)."""
 
 _COORDINATES: dict[Motion, tuple[str, ...]] = {
     "3T": ("x", "y", "z"),
     "3T1R": ("x", "y", "z", "phi"),
     "2T": ("x", "y"),
     "2T1R": ("x", "y", "phi"),
+    "3T3R": ("x", "y", "z", "roll", "pitch", "yaw"),
+    "3R": ("roll", "pitch", "yaw"),
+    "2R": ("alpha", "beta"),
+    "1T2R": ("z", "roll", "pitch"),
 }
+_XYZ: dict[Motion, tuple[str, ...]] = {
+    "3T3R": ("x", "y", "z", "rx", "ry", "rz"),
+    "3R": ("rx", "ry", "rz"),
+}
+TILTING: tuple[Motion, ...] = ("3T3R", "3R", "2R", "1T2R")
+_CENTRED = ("3R", "2R")
+
+Limits = tuple[float, float]
 
 _BASE_Z: Vector = (0.0, 0.0, 1.0)
 
@@ -77,52 +99,80 @@ class Geared:
         object.__setattr__(self, "ratio", number(self.ratio, "ratio"))
 
 
+class HeldPoint(NamedTuple):
+    """A platform point that its leg keeps in a plane of the base."""
+
+    normal: Vector
+    """Unit vector."""
+    point: Vector
+    """A point of the plane, m."""
+    platform_point: Vector
+    """In the platform frame, m."""
+
+
 @dataclass(frozen=True)
 class Platform:
     """The moving platform.
 
     Parameters
     ----------
-    motion : {"3T1R", "3T", "2T", "2T1R"}
+    motion : {"3T1R", "3T", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"}
         Its freedom: translation, in space or in the plane across `axis`, with or without a rotation
-        about `axis`.
-    inertia : PlanarInertia
-        Mass, first moment in the platform frame and moment of inertia about `axis` through P.
+        about `axis`; or any motion, turns about `center`, or those of a tripod.
+    inertia : PlanarInertia or SpatialInertia
+        Mass, first moment in the platform frame and moment of inertia about `axis` through P; of a
+        platform that tilts its inertia tensor about P.
     axis : unit vector
-        k, the axis of rotation in the base frame, and the platform frame's z; the normal of the
-        plane that a planar machine moves in.
+        k, the axis of rotation in the base frame, and the platform frame's z at angles zero; the
+        normal of the plane that a planar machine moves in; of a 2R platform the first axis that it
+        turns about.
     x_axis : unit vector, optional
-        The platform frame's x at phi = 0, in the base frame. It may be left out where `axis` is
-        the base frame's z: the frames then coincide at phi = 0.
+        The platform frame's x at angles zero, in the base frame. It may be left out where `axis` is
+        the base frame's z, the frames then coincide at angles zero, and of a 2R platform, where
+        they always do.
     slides : bool
         Whether phi slides the platform points, as the two halves of an I4's nacelle do, and turns
         nothing but the tool. Platform points then hold m/rad: c = p + t0 + phi (x_axis s_x + ...).
-    limits : (float, float), optional
-        Least and greatest phi, rad, where hinges of the platform allow no more.
+    limits : (float, float) or tuple of them, optional
+        Least and greatest phi, rad, where hinges of the platform allow no more; of a platform that
+        tilts one pair for each angle.
     tool : vector
         The tool's centre point in the platform frame, m.
     bars : tuple of Bar
         Parts that move with the platform's hinges and do not turn.
     geared : tuple of Geared
         Parts that a gear turns with the platform.
+    angle_order : {"rpy", "xyz"}
+        Which angles a 3T3R or 3R platform has: roll, pitch and yaw, or rx, ry and rz.
+    center : vector, optional
+        P of a 3R or 2R platform, on its joint with the base, m.
+    second_axis : unit vector, optional
+        What a 2R platform turns about by beta, at alpha = 0.
+    planes : tuple of HeldPoint
+        Of a 1T2R platform the planes in which its legs keep its points: the manipulator says them.
     """
 
     motion: Motion
-    inertia: PlanarInertia
+    inertia: PlanarInertia | SpatialInertia
     axis: Vector = _BASE_Z
     x_axis: Vector | None = None
     slides: bool = False
-    limits: tuple[float, float] | None = None
+    limits: Limits | tuple[Limits, ...] | None = None
     tool: Vector = (0.0, 0.0, 0.0)
     bars: tuple[Bar, ...] = ()
     geared: tuple[Geared, ...] = ()
+    angle_order: AngleOrder = "rpy"
+    center: Vector | None = None
+    second_axis: Vector | None = None
+    planes: tuple[HeldPoint, ...] = ()
 
     def __post_init__(self) -> None:
         if self.motion not in get_args(Motion):
             valid = " or ".join(f'"{m}"' for m in get_args(Motion))
             raise ModelError(f"motion: {self.motion!r} is not {valid}")
         faults: list[str] = []
-        for checked in (self._checked_axes, self._checked_limits, self._checked_tool):
+        checks = self._checked_axes, self._checked_limits, self._checked_tool, self._checked_joint
+        for checked in checks:
             try:
                 for name, value in checked().items():
                     object.__setattr__(self, name, value)
@@ -135,16 +185,28 @@ class Platform:
         if self.slides and any(bar.hinge[2] != 0.0 for bar in self.bars):
             faults.append("bars: what slides moves across the axis; give 0 as hinge's third number")
         if self.geared and not self.turns:
-            faults.append(f"geared: a {self.motion} platform has no angle for a gear to turn")
+            faults.append(f"geared: a {self.motion} platform has no axis for a gear to turn about")
+        if self.bars and self.tilts:
+            faults.append(f"bars: a {self.motion} platform tilts, and takes none")
+        expected = SpatialInertia if self.tilts else PlanarInertia
+        if not isinstance(self.inertia, expected):
+            faults.append(
+                f"inertia: {type(self.inertia).__name__} given, but a {self.motion} platform "
+                f"{'tilts' if self.tilts else 'does not tilt'}: {expected.__name__} expected"
+            )
         if faults:
             raise ModelError(told(faults), faults=faults)
 
     def _checked_axes(self) -> dict[str, Any]:
         axis = unit_vector(self.axis, "axis")
+        if self.x_axis is not None and self.motion == "2R":
+            raise ModelError(
+                "x_axis: a 2R platform's frame is the base frame at angles zero; leave it out"
+            )
         if self.x_axis is not None:
             return {"axis": axis, "x_axis": perpendicular(self.x_axis, axis, "x_axis", "axis")}
-        if axis == _BASE_Z:
-            return {"axis": axis, "x_axis": (1.0, 0.0, 0.0)}
+        if axis == _BASE_Z or self.motion == "2R":
+            return {"axis": axis, "x_axis": None if self.motion == "2R" else (1.0, 0.0, 0.0)}
         raise ModelError(
             f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
             "where the platform frame's x points at phi = 0"
@@ -153,18 +215,56 @@ class Platform:
     def _checked_limits(self) -> dict[str, Any]:
         if self.limits is None:
             return {}
-        if not self.turns:
+        if not self.angles:
             raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
-        return {"limits": interval(self.limits, "limits")}
+        if not self.tilts:
+            return {"limits": interval(self.limits, "limits")}
+        try:
+            pairs = [tuple(pair) for pair in self.limits]  # type: ignore[arg-type]
+        except TypeError:
+            pairs = []
+        if len(pairs) != len(self.angles):
+            raise ModelError(
+                f"limits: {self.limits!r} given, one pair for each of {', '.join(self.angles)} "
+                "expected, rad"
+            )
+        return {"limits": tuple(interval(p, f"limits[{i}]") for i, p in enumerate(pairs))}
 
     def _checked_tool(self) -> dict[str, Any]:
         return {"tool": vector(self.tool, "tool")}
 
+    def _checked_joint(self) -> dict[str, Any]:
+        """Return what a platform on a joint with the base has, and no other."""
+        faults, found = [], {}
+        if self.angle_order not in get_args(AngleOrder):
+            faults.append(f'angles: {self.angle_order!r} is not "rpy" or "xyz"')
+        elif self.angle_order != "rpy" and self.motion not in _XYZ:
+            faults.append(f'angles: a {self.motion} platform has no "xyz"; only 3T3R and 3R')
+        wanted = {"center": self.motion in _CENTRED, "second_axis": self.motion == "2R"}
+        for name, needed in wanted.items():
+            value = getattr(self, name)
+            if (value is None) == needed:
+                faults.append(
+                    f"{name}: missing; a {self.motion} platform turns about it"
+                    if needed
+                    else f"{name}: a {self.motion} platform has none; leave it out"
+                )
+            elif needed:
+                check = vector if name == "center" else unit_vector
+                found[name] = check(value, name)
+        second = found.get("second_axis")
+        if second and parallel(unit_vector(self.axis, "axis"), second):
+            faults.append("second_axis: along axis, so that both angles turn alike; turn one")
+        if faults:
+            raise ModelError(told(faults), faults=faults)
+        return found
+
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
-        """The platform frame's x, y and z at phi = 0, in the base frame."""
+        """The platform frame's x, y and z at angles zero, in the base frame."""
         x = self.x_axis
-        assert x is not None  # set when the platform was made
+        if x is None:  # of a 2R platform
+            return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), _BASE_Z
         return (x, cross(self.axis, x), self.axis)
 
     @property
@@ -174,12 +274,19 @@ class Platform:
 
     @property
     def turns(self) -> bool:
-        """Whether the pose has an angle."""
+        """Whether it turns about its axis, and no other."""
         return self.motion in ("3T1R", "2T1R")
+
+    @property
+    def tilts(self) -> bool:
+        """Whether it turns about more axes than one."""
+        return self.motion in TILTING
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the pose's coordinates, in order; see `platforms.coordinates`."""
+        if self.angle_order == "xyz" and self.motion in _XYZ:
+            return _XYZ[self.motion]
         return _COORDINATES[self.motion]
 
     @property
@@ -203,20 +310,36 @@ class Platform:
         return tuple(name for name in self.coordinates if COORDINATES[name].unit == "rad")
 
     @property
+    def wrench_columns(self) -> tuple[str, ...]:
+        """Names of a wrench at P: a force and moments along its coordinates, all where it tilts."""
+        own = equations_class(self).wrench_columns
+        return own or tuple(COORDINATES[name].wrench for name in self.coordinates)
+
+    @property
     def rotation_axes(self) -> tuple[Vector, ...]:
         """Unit vectors that span the axes about which it turns against its legs."""
+        if self.motion == "2R":
+            assert self.second_axis is not None
+            return self.axis, self.second_axis
+        if self.tilts:
+            return self.frame
         return (self.axis,) if self.angles and not self.slides else ()
 
     @property
     def directions(self) -> NDArray[np.float64]:
-        """Unit vectors (k, 3), k = 2 or 3, along which the pose's lengths count."""
-        return np.array(self.frame[:2]) if self.planar else np.eye(3)
+        """Unit vectors (l, 3) along which the pose's lengths count; l = 2 or 3 of most."""
+        x, y, k = self.frame
+        along = {"x": x, "y": y, "z": k}
+        found = np.array([along[name] for name in self.lengths]).reshape(-1, 3)
+        return np.eye(3) if len(found) == 3 else found
 
     def at(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame.
 
         Of a platform that slides they are the tool's.
         """
+        if self.tilts:
+            return self._placed(poses)
         count = len(self.lengths)
         x, y, z = (np.array(axis) for axis in self.frame)
         angle = poses[..., -1:] if self.turns else np.zeros((*poses.shape[:-1], 1))
@@ -224,18 +347,79 @@ class Platform:
         axes = [cos * x + sin * y, cos * y - sin * x, np.broadcast_to(z, (*angle.shape[:-1], 3))]
         return poses[..., :count] @ self.directions, np.stack(axes, axis=-2)
 
+    def _placed(
+        self, poses: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        rows = np.asarray(poses, dtype=float).reshape(-1, poses.shape[-1])
+        place, axes = (np.asarray(part) for part in _placing(self)(rows.T))
+        shape = poses.shape[:-1]
+        # The columns of each (3, 3) stand one behind the other.
+        return place.T.reshape(*shape, 3), axes.T.reshape(*shape, 3, 3)
+
+    @property
+    def quantities(self) -> dict[str, tuple[float, ...]]:
+        """What its equations need of it beside its frame and its points, by name."""
+        if self.motion == "1T2R":
+            return {"side": (self._side,)}
+        if self.center is None:
+            return {}
+        if self.second_axis is None:
+            return {"center": self.center}
+        return {
+            "center": self.center,
+            "first_axis": self.axis,
+            "second_axis": self.second_axis,
+        }
+
+    def expressions(self) -> dict[str, Any]:
+        """Return its `quantities`, and the planes that hold its points, as expressions."""
+        more: dict[str, Any] = {name: _column(v) for name, v in self.quantities.items()}
+        planes = [HeldPlane(_column(n), _column(r)) for n, r, _ in self.planes]
+        return {**more, "planes": planes} if planes else more
+
+    @property
+    def _side(self) -> float:
+        """The side, 1 or -1, on which a level tripod's yaw is nearest to 0."""
+        normals = np.array([plane.normal for plane in self.planes])
+        arms = np.array([plane.platform_point for plane in self.planes]) @ np.array(self.frame)
+        k = np.array(self.axis)
+        weights = np.cross(np.roll(normals, -1, axis=0), np.roll(normals, -2, axis=0)) @ k
+        return float(np.copysign(1.0, -(weights * (np.cross(normals, arms) @ k)).sum()))
+
     def arms(self, points: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the way (..., k, 3) from P to platform points (k, 3), but for fixed offsets."""
         if self.slides:
             return np.asarray(poses[..., -1:, None] * (points @ np.array(self.frame)))
         return np.asarray(points @ self.at(poses)[1])
 
+    def turned(self, turn: Callable[[Vector], Vector]) -> Platform:
+        """Return the platform with every base-frame vector v replaced by `turn(v)`.
+
+        Of a 2R platform, whose frame is the base frame at angles zero, it is another frame that the
+        tool, the inertia and the platform points are in.
+        """
+        x, _, axis = self.frame
+        center = self.center and turn(self.center)
+        if self.second_axis is None:
+            return replace(self, axis=turn(axis), x_axis=turn(x), center=center)
+        assert isinstance(self.inertia, SpatialInertia)
+        return replace(
+            self,
+            axis=turn(self.axis),
+            second_axis=turn(self.second_axis),
+            center=center,
+            tool=turn(self.tool),
+            inertia=self.inertia.turned(np.array([turn(v) for v in self.frame]).T),
+        )
+
     @property
-    def joined(self) -> PlanarInertia:
+    def joined(self) -> PlanarInertia | SpatialInertia:
         """The platform's inertia with its bars and geared parts, as the equations take it.
 
         A bar counts as a point mass at its hinge; a gear of ratio n adds n^2 times the inertia.
         """
+        if isinstance(self.inertia, SpatialInertia):
+            return self.inertia
         mass, (hx, hy), inertia = self.inertia.mass, self.inertia.first_moment, self.inertia.inertia
         for bar in self.bars:
             x, y, _ = bar.hinge
@@ -244,6 +428,23 @@ class Platform:
         inertia += sum(part.ratio**2 * part.inertia for part in self.geared)
         return PlanarInertia(mass, (hx, hy), inertia)
 
-    def with_joined(self, inertia: PlanarInertia) -> Platform:
+    def with_joined(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
         """Return the same platform with this inertia, of which no part is told apart."""
         return replace(self, inertia=inertia, bars=(), geared=())
+
+
+@lru_cache(maxsize=64)
+def _placing(platform: Platform) -> ca.Function:
+    """Return P (3,) and the axes, as columns (3, 3), by pose, of a platform that tilts."""
+    points = [_column(held.platform_point) for held in platform.planes]
+    frame = [_column(axis) for axis in platform.frame]
+    still = [ca.SX(3, 1)] * len(points)
+    kind = equations_class(platform)
+    pose = ca.SX.sym("pose", len(kind.coordinates))
+    rest = ca.SX.zeros(len(kind.coordinates))
+    motion = kind(frame, points, still, platform.expressions()).motion(pose, rest, rest)
+    return ca.Function("placing", [pose], [motion.body.position, ca.vec(ca.densify(motion.axes))])
+
+
+def _column(values: Sequence[float]) -> ca.SX:
+    return ca.SX(ca.DM(list(values)))

@@ -5,7 +5,8 @@ A rack and a pinion turn the tool by phi as the halves slide. Nothing that the l
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import casadi as ca
 
@@ -35,6 +36,7 @@ class Sliding(PlatformEquations):
         frame: Sequence[Expression],
         platform_points: Sequence[Expression],
         fixed_offsets: Sequence[Expression],
+        more: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__(frame, platform_points, fixed_offsets)
         x0, y0, _ = frame

@@ -1,0 +1,74 @@
+"""The closure of legs with ball joints at their ends, under a platform that turns about any axis.
+
+While its joint is held each leg keeps its platform point on a sphere, or on a circle of a tripod's
+plane. The poses have no closed form; see `kinematics.assembly`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from operator import mul
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.closures.closure import Closure, against
+from pteron.closures.determinants import determinant
+from pteron.errors import ModelError
+from pteron.legs.leg import LegEquations
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
+
+
+class TiltingLoci(Closure):
+    """Two to six legs under a platform with several angles."""
+
+    closed_form = False
+
+    @classmethod
+    def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
+        return len(platform.angles()) > 1
+
+    @property
+    def modes(self) -> int:
+        """The most poses that joint coordinates may have: 40, or 8 where a point stays."""
+        if len(self.legs) == 6:
+            return 40
+        return 16 if "z" in self.platform.coordinates else 8
+
+    def poses(self, joints: Expression) -> Expression:
+        raise ModelError(
+            "direct_kinematics: these legs have no closed form of it under a platform that tilts; "
+            '"direct_step" follows the pose from one that is near'
+        )
+
+    def measure_of(
+        self,
+        platform: PlatformMotion,
+        rows: Sequence[Expression],
+        sizes: Sequence[Expression] | None = None,
+    ) -> Expression:
+        """Return the type-II measure, of the forces that legs and the platform's planes exert.
+
+        It is the determinant of their rows against (v, omega) of P, or omega where P stays, each a
+        unit force, over the most that so many forces on these points may have: with moments counted
+        by the root of a third of the sum of squares of the points' distances from their mean, or
+        from P.
+        """
+        held, size = self.platform.held_rows(platform), reduce(mul, sizes or [ca.SX(1)])
+        if held is None:
+            return determinant(against(platform, rows)) / (self._greatest(1) * size)
+        pairs = zip(rows, platform.point_twists, strict=True)
+        whole = ca.vertcat(*(ca.mtimes(row, twist) for row, twist in pairs), held)
+        return determinant(whole) / (self._greatest(2) * size)
+
+    def _greatest(self, forces: int) -> Expression:
+        """Return the greatest determinant of so many unit forces at each point.
+
+        By Fischer's inequality and that of the means.
+        """
+        points, centred = self.platform.points, "z" not in self.platform.coordinates
+        center = ca.SX(3, 1) if centred else sum(points) / len(points)
+        square = sum(ca.dot(s - center, s - center) for s in points)
+        turns = len(self.legs) if centred else 3
+        return (1.0 if centred else 2.0**1.5) * ca.sqrt(forces * square / turns) ** turns

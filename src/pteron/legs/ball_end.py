@@ -1,0 +1,73 @@
+"""A leg's end in a ball joint under a platform that tilts; planar legs end so in a tripod."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression, HeldPlane, RotationMotion
+from pteron.bodies.vectors import Vector
+from pteron.legs.cones import Cone, within_cone
+from pteron.legs.keys import Key
+from pteron.legs.leg import Joint, LegMotion, Passive
+
+UPRIGHT = Key(
+    "direction",
+    "d, of the revolute axes: the normal, across the platform's axis, of the plane that the leg "
+    "keeps its point in",
+)
+
+BALL_KEYS: dict[str, Key] = {
+    "platform_cone": Key(
+        "cone",
+        "how far the last link may lean at the platform; axis in the platform frame",
+        default=None,
+        example={"axis": [0.0, 0.0, -1.0], "angle": 0.8},
+    ),
+}
+
+
+def every_axis() -> tuple[Vector, ...]:
+    """Return the axes about which a ball joint lets the platform turn."""
+    return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@property  # type: ignore[misc]
+def held_plane(leg: Any) -> HeldPlane:
+    """The plane through the guide point in which a planar leg keeps its platform point."""
+    return HeldPlane(leg.d, leg.r)
+
+
+def ball_cone(
+    cone: Cone | None, motion: LegMotion, socket: Expression, length: float
+) -> list[Passive]:
+    """Return the lean of a leg's last link at the platform, against a cone."""
+    link = motion.links[1]
+    assert link is not None
+    return within_cone("link at the platform", cone, socket, -link, length)
+
+
+def ball_joint(
+    c: Expression,
+    rotation: RotationMotion,
+    row: Expression,
+    rate: Expression,
+    acceleration: Expression,
+) -> list[Joint]:
+    """Return the ball joint at c as hinges about the axes of the platform's turns.
+
+    `row` (3, 6), `rate` and `acceleration` (3, 1) are the angular velocity of the leg's last link,
+    against which the platform turns.
+    """
+    return [
+        Joint(
+            "R",
+            turn.axis,
+            c,
+            turn.row - ca.mtimes(turn.axis.T, row),
+            turn.rate - ca.dot(turn.axis, rate),
+            turn.acceleration - ca.dot(turn.axis, acceleration),
+        )
+        for turn in rotation.turns
+    ]

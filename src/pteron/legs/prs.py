@@ -1,0 +1,54 @@
+"""P-R-S legs, of tripods and spindle heads: a slider and a link in an upright plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pteron.bodies.motion import Expression
+from pteron.bodies.vectors import Vector
+from pteron.legs.ball_end import BALL_KEYS, UPRIGHT, ball_cone, every_axis, held_plane
+from pteron.legs.cones import Cone
+from pteron.legs.leg import LegMotion, Passive
+from pteron.legs.prr import PRR, PRREquations
+
+
+@dataclass(frozen=True)
+class PRS(PRR):
+    """A P-R-S leg, which keeps its platform point in the plane through r across `direction`.
+
+    It is a P-R-R leg (`PRR`, whose parameters it has) that ends in a ball joint.
+
+    Parameters
+    ----------
+    direction : unit vector
+        d, of the revolute axis on the slider: the normal of the leg's plane.
+    platform_cone : Cone, optional
+        Where the ball joint lets the link point, in the platform frame.
+    """
+
+    platform_cone: Cone | None = None
+
+    type = "PRS"
+    account = (
+        "A slider moves along e through the guide point r; its coordinate rho is zero there. A "
+        "link leads from a revolute joint about d on the slider to a ball joint at the platform "
+        "point s0, which it keeps in the plane across d."
+    )
+    keys: ClassVar = {**PRR.keys, "direction": UPRIGHT, **BALL_KEYS}
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return every_axis()
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        own = super().passive(motion, still, turned)
+        return [*own, *ball_cone(self.platform_cone, motion, turned, self.lower_length)]
+
+
+class PRSEquations(PRREquations):
+    """The equations of a P-R-S leg."""
+
+    holds = held_plane
+
+
+PRS.equations_class = PRSEquations

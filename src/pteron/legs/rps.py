@@ -1,0 +1,52 @@
+"""R-P-S legs, of tripods: a ram in an upright plane, with a ball joint at the platform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pteron.bodies.motion import Expression
+from pteron.bodies.vectors import Vector
+from pteron.legs.ball_end import BALL_KEYS, UPRIGHT, ball_cone, every_axis, held_plane
+from pteron.legs.cones import Cone
+from pteron.legs.leg import LegMotion, Passive
+from pteron.legs.rpr import RPR, RPREquations
+
+
+@dataclass(frozen=True)
+class RPS(RPR):
+    """An R-P-S leg, which keeps its platform point in the plane through r across `direction`.
+
+    It is an R-P-R leg (`RPR`, whose parameters it has) that ends in a ball joint.
+
+    Parameters
+    ----------
+    direction : unit vector
+        d, of the revolute axis at r: the normal of the leg's plane.
+    platform_cone : Cone, optional
+        Where the ball joint lets the ram point, in the platform frame.
+    """
+
+    platform_cone: Cone | None = None
+
+    type = "RPS"
+    account = (
+        "A ram leads from a revolute joint about d at the guide point r to a ball joint at the "
+        "platform point s0, which it keeps in the plane across d. Its coordinate rho is its length."
+    )
+    keys: ClassVar = {**RPR.keys, "direction": UPRIGHT, **BALL_KEYS}
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return every_axis()
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        return ball_cone(self.platform_cone, motion, turned, self.limits[1])
+
+
+class RPSEquations(RPREquations):
+    """The equations of an R-P-S leg."""
+
+    holds = held_plane
+
+
+RPS.equations_class = RPSEquations

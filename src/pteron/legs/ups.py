@@ -1,0 +1,294 @@
+"""U-P-S legs, the hexapod's: a ram between a universal joint on the base and a ball joint.
+
+The cylinder swings about the base joint, the piston ends at the platform point; both are rods, of
+which the spin about their axis has no inertia.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from random import Random
+from typing import ClassVar, NamedTuple, Self
+
+import casadi as ca
+
+from pteron.bodies.inertia import RodInertia
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    point_rows,
+)
+from pteron.bodies.vectors import Vector, dot
+from pteron.legs.circles import random_fraction, random_vector
+from pteron.legs.cones import Cone, within_cone
+from pteron.legs.drive import Drive
+from pteron.legs.keys import Condition, Key
+from pteron.legs.kind import LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Sphere, on_point
+from pteron.legs.rods import rod_body, universal_joints
+from pteron.legs.rpr import RAM, RAM_LIMITS, check_ram
+
+
+@dataclass(frozen=True)
+class UPS(LegKind):
+    """A U-P-S leg that carries one point of the platform.
+
+    Its joint coordinate is the length of the ram, from `guide_point` to the platform point.
+
+    Parameters
+    ----------
+    guide_point : vector
+        r, the universal joint on the base, m.
+    platform_point : vector
+        s0, from P to the platform point, in the platform frame, m.
+    upper : RodInertia
+        Inertia of the cylinder about the joint on the base, x towards the platform point.
+    lower : RodInertia
+        Inertia of the piston about the platform point, x pointing there from the base.
+    limits : (float, float)
+        Least and greatest length, m; above 0.
+    elbow : {1}
+        A ram has but one branch.
+    fixed_offset : vector
+        t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
+    direction : unit vector, optional
+        Of the base joint's first axis: for reactions and drawings, forces do not depend on it. By
+        default that axis of the base plate across which the leg leans more.
+    base_cone, platform_cone : Cone, optional
+        Where the joints at its ends let it point: at the base in the base frame, at the platform in
+        the platform's.
+    screw_lead : float, optional
+        m a turn, of a screw that turns where the piston spins about its axis. The ball joint leaves
+        that spin free, so that lengths are told as if there were none.
+    """
+
+    guide_point: Vector
+    platform_point: Vector
+    upper: RodInertia
+    lower: RodInertia
+    limits: tuple[float, float]
+    elbow: int = 1
+    fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
+    direction: Vector | None = None
+    base_cone: Cone | None = None
+    platform_cone: Cone | None = None
+    screw_lead: float | None = None
+
+    type = "UPS"
+    joint = RAM
+    branches = (1,)
+    names: ClassVar = {"u": "cylinder", "l": "piston"}
+    measure_text = "1 everywhere, as a ram pushes the platform point in every pose"
+    account = (
+        "A ram leads from a universal joint at the guide point r to a ball joint at the platform "
+        "point s0. Its coordinate rho is its length."
+    )
+
+    keys: ClassVar = {
+        "guide_point": Key("point", "r, the universal joint on the base, m"),
+        "direction": Key(
+            "direction",
+            "of the base joint's first axis: forces do not depend on it",
+            default=None,
+            example=[1.0, 0.0, 0.0],
+        ),
+        "elbow": Key("sign", "1: a ram has but one branch", default=1),
+        "limits": RAM_LIMITS,
+        "base_cone": Key(
+            "cone",
+            "how far it may lean at the base; axis in the base frame",
+            default=None,
+            example={"axis": [0.0, 0.0, 1.0], "angle": 0.8},
+        ),
+        "platform_cone": Key(
+            "cone",
+            "how far it may lean at the platform; axis in the platform frame",
+            default=None,
+            example={"axis": [0.0, 0.0, -1.0], "angle": 0.8},
+        ),
+        "screw_lead": Key(
+            "length",
+            "m a turn, of a screw that turns where the piston spins about its axis",
+            default=None,
+            example=0.005,
+        ),
+        "upper": Key("rod", "the cylinder: origin at guide_point, x to the platform point", "u"),
+        "lower": Key(
+            "rod", "the piston: origin at the platform point, x from the base to there", "l"
+        ),
+    }
+
+    conditions = (Condition(("limits",), check_ram),)
+
+    def under(self, frame: Sequence[Vector]) -> Self:
+        if self.direction is not None:
+            return self
+        way = [a - b for a, b in zip(self.platform_point, self.guide_point, strict=True)]
+        x, y, _ = frame
+        leans = abs(dot(x, (way[0], way[1], way[2]))) > abs(dot(y, (way[0], way[1], way[2])))
+        return replace(self, direction=y if leans else x)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        assert self.direction is not None  # the manipulator has given it
+        return (
+            Quantity("guide_point", "point", self.guide_point),
+            Quantity("direction", "normal", self.direction),
+            Quantity("elbow", "sign", (self.elbow,)),
+        )
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+    @property
+    def size(self) -> float:
+        return self.limits[1]
+
+    @property
+    def reach_bound(self) -> ReachBound:
+        return ReachBound(self.guide_point, None, self.limits[1])
+
+    @property
+    def reach_text(self) -> str:
+        return "its ram has no length"
+
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        shortest = self.limits[0]
+        return {
+            "u": ("upper", 0.0, shortest, "the joint on the base and the shortest ram's end"),
+            "l": ("lower", -shortest, 0.0, "the shortest ram's beginning and the platform point"),
+        }
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        (_, way), length = motion.links, self.limits[1]
+        return [
+            *within_cone("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
+            *within_cone("ram at the platform", self.platform_cone, turned, -way, length),
+        ]
+
+    def rod_couple(self, motion: LegMotion) -> Expression:
+        return ca.SX(3, 1)
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        if self.screw_lead is not None:
+            yield (
+                f"screw_lead: a turn of the piston about its axis is {self.screw_lead:g} m of its "
+                "length, but the ball joint leaves that turn free: lengths are told as if it kept "
+                "still"
+            )
+
+    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+        return (
+            Transfer("the cylinder{} turns about a fixed point", {("m", "u"): (1, ())}),
+            Transfer(
+                "cylinder and piston{} turn alike", {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
+            ),
+        )
+
+    @classmethod
+    def closing(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> tuple[list[Fraction], int]:
+        """Draw the ram."""
+        return random_vector(abs(random_fraction(rng)), 3, rng), 1
+
+
+class _Ram(NamedTuple):
+    """The ram in motion: its length L and its direction n, to second order."""
+
+    length: Expression
+    rate: Expression
+    growth: Expression
+    n: Expression
+    dn: Expression
+    ddn: Expression
+    swing: Expression
+    """(3, 6): the row of n'."""
+
+
+class UPSEquations(LegEquations):
+    """The equations of a U-P-S leg: n along the ram, L its length."""
+
+    kinds: ClassVar = {"u": RodInertia.kinds, "l": RodInertia.kinds}
+    rides = ("l",)
+
+    def __init__(self, guide_point: Expression, direction: Expression, elbow: Expression) -> None:
+        self.r, self.d = guide_point, direction
+
+    def _ram(self, point: PointMotion) -> _Ram:
+        """Return the ram in motion.
+
+        L' = n.c' and L n' = c' - L' n; differentiated, L'' = n.c'' + L n'.n' and L n'' = c'' - L''
+        n - 2 L' n'.
+        """
+        w = point.position - self.r
+        length = ca.sqrt(ca.dot(w, w))
+        n = w / length
+        rate = ca.dot(n, point.velocity)
+        dn = (point.velocity - rate * n) / length
+        growth = ca.dot(n, point.acceleration) + length * ca.dot(dn, dn)
+        ddn = (point.acceleration - growth * n - 2 * rate * dn) / length
+        swing = point_rows((ca.SX.eye(3) - ca.mtimes(n, n.T)) / length)
+        return _Ram(length, rate, growth, n, dn, ddn, swing)
+
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        at = self._ram(point)
+        row, one = point_rows(at.n.T), ca.SX(1)
+        turning = ca.mtimes(ca.skew(at.n), at.swing)
+        still = self.r, ca.SX(3, 6), ca.SX(3, 1)
+        bodies = {
+            "u": BodyMotion(*still, ca.SX.eye(3), turning, at.n, ddx=at.ddn),
+            "l": rod_body(point, at.n, at.ddn, at.swing),
+        }
+        directions = at.n, at.dn, at.ddn
+        joints = universal_joints(self.d, self.r, point, at.swing, directions, rotation, body="u")
+        ram = Joint("P", at.n, self.r, row, at.rate, at.growth, "l", driven=True)
+        chain = (*joints[:2], ram, *joints[2:])
+        links = None, point.position - self.r
+        return LegMotion(
+            at.length, at.rate, at.growth, row, one, bodies, chain, links, row_size=one
+        )
+
+    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+        at = self._ram(point)
+        return {"w": point.position - self.r, "length": at.length, "n": at.n, "dn": at.dn}
+
+    def reach(self, c: Expression) -> Reach:
+        w = c - self.r
+        square = ca.dot(w, w)
+        length = ca.sqrt(square)
+        return Reach(length, square, square, length)
+
+    def locus(self, q: Expression) -> Sphere:
+        return Sphere(self.r, q)
+
+    def needs(
+        self,
+        point: PointMotion,
+        rotation: RotationMotion,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return the forces that cylinder and piston need: all of them at the platform point.
+
+        With P_n = 1 - n n^T, beside the mass that rides: m gamma_l n'' + P_n ((I_u + I_l) n'' - m
+        gamma_u g + m gamma_l (c'' - g)) / L.
+        """
+        at, upper, lower = self._ram(point), inertia["u"], inertia["l"]
+        across = ca.mtimes(at.ddn, upper.i + lower.i) - ca.mtimes(gravity, upper.hx)
+        across += ca.mtimes(point.acceleration - gravity, lower.hx)
+        across = (across - ca.mtimes(at.n, ca.mtimes(at.n.T, across))) / at.length
+        force = ca.mtimes(at.ddn, lower.hx) + across
+        return Needs(ca.SX(1, force.shape[1]), on_point(force), lower.m)
+
+
+UPS.equations_class = UPSEquations
