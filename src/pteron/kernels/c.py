@@ -4,7 +4,7 @@ Through Numba or ctypes a call costs more than the arithmetic: boxing one array 
 So the module takes NumPy's arrays itself. A batch is computed in blocks held as structures of
 arrays, one state a vector lane. Products and sums are not contracted to fused operations: it costs
 nothing measurable here (17.5 against 16.8 ns a state without the sines), and every float64 target
-then returns the same bits, whatever the size of the batch.
+but JAX then returns the same bits, whatever the size of the batch.
 """
 
 from __future__ import annotations

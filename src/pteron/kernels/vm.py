@@ -93,7 +93,7 @@ class _OneState:
 
 @lru_cache(maxsize=256)
 def _lowered(function: ca.Function) -> ca.Function:
-    """Return the function with the sines and cosines that every target has."""
+    """Return the function with the sines and cosines of `sincos`."""
     entries = [symbol.nonzeros() for symbol in function.sx_in()]
 
     def rule(node: Node, arguments: list[Expression]) -> Expression:
