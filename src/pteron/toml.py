@@ -1,6 +1,8 @@
 """TOML files, read and checked against pydantic models; one message lists a file's faults.
 
-A file that could exhaust memory or time (huge, deeply nested, keys of very many parts) is refused.
+`read_toml` returns a file's content, `validated` makes an object of it, `table_keys` has the keys
+that it may have. A file that could exhaust memory or time (huge, deeply nested, keys of very many
+parts) is refused.
 """
 
 from __future__ import annotations

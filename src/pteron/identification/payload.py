@@ -34,6 +34,7 @@ from pteron.reduction import BaseParameters
 from pteron.renamed import former_attribute
 
 _NAMES = tuple(f"{name}_L" for name in PLATFORM_KINDS)
+"""Names of the payload's values: m_L, mgx_L, mgy_L, I_L."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ class Payload:
             lines.append("The stated errors do not allow for that.")
         lines += [f"Note: {one.message}" for one in self.findings]
         left = ", ".join(f"{value:.2g}" for value in self.residual)
-        lines.append(f"Left of the actuator forces: {left} (N, at a crank N m).")
+        lines.append(f"Residuals of the actuator forces: {left} (standard deviations, N or N m).")
         return "\n".join(lines)
 
     def _opinion(self) -> str:

@@ -21,7 +21,8 @@ Method = Literal["rk4", "dop853"]
 """Runge and Kutta's method with fixed steps, or SciPy's DOP853, which chooses its steps."""
 
 _STABLE = 2.0
-"""Runge and Kutta's method of fourth order is stable up to a decay of 2.78 within a step."""
+"""Greatest decay within a step, for stability: Runge and Kutta's method of fourth order is stable
+up to 2.78."""
 
 _SHORTEST = 1e-8
 """Steps shorter than this, s, point to a mistake in the drives' numbers."""
