@@ -21,7 +21,7 @@ _POSES = 32
 
 
 class EnvironmentPicture:
-    """Draws one machine: its guides are the same in every picture."""
+    """The picture of one machine, drawn anew for each state: its guides are the same in all."""
 
     def __init__(self, world: World) -> None:
         self._world = world

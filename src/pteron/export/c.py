@@ -1,4 +1,4 @@
-"""C99 for a controller: one header and one source, with a test program and a CMakeLists.txt.
+"""Export of C99 for a controller: a header and a source, with a test program and a CMakeLists.txt.
 
 No allocation, no static state, one exit a function, nothing but math.h. Comparisons are those of
 C99's macros, which are quiet for NaN: a plain `<` sets off the trap for invalid operations.

@@ -1,4 +1,4 @@
-"""CasADi functions of a machine, for optimal control: serialised, with a module that loads them."""
+"""Export of CasADi functions for optimal control: serialised, with a module that loads them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An FMU of FMI 3.0: a machine with its drives, for model exchange and co-simulation.
+"""Export of an FMU of FMI 3.0: a machine with its drives, for model exchange and co-simulation.
 
 The exported C is inside, with `fmu.c` around it, and compiled for the platform that writes it. That
 is done here and not by CasADi's DaeBuilder, which (3.8) writes model exchange alone, and which

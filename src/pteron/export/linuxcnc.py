@@ -1,4 +1,4 @@
-"""LinuxCNC's kinematics of a machine: a component around the exported C, with INI and HAL lines.
+"""Export of kinematics for LinuxCNC: a component around the exported C, with INI and HAL lines.
 
 The component has the three functions that LinuxCNC 2.8 and 2.9 ask of a kinematics module, and
 converts their millimetres and degrees. A machine whose joints are linear in x, y and z may use

@@ -1,4 +1,4 @@
-"""IEC 61131-3 Structured Text for a PLC: one function block a file, which never traps.
+"""Export of IEC 61131-3 Structured Text for a PLC: one function block a file, which never traps.
 
 Inputs beyond a range are refused before anything is computed; `guards` rules out the rest. Where a
 guard fails the outputs stay as they were.

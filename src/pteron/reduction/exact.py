@@ -1,4 +1,4 @@
-"""Method `exact`: the null space of the regressor by exact arithmetic, with a certificate.
+"""Method `exact` of `base_parameters`: a regressor's null space by exact arithmetic, certified.
 
 Null vectors are found modulo primes of 61 bits, lifted to fractions, and verified in fractions. So
 the rank is bounded from below by a minor that does not vanish, and from above by null vectors that

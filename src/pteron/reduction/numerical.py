@@ -1,4 +1,4 @@
-"""Methods `svd` and `qr`: the null space of a regressor at random states, in floating point."""
+"""Methods `svd` and `qr` of `base_parameters`: a regressor's null space, in floating point."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ length: rounding leaves 1e-14, what is identifiable at all 1e-6 and more. The ce
 the gap."""
 
 _STATES_PER_COLUMN = 4
+"""Random states at which the regressor is evaluated, for each of its columns."""
 
 _ACCELERATION = 9.81
 """m/s^2: that of the random motions, so that inertia weighs about as much as gravity."""

@@ -1,4 +1,4 @@
-"""MJCF, for MuJoCo: the whole closed machine, with its drives."""
+"""Export to MJCF, for MuJoCo: the whole machine, its loops closed, with its drives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pinocchio: the opened mechanism as a model, and the constraints that close its loops.
+"""Export to Pinocchio: the opened mechanism as a model, and the constraints that close its loops.
 
 Joints that are coupled to others are no part of Pinocchio's constrained dynamics. What a gear turns
 with the platform is therefore in the platform's inertia: the square of its ratio times its own.

@@ -1,4 +1,4 @@
-"""SDF, for Gazebo and others: the whole machine, its loops closed by ball joints."""
+"""Export to SDF, for Gazebo and others: the whole machine, its loops closed by ball joints."""
 
 from __future__ import annotations
 
