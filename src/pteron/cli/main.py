@@ -124,7 +124,7 @@ _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
 """The subcommands of each panel of the help."""
 
 _NUMERIC = (inverse, direct, forces, cycle)
-"""Those whose arguments may be negative numbers."""
+"""Subcommands whose arguments may be negative numbers."""
 
 _EXAMPLES = """\
 pteron catalog --json

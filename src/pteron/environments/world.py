@@ -1,4 +1,4 @@
-"""The dynamics of an environment, for many machines at once: starts, steps, rewards, ends."""
+"""The dynamics of a Gymnasium environment, for many machines at once: starts, steps, rewards."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ VARIABLE = "PTERON_CACHE"
 """Environment variable with another directory for compiled code."""
 
 _WORK = ".pteron-work-"
-"""Begins the name of a folder that is being built, or being removed."""
+"""Beginning of the name of a folder that is being built, or being removed."""
 
 _MANIFEST = "manifest.json"
 """The file of an entry that has the digests of the others."""

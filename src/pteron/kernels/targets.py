@@ -32,7 +32,7 @@ TARGETS: dict[str, type[Kernel]] = {
     "exact": Exact,
     "intervals": Boxed,
 }
-"""What executes a function, by name: CasADi's virtual machine, Numba, C, JAX, fractions,
+"""Executors of a function, by name: CasADi's virtual machine, Numba, C, JAX, fractions,
 intervals."""
 
 Grade = Literal["specialised", "parametric", "general"]

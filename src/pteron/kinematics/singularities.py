@@ -26,7 +26,7 @@ _DRAWN = 4096
 """Random poses among which the best type-II measure is sought."""
 
 _FOREMOST = 6
-"""How many of the best random poses are improved by a local search."""
+"""Random poses, the best ones, that are improved by a local search."""
 
 _TRIES = 200
 """Evaluations of the measure in each local search."""

@@ -1,4 +1,4 @@
-"""How a regressor's dependent columns join others: the grouping that gives the base parameters.
+"""The grouping of a regressor's columns that gives the base parameters.
 
 Every method of `base_parameters` returns one: the columns kept, and the shares of the others.
 """

@@ -15,7 +15,7 @@ from pteron.viewer.state import ViewerState
 from pteron.workspace import pose_margins
 
 Level = Literal["far", "near", "close"]
-"""How far a pose is from what ends the work."""
+"""Distance of a pose from what ends the machine's work."""
 
 _NEAR = 0.3
 """Margin, 1 at best, below which a pose is near what ends the work."""

@@ -40,8 +40,8 @@ _BESIDE = 0.1
 """Share of a pose's distance within which other poses count as its neighbours and are left out."""
 
 _LAST, _HITS = 128, 12
-"""Of the boxes left in the end so many are searched, the nearest and others spread over all; and so
-many poses found in them lead to quadratic programs."""
+"""Boxes searched of those left in the end, the nearest and as many spread over all; and poses found
+in them that lead to quadratic programs."""
 
 _STEPS = 30
 """Newton's steps, so many since they only halve the distance where a function does not change its

@@ -48,7 +48,7 @@ class Vanishing:
 
     @property
     def smooth(self) -> Smooth:
-        """It, as a function of pose and roots."""
+        """The function, of pose and roots."""
         return _smooth(self.robot, self.kind, self.leg)
 
     def absent(self, boxes: Array) -> NDArray[np.bool_]:

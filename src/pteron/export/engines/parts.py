@@ -1,4 +1,4 @@
-"""The parts of an opened mechanism: bodies on joints, and the points where its loops close.
+"""The parts of the opened mechanism, a tree: bodies on joints, and the points that close loops.
 
 Everything is in the base frame with the machine at its home pose, where every loop is closed: an
 engine's file may place its bodies there, or take their joints back to zero by `place`.
@@ -188,7 +188,7 @@ class Tree:
 
     @property
     def free(self) -> tuple[TreeJoint, ...]:
-        """Those that are coupled to no other."""
+        """Joints that are coupled to no other."""
         return tuple(joint for joint in self.joints if joint.follows is None)
 
 

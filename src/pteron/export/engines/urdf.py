@@ -1,4 +1,4 @@
-"""URDF of the opened mechanism, and a file beside it (YAML) that says how its loops close."""
+"""Export to URDF: the opened mechanism, and a YAML file beside it that says how its loops close."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ Contents = Literal["all", "joints", "poses"]
 """Contents of a file beside time: everything, the joint coordinates, or the poses."""
 
 _PER_UNIT: dict[str, float] = {**PER_SECOND, "mm": 1e3, "um": 1e6, "deg": 180.0 / math.pi}
-"""How many of a unit make one SI unit."""
+"""Units by name, each with the number that makes one SI unit."""
 
 _MOST_SAMPLES = 10_000_000
 """Samples that a file may have."""

@@ -1,4 +1,4 @@
-"""Which columns of a file hold which part of a log, and in which units.
+"""The columns of a file that hold the parts of a log, and their units.
 
 Columns are those declared in the description, else the documented ones, else those whose names say
 what they hold.
