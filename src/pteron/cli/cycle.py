@@ -39,7 +39,9 @@ _way, _time, _limit = (partial(option, rich_help_panel=p) for p in ("Way", "Time
 """Makers of options, one for each section of the help."""
 
 _pose = partial(_way, metavar="POSE", show_default=False)
+
 _numbers = partial(_limit, metavar="NUMBERS")
+"""Makers, here and above, of options with a number for each joint, or a pose."""
 
 
 def cycle(

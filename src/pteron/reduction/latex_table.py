@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 _NEEDS = r"% In the preamble: \usepackage{amsmath, booktabs}"
+"""The comment above a table: the packages that it needs."""
 
 _LONGEST = 55
 """Printed letters of a sum that stand in a line; the next term begins another."""
@@ -14,6 +15,7 @@ _SPECIAL = {letter: rf"\{letter}" for letter in "&%$#_{}"} | {
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
 }
+"""Letters that mean something in LaTeX, and how they are written."""
 
 
 def latex_table(

@@ -32,6 +32,7 @@ _ARRAYS = ("time", "joints", "forces", "pose", "payload")
 """Fields of a log with a row for each sample."""
 
 _Phases = Int[np.ndarray, "*batch"]
+"""Whole numbers, one a row."""
 
 
 Kind = Literal[
