@@ -15,9 +15,8 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import plain_rows
+from pteron.closures.closure import against, plain_rows
 from pteron.closures.determinants import adjugate
-from pteron.equations import kinematics
 from pteron.equations.machine import Machine, State
 from pteron.equations.singular_values import largest, singular_values, smallest
 
@@ -30,26 +29,28 @@ class Homogeneous(NamedTuple):
 
 
 def lever_arms(machine: Machine, state: State) -> list[Expression]:
-    """Return k x s (3, 1) of the platform points that legs hold: how they move per radian."""
-    (angle,) = machine.platform.angles()
+    """Return the velocities (3, k) of the platform points that legs hold, per unit of each turn."""
+    lengths = _lengths_of(machine)
     pairs = zip(state.legs, state.platform.matrices, strict=True)
-    return [matrix[:3, angle] for leg, matrix in pairs if leg.pushes]
+    return [matrix[:3, lengths:] for leg, matrix in pairs if leg.pushes]
 
 
 def homogeneous(machine: Machine, state: State) -> Homogeneous:
-    """Return J with a crank's row times its length and the angle's column over the length L.
+    """Return J with a crank's row times its length and the turns' columns over the length L.
 
     L is the root mean square distance of the platform points, as far as they turn, from the axis
-    through P; 1 m where none of them does. The joint of a leg that follows the angle counts as that
-    angle times L: its gear does not count.
+    through P, or from all such axes; 1 m where none of them does. The joint of a leg that follows
+    the angle counts as that angle times L: its gear does not count. Where the platform tilts the
+    turns are those about the base frame's axes, or of a tripod roll and pitch.
     """
     if not machine.platform.angles():
-        return Homogeneous(_measured(machine, kinematics.jacobian(state), ca.SX(1)), ca.SX(1))
+        return Homogeneous(_measured(machine, _jacobian(state), ca.SX(1)), ca.SX(1))
     arms = lever_arms(machine, state)
-    length = _root_or_one(sum(ca.dot(arm, arm) for arm in arms) / len(arms))
-    rows = _measured(machine, kinematics.jacobian(state), length)
-    rows[:, -1] = rows[:, -1] / length
-    return Homogeneous(rows, length)
+    square = sum(ca.sumsqr(arm) for arm in arms) / (len(arms) * arms[0].shape[1])
+    length = _root_or_one(square)
+    rows = _measured(machine, _jacobian(state), length)
+    lengths = _lengths_of(machine)
+    return Homogeneous(ca.horzcat(rows[:, :lengths], rows[:, lengths:] / length), length)
 
 
 def by_points(machine: Machine, state: State) -> Expression:
@@ -60,16 +61,40 @@ def by_points(machine: Machine, state: State) -> Expression:
     """
     if not machine.platform.angles():
         return homogeneous(machine, state).matrix
+    if machine.robot.platform.tilts:
+        return _by_points_in_space(machine, state)
     first, *_ = arms = lever_arms(machine, state)
     # From the first one, so that points that coincide do so to the last bit.
     offset = sum(arm - first for arm in arms) / len(arms)
     apart = [arm - first - offset for arm in arms]
     length = _root_or_one(sum(ca.dot(arm, arm) for arm in apart) / len(arms))
-    rows = _measured(machine, kinematics.jacobian(state), length)
+    rows = _measured(machine, _jacobian(state), length)
     # What the turning about the centroid asks of the joints.
     moved = ca.mtimes(rows[:, :-1], ca.mtimes(machine.platform.directions.T, first + offset))
     rows[:, -1] = (rows[:, -1] - moved) / length
     return rows
+
+
+def _by_points_in_space(machine: Machine, state: State) -> Expression:
+    moved = [matrix[:3, :] for matrix in state.platform.matrices]
+    lower = _root(sum(ca.mtimes(one.T, one) for one in moved) / len(moved))
+    rows = _measured(machine, _jacobian(state), ca.SX(1))
+    found: list[Expression] = []  # X lower^T = rows, by columns
+    for k in range(rows.shape[1]):
+        known = sum(
+            (lower[k, j] * column for j, column in enumerate(found)), ca.SX(rows.shape[0], 1)
+        )
+        found.append((rows[:, k] - known) / lower[k, k])
+    return ca.horzcat(*found)
+
+
+def _jacobian(state: State) -> Expression:
+    """Return J (n, m) against the platform's quasi-velocities."""
+    return against(state.platform, [leg.row / leg.divisor for leg in state.legs])
+
+
+def _lengths_of(machine: Machine) -> int:
+    return int(machine.platform.directions.shape[1])
 
 
 def _measured(machine: Machine, jacobian: Expression, length: Expression) -> Expression:
@@ -115,9 +140,9 @@ def speed_most(machine: Machine, state: State) -> Expression:
 
 
 def turning_speed(machine: Machine, state: State) -> Expression:
-    """Return phi' at |q'| = 1 while P rests, rad/s per m/s."""
+    """Return the turning speed at |q'| = 1 while P rests, rad/s per m/s, about the worst axis."""
     rows, length = homogeneous(machine, state)
-    return 1 / (length * ca.norm_2(rows[:, -1]))
+    return 1 / (length * largest(singular_values(_turns(machine, rows))))
 
 
 def force_least(machine: Machine, state: State) -> Expression:
@@ -133,10 +158,10 @@ def force_most(machine: Machine, state: State) -> Expression:
 
 
 def turning_moment(machine: Machine, state: State) -> Expression:
-    """Return the moment about k held at |F| = 1 without a force at P, N m per N."""
+    """Return the moment held at |F| = 1 without a force at P, N m per N, about the worst axis."""
     rows, length = homogeneous(machine, state)
     across, volume = _inverse(rows)
-    return length * ca.fabs(volume) / ca.norm_2(across[-1, :])
+    return length * ca.fabs(volume) / largest(singular_values(_turns(machine, across.T)))
 
 
 def error(machine: Machine, state: State) -> Expression:
@@ -152,17 +177,17 @@ def error_worst(machine: Machine, state: State) -> Expression:
 
 
 def turning_error(machine: Machine, state: State) -> Expression:
-    """Return the same of the platform's angle, rad/m: the errors add up as squares."""
+    """Return the same of the platform's turning, rad/m: the errors add up as squares."""
     rows, length = homogeneous(machine, state)
     across, volume = _inverse(rows)
-    return ca.norm_2(across[-1, :].T) / (length * ca.fabs(volume))
+    return ca.norm_fro(_turns(machine, across.T)) / (length * ca.fabs(volume))
 
 
 def turning_error_worst(machine: Machine, state: State) -> Expression:
-    """Return the same of the platform's angle, rad/m, where the errors conspire."""
+    """Return the same of the platform's turning, rad/m, where the errors conspire."""
     rows, length = homogeneous(machine, state)
     across, volume = _inverse(rows)
-    return ca.sum2(ca.fabs(across[-1, :])) / (length * ca.fabs(volume))
+    return _conspiring(_turns(machine, across.T).T) / (length * ca.fabs(volume))
 
 
 def _conspiring(columns: Expression) -> Expression:
@@ -177,7 +202,12 @@ def _conspiring(columns: Expression) -> Expression:
 
 def _lengths(machine: Machine, rows: Expression) -> Expression:
     """Return the columns of the pose's lengths."""
-    return rows[:, : machine.platform.directions.shape[1]]
+    return rows[:, : _lengths_of(machine)]
+
+
+def _turns(machine: Machine, rows: Expression) -> Expression:
+    """Return the columns of the platform's turns."""
+    return rows[:, _lengths_of(machine) :]
 
 
 def _inverse(rows: Expression) -> tuple[Expression, Expression]:
@@ -228,7 +258,8 @@ def kappa(machine: Machine, state: State, mass: Expression) -> Expression:
     """Return the condition number of the mass matrix, turning measured by L as in the Jacobian."""
     counts = ca.SX.ones(machine.freedom)
     if machine.platform.angles():
-        counts[-1] = homogeneous(machine, state).length
+        counts[_lengths_of(machine) :] = homogeneous(machine, state).length
+        mass = state.platform.quasi_forces(state.platform.quasi_forces(mass).T)
     values = singular_values(_root(mass / ca.mtimes(counts, counts.T)))
     ratio = largest(values) / smallest(values)
     return ratio * ratio

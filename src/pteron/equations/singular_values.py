@@ -18,7 +18,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 
-_SWEEPS = {1: 0, 2: 1, 3: 4, 4: 5}
+_SWEEPS = {0: 0, 1: 0, 2: 1, 3: 4, 4: 5, 5: 6, 6: 6}
 """Sweeps, by the number of columns, that bring random and graded matrices to rounding."""
 
 _TINY = 1e-300

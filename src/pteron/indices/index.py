@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pteron.errors import DataError, ModelError
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,8 @@ class Index:
         The values that are good.
     turning : bool
         Whether it is about the platform's turning, so that a machine must have an angle.
+    moving : bool
+        Whether it is about its translation, so that the pose must have lengths.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Index:
     unit: str
     better: Literal["more", "less"]
     turning: bool = False
+    moving: bool = True
 
     @property
     def label(self) -> str:
@@ -57,6 +60,7 @@ _LISTED = (
         "4-17; J. Angeles, the same 11(3) (1992) 196-201 (characteristic length)",
         "",
         "less",
+        moving=False,
     ),
     Index(
         "condition_points",
@@ -66,6 +70,7 @@ _LISTED = (
         "J. Ryu, IEEE Transactions on Robotics and Automation 19 (2003) 731-736",
         "",
         "less",
+        moving=False,
     ),
     Index(
         "manipulability",
@@ -74,6 +79,7 @@ _LISTED = (
         _YOSHIKAWA,
         "",
         "more",
+        moving=False,
     ),
     Index(
         "speed_least",
@@ -99,6 +105,7 @@ _LISTED = (
         "rad/s per m/s",
         "more",
         turning=True,
+        moving=False,
     ),
     Index(
         "force_least",
@@ -124,6 +131,7 @@ _LISTED = (
         "N m per N",
         "more",
         turning=True,
+        moving=False,
     ),
     Index(
         "pressure_angle",
@@ -133,6 +141,7 @@ _LISTED = (
         "transmission index is its cosine",
         "rad",
         "less",
+        moving=False,
     ),
     Index(
         "output_pressure_angle",
@@ -141,6 +150,7 @@ _LISTED = (
         "the same: the output transmission index is its cosine",
         "rad",
         "less",
+        moving=False,
     ),
     Index(
         "error",
@@ -166,6 +176,7 @@ _LISTED = (
         "rad per m",
         "less",
         turning=True,
+        moving=False,
     ),
     Index(
         "turning_error_worst",
@@ -175,6 +186,7 @@ _LISTED = (
         "rad per m",
         "less",
         turning=True,
+        moving=False,
     ),
     Index(
         "kappa",
@@ -184,6 +196,7 @@ _LISTED = (
         "(generalized inertia ellipsoid)",
         "",
         "less",
+        moving=False,
     ),
 )
 
@@ -192,7 +205,7 @@ INDICES: dict[str, Index] = {index.name: index for index in _LISTED}
 
 
 def indices_of(robot: RobotLike) -> tuple[str, ...]:
-    """Return the names of the indices that a machine has: those of turning only if it turns.
+    """Return the names of the indices that a machine has: those of what its platform does.
 
     Parameters
     ----------
@@ -210,7 +223,16 @@ def indices_of(robot: RobotLike) -> tuple[str, ...]:
     (False, True)
     """
     robot = as_manipulator(robot)
-    return tuple(i.name for i in _LISTED if robot.platform.angles or not i.turning)
+    return tuple(i.name for i in _LISTED if not _lacking(robot, i))
+
+
+def _lacking(robot: Manipulator, index: Index) -> str:
+    """Return what of an index a platform does not do; nothing where it has the index."""
+    if index.turning and not robot.platform.angles:
+        return "turning, but this {} platform does not turn"
+    if index.moving and not robot.platform.lengths:
+        return "translation, but this {} platform only turns"
+    return ""
 
 
 def expect_index(robot: RobotLike, name: str) -> Index:
@@ -219,10 +241,10 @@ def expect_index(robot: RobotLike, name: str) -> Index:
     if name not in INDICES:
         raise DataError(f"index: {name!r} is not known; choose from {', '.join(INDICES)}")
     index = INDICES[name]
-    if index.turning and not robot.platform.angles:
+    if lacking := _lacking(robot, index):
         raise ModelError(
-            f"index: {name!r} is about turning, but this {robot.platform.motion} platform does not "
-            f"turn; choose from {', '.join(indices_of(robot))}",
+            f"index: {name!r} is about {lacking.format(robot.platform.motion)}; choose from "
+            f"{', '.join(indices_of(robot))}",
             subject=robot.name,
         )
     return index

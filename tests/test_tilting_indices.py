@@ -1,0 +1,77 @@
+"""Indices of machines whose platforms tilt, against linear algebra on Jacobians by differences."""
+
+import numpy as np
+import pytest
+import tilting
+from mechanisms import NIGHTLY
+
+import pteron
+from pteron.indices import evaluate, indices_of
+
+CASES = [("1T2R", ("RPS", "PRS", "RRS")), pytest.param("3T3R", ("UPS",), marks=NIGHTLY)]
+CASES += [("2R", ("UPS", "PSS", "RSS")), ("3R", ("UPS", "PSS", "RSS"))]
+
+
+def twists(robot, pose):
+    """Return d(v, omega) / d x' (6, m), by differences of P and of the axes."""
+    columns, step = [], 1e-5
+    for way in np.eye(len(pose)):
+        (p1, r1), (p0, r0) = (robot.platform.at(pose + side * step * way) for side in (1, -1))
+        turn = r1.T @ r0 / (4 * step)  # R(t) R(-t)^T, axes being rows
+        spin = [turn[i - 1, i - 2] - turn[i - 2, i - 1] for i in range(3)]
+        columns.append([*(p1 - p0) / (2 * step), *spin])
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize(("motion", "kinds"), CASES)
+def test_indices_are_those_of_the_homogeneous_jacobian(motion, kinds):
+    robot, home = tilting.machine(motion, kinds, 3)
+    poses = tilting.states(robot, home, 3)[0]
+    found = {name: evaluate(robot, name, poses) for name in indices_of(robot)}
+    assert ("speed_least" in found) == bool(robot.platform.lengths)
+    levers = np.array([leg.lever for leg in robot.legs])
+    for k, pose in enumerate(poses):
+        twist, axes = twists(robot, pose), robot.platform.at(pose)[1]
+        # Along which the index counts: the twist, omega, or the pose's own coordinates.
+        basis = twist if motion in ("1T2R", "2R") else np.eye(6)[:, -len(pose) :]
+        quasi = np.linalg.lstsq(basis, twist, rcond=None)[0]
+        rows = levers[:, None] * pteron.jacobian(robot, pose) @ np.linalg.inv(quasi)
+        lengths = len(robot.platform.lengths)
+        points = [
+            basis[:3] - np.cross(np.array(leg.platform_point) @ axes, basis[3:], axisb=0).T
+            for leg in robot.legs
+        ]
+        square = np.mean([(one[:, lengths:] ** 2).sum(0).mean() for one in points])
+        length = np.sqrt(square)
+        rows[:, lengths:] /= length
+        inverse = np.linalg.inv(rows)
+        turning = {
+            "condition": np.linalg.cond(rows),
+            "manipulability": 1 / abs(np.linalg.det(rows)),
+            "turning_speed": 1 / (length * np.linalg.norm(rows[:, lengths:], 2)),
+            "turning_moment": length / np.linalg.norm(inverse[lengths:], 2),
+            "turning_error": np.linalg.norm(inverse[lengths:]) / length,
+        }
+        moving = lengths and {
+            "speed_least": 1 / np.linalg.norm(rows[:, :lengths], 2),
+            "force_least": 1 / np.linalg.norm(inverse[:lengths], 2),
+            "error": np.linalg.norm(inverse[:lengths]),
+        }
+        for name, value in (turning | (moving or {})).items():
+            assert found[name][k] == pytest.approx(value, rel=1e-6), name
+
+
+@pytest.mark.parametrize("shape", [(6, 6), (6, 5), (6, 3)])
+def test_singular_values_of_six_columns(shape):
+    import casadi as ca
+
+    from pteron.equations.singular_values import singular_values
+
+    matrix = ca.SX.sym("m", *shape)
+    values = ca.Function("values", [matrix], [ca.vertcat(*singular_values(matrix))])
+    rng = np.random.default_rng(0)
+    for graded in (0.0, 2.0):
+        for _ in range(20):
+            one = rng.normal(size=shape) * 10.0 ** rng.uniform(-graded, graded, shape[1])
+            found = np.sort(np.asarray(values(one)).ravel())[::-1]
+            np.testing.assert_allclose(found, np.linalg.svd(one)[1], rtol=1e-11)
