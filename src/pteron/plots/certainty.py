@@ -1,4 +1,8 @@
-"""Pictures of an identification's certainty: residuals' noise, parameters' errors, correlations."""
+"""Pictures of how certain an identification is: its residuals, and its parameters' significance.
+
+Residuals: their distribution beside the normal one, and their correlation in time beside that of
+white noise. Parameters: each over its standard deviation, and their correlations.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Axes of pictures in space, on which nearer things hide those farther away."""
+"""Axes of pictures in space, seen from any side: nearer things hide those farther away."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pteron.plots.canvas import GRID
 from pteron.plots.machine_axes import MachineAxes
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
-"""Degrees, from which the machine is seen."""
+"""Degrees, from which the machine is seen at first: `turn` walks round it."""
 
 _MARGIN = 0.04
 """Margin on each side, as a share of the figure."""

@@ -1,4 +1,4 @@
-"""The reduced model: forces from base parameters alone."""
+"""The reduced model: the regressor whose product with base parameters is the actuator forces."""
 
 from __future__ import annotations
 

@@ -17,10 +17,10 @@ _SLOW = 5.0
 hundreds."""
 
 _SMOOTH = 0.1
-"""Greatest `rest_speed`, within which dry friction changes its sign smoothly, over the greatest
-speed."""
+"""Greatest usual `rest_speed`, the speed within which dry friction changes its sign smoothly, as a
+share of the drive's greatest speed."""
 
-_APART = 20.0
+_PEAK = 20.0
 """Greatest ratio of a drive's peak to its rated force, or the inverse: servo drives have 2 to 5."""
 
 _HEAVY = 100.0
@@ -53,7 +53,7 @@ def drive_warnings(leg: LegKind) -> Iterator[str]:
             f"{rated:.3g} {unit}: are ratio and rated_torque at the motor, in rad/{leg.joint.unit} "
             "and N m?"
         )
-    if rated is not None and most is not None and not 1.0 / _APART <= most / rated <= _APART:
+    if rated is not None and most is not None and not 1.0 / _PEAK <= most / rated <= _PEAK:
         yield (
             f"drive: max_force is {most / rated:.2g} times what rated_torque gives at the joint, "
             f"{rated:.3g} {unit}: is the ratio in rad/{leg.joint.unit}?"
