@@ -281,7 +281,7 @@ def test_without_a_closed_form_there_is_the_step(tmp_path):
 
 @pytest.mark.parametrize("target", ["vm", "c"])
 @pytest.mark.parametrize(
-    "kinds", gated(["RRRR", "RPPP", "CCC", "RRRU", "PPPP", "RRR"], ["CCC", "RRRU", "RRR"])
+    "kinds", gated(["RRRR", "RPPP", "CCC", "RRRU", "PPPP", "RRR"], ["CCC", "RRRU"])
 )
 def test_a_step_from_a_pose_that_is_near(kinds, target):
     robot = random_machine(0, kinds)
@@ -371,7 +371,13 @@ def test_the_leg_that_a_step_bends_the_other_way_is_named():
     assert bent == 0.0
 
 
-@pytest.mark.parametrize("name", ["par4", "h4", "3-rrr", "3-prr", "delta", "five-bar", "delta-4"])
+@pytest.mark.parametrize(
+    "name",
+    gated(
+        ["par4", "h4", "3-rrr", "3-prr", "delta", "five-bar", "delta-4"],
+        ["h4", "3-rrr", "delta", "five-bar", "delta-4"],
+    ),
+)
 def test_a_motion_is_followed_through_home(name):
     """At home all joints are equal, or nearly, and the tips in a plane."""
     robot = pteron.load(name)

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanisms import CLIENTS
 
 FOLDER = Path(__file__).parent.parent / "benchmarks" / "identification"
 
 
+@CLIENTS
 def test_exported_code_of_what_was_identified_runs_the_machine(tmp_path):
     """Excite, record, identify, export, compile, and follow a cycle that was held out."""
     pytest.importorskip("mujoco")

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from controlled import controlled
-from mechanisms import CATALOG, random_machine, relative_error, states
+from mechanisms import CATALOG, gated, random_machine, relative_error, states
 
 import pteron
 from pteron.controllers import (
@@ -251,7 +251,10 @@ def wrong(robot, seed, share=0.2):
     return pteron.with_parameters(robot, values)
 
 
-@pytest.mark.parametrize("name", [name for name in MACHINES if not name.startswith("random")])
+@pytest.mark.parametrize(
+    "name",
+    gated([name for name in MACHINES if not name.startswith("random")], ["five-bar", "delta"]),
+)
 def test_adaptive_control_learns_what_the_cycle_shows(name):
     """Errors fall ten times within six cycles, where all bodies are off by 20 %."""
     robot, motion = MACHINES[name], cycle(name)

@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from mechanisms import CATALOG, MECHANISMS, random_machine
+from mechanisms import CATALOG, MECHANISMS, NIGHTLY, random_machine
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
 from PIL import Image
 from scipy.spatial.transform import Rotation
@@ -336,7 +336,13 @@ def test_singular_orientations_are_marked():
 
 
 @pytest.mark.parametrize(
-    ("name", "plane"), [("delta-4", "xz"), ("h4", "yz"), ("quadrupteron", "xy"), ("3-rrr", "xy")]
+    ("name", "plane"),
+    [
+        ("delta-4", "xz"),
+        pytest.param("h4", "yz", marks=NIGHTLY),
+        pytest.param("quadrupteron", "xy", marks=NIGHTLY),
+        ("3-rrr", "xy"),
+    ],
 )
 def test_a_map_of_the_reach_has_no_gaps(name, plane):
     robot = CATALOG[name]

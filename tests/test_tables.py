@@ -260,7 +260,7 @@ def test_a_fault_behind_many_blocks_is_placed(block: int):
 def test_a_quote_that_is_never_closed_is_told_without_reading_on():
     content = b"x,y\n" + b'1,"2\n' + b"3,4\n" * 1_000_000
     with pytest.raises(DataError, match=r"behind row 0 is not CSV .*check its quotes"):
-        list(CsvFile(content, "file", block=100).tables())
+        list(CsvFile(content, "file", block=10_000).tables())
 
 
 def test_the_last_row_of_a_long_table_is_found(given):

@@ -184,7 +184,7 @@ def test_c_on_other_modes_layouts_and_gravity(name):
     [
         pytest.param("quadrupteron-oblique", "direct_kinematics", marks=NIGHTLY),
         pytest.param("quadrupteron-oblique", DYNAMICS, marks=NIGHTLY),
-        ("tripteron", DYNAMICS),
+        pytest.param("tripteron", DYNAMICS, marks=NIGHTLY),
         ("delta", "direct_kinematics"),
         pytest.param("random PRR 0", DYNAMICS, marks=NIGHTLY),
     ],
@@ -567,7 +567,9 @@ def test_a_second_start_compiles_nothing(fresh, monkeypatch):
 
 
 @needs_compiler
-@pytest.mark.parametrize("manifest", ["kept", "gone", "", "{}", "[]", "3"])
+@pytest.mark.parametrize(
+    "manifest", gated(["kept", "gone", "", "{}", "[]", "3"], ["kept", "gone", "[]"])
+)
 def test_a_damaged_entry_is_built_again(fresh, manifest):
     assert_works()
     (folder,) = entries(fresh)
@@ -673,10 +675,10 @@ def test_processes_that_compile_at_once_do_not_meet(fresh):
     """)
     running = [
         subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
-        for _ in range(3)
+        for _ in range(2)
     ]
     printed = {process.communicate()[0] for process in running}
-    assert [process.returncode for process in running] == [0] * 3
+    assert [process.returncode for process in running] == [0] * 2
     assert len(printed) == 1
     assert len(entries(fresh)) == 1
 
