@@ -184,7 +184,7 @@ def test_leading_axes_broadcast():
     np.testing.assert_array_equal(found[4, 2], kernel(pose[4], velocity[2], acceleration[0]))
 
 
-@pytest.mark.parametrize("batch", [1, 255, 256, 257, 512, 700])
+@pytest.mark.parametrize("batch", [1, 7, 255, 256, 257, 512, 700])
 def test_blocks_of_the_virtual_machine_are_seamless(batch):
     kernel = pteron.compile(ROBOT, "inverse_dynamics")
     values = states(ROBOT, batch)

@@ -106,11 +106,17 @@ def distance_to_limits(robot: Manipulator, poses: Array) -> Array:
     within its limits that turns with the platform alone, since no translation leads out of them.
     """
     distances = joint_distances(robot, numeric(robot, "joint_coordinates")(poses)[0])
-    levers = np.array([leg.lever for leg in robot.legs])
-    turned = np.array([leg.reach_bound is None for leg in robot.legs])
+    levers, turned = _levers(robot)
     free = np.isnan(distances) | (turned & (distances >= 0.0))
     passive: Array = numeric(robot, "passive_room")(poses)[1]
     return np.asarray(np.fmin(np.where(free, np.inf, distances * levers), passive))
+
+
+@lru_cache(maxsize=64)
+def _levers(robot: Manipulator) -> tuple[Array, NDArray[np.bool_]]:
+    """Return each joint's lever, m, and whether the joint turns with the platform alone."""
+    levers = np.array([leg.lever for leg in robot.legs])
+    return levers, np.array([leg.reach_bound is None for leg in robot.legs])
 
 
 @dataclass(frozen=True)
