@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.kernels import Array, numeric
+from pteron.kinematics.tilting_assembly import tilting_poses
 from pteron.manipulator import Manipulator
 
 _BATCH = 4096
@@ -89,6 +90,8 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
 
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
+    if robot.platform.tilts:
+        return in_order(_table(*tilting_poses(robot, joints)[::-1], most, len(joints)))[:, :most]
     slides = robot.platform.slides
     zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
     rows = np.stack([zeroth, first, second], axis=-1)

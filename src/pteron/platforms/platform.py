@@ -350,9 +350,11 @@ class Platform:
     def _placed(
         self, poses: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        shape = poses.shape[:-1]
+        if not poses.size:
+            return np.empty((*shape, 3)), np.empty((*shape, 3, 3))
         rows = np.asarray(poses, dtype=float).reshape(-1, poses.shape[-1])
         place, axes = (np.asarray(part) for part in _placing(self)(rows.T))
-        shape = poses.shape[:-1]
         # The columns of each (3, 3) stand one behind the other.
         return place.T.reshape(*shape, 3), axes.T.reshape(*shape, 3, 3)
 
