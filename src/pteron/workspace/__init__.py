@@ -21,6 +21,7 @@ from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.quadrature import Quadrature, quadrature_volume
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.regions import Box, Cylinder, Region
+from pteron.workspace.tilts import LargestTilt, TiltedBall, largest_ball, largest_tilt
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "FreeRegion",
     "Inscribed",
     "JointRanges",
+    "LargestTilt",
     "LimitedJoint",
     "NearestSingularity",
     "Paving",
@@ -44,6 +46,7 @@ __all__ = [
     "ReachSlice",
     "ReachVolume",
     "Region",
+    "TiltedBall",
     "PoseMargins",
     "VolumesOverAngles",
     "bounding_box",
@@ -55,8 +58,10 @@ __all__ = [
     "home_pose",
     "interference",
     "joint_ranges",
+    "largest_ball",
     "largest_cube",
     "largest_cylinder",
+    "largest_tilt",
     "limited_joints",
     "nearest_singularities",
     "mode_contacts",

@@ -180,6 +180,12 @@ def _largest(
     proved: bool,
     given: tuple[Condition, ...] | None,
 ) -> Inscribed:
+    if not robot.platform.lengths:
+        raise ModelError(
+            f"a {robot.platform.motion} platform has no places to move to: it only turns; ask for "
+            "its `largest_tilt`",
+            subject=robot.name,
+        )
     asked = conditions(robot) if given is None else given
     smooth, geometry = smooth_conditions(robot, asked), np.array(numbers(robot))
     lengths = len(robot.platform.lengths)

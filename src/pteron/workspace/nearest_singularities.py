@@ -83,7 +83,8 @@ def nearest_singularities(
     """Return the nearest singular poses of each kind, by translation and by rotation alone.
 
     Only poses in reach of all legs count, and of the robot's working mode; limits of joints do not.
-    But an orientation that is singular (type II) at every position counts as such everywhere.
+    But an orientation that is singular (type II) at every position counts as such everywhere. Of a
+    platform that tilts a rotation's distance is the root of the sum of its angles' squares.
 
     Parameters
     ----------
@@ -130,8 +131,11 @@ def nearest_singularities(
         raise singular_everywhere(robot)
     inverse_kinematics(robot, at)
     found: list[NearestSingularity] = []
-    kinds: tuple[By, ...] = ("translation", "rotation")
-    for by in kinds[: 1 + bool(robot.platform.angles)]:
+    kinds: dict[By, tuple[str, ...]] = {
+        "translation": robot.platform.lengths,
+        "rotation": robot.platform.angles,
+    }
+    for by in (by for by, moving in kinds.items() if moving):
         several = [
             _result(robot, at, by, vanishing, _search(vanishing, at, by, most))
             for vanishing in _kinds(robot)

@@ -1,0 +1,260 @@
+"""How far a platform tilts at a place, and how far it moves while it tilts: found, then proved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc  # type: ignore[import-untyped]
+
+from pteron.bodies.vectors import PARALLEL_TOLERANCE, dot
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import PoseLike
+from pteron.workspace.conditions import Condition, conditions, keeps
+from pteron.workspace.proofs import Proof, prove
+
+_SAMPLES = 4096
+"""Poses of a region by which its size is found before it is proved; a third on its rim."""
+
+_HALVINGS = 40
+"""Bisections of the size."""
+
+_SHARES = 20
+"""Most times that the size is made smaller by the tolerance until it is proved."""
+
+_MOST = math.pi / 2.0
+"""Greatest tilt that is looked at, rad: beyond it the angles of a pose are singular."""
+
+
+@dataclass(frozen=True)
+class TiltedBall:
+    """All poses within a distance of a place that tilt by no more than an angle, to any side.
+
+    The tilt is the angle between the platform's z and its direction at angles zero: of roll and
+    pitch cos(tilt) = cos(roll) cos(pitch). The yaw, where the pose has one, stays.
+
+    Parameters
+    ----------
+    center : array, shape (m,)
+        The pose in its middle, m and rad; its roll and pitch do not count.
+    radius : float
+        m; of machines whose pose has no lengths 0.
+    tilt : float
+        Greatest tilt, rad, below pi / 2.
+    lengths, angles : tuple of int
+        Where the lengths, and the two angles that tilt it, stand in a pose.
+    """
+
+    center: tuple[float, ...]
+    radius: float
+    tilt: float
+    lengths: tuple[int, ...]
+    angles: tuple[int, int]
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose (2, m)."""
+        box = np.array([self.center, self.center])
+        box[:, list(self.lengths)] += np.array([[-self.radius], [self.radius]])
+        box[:, list(self.angles)] = np.array([[-self.tilt], [self.tilt]])
+        return box
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which poses (..., m) lie in it."""
+        away = poses[..., self.lengths] - np.array(self.center)[list(self.lengths)]
+        level = np.cos(poses[..., self.angles]).prod(axis=-1)
+        near = (away * away).sum(axis=-1) <= self.radius**2
+        return np.asarray(near & (level >= math.cos(self.tilt)))
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which boxes with corners (B, m) surely have no pose of it."""
+        center = np.array(self.center)[list(self.lengths)]
+        ahead, behind = low[:, self.lengths] - center, center - high[:, self.lengths]
+        nearest = np.maximum(np.maximum(ahead, behind), 0.0)
+        slack = 1e-12 * (1.0 + self.radius)
+        far = np.linalg.norm(nearest, axis=-1) > self.radius + slack
+        least = np.maximum(np.maximum(low[:, self.angles], -high[:, self.angles]), 0.0)
+        return np.asarray(far | (np.cos(least).prod(axis=-1) < math.cos(self.tilt) - 1e-12))
+
+    def sampled(self) -> Array:
+        """Return poses (K, m) spread over it, a third of them on its rim."""
+        free = len(self.lengths) + 2
+        shares = qmc.Sobol(free, seed=0).random(_SAMPLES)
+        tilt = self.tilt * np.sqrt(shares[:, 0])
+        tilt[: _SAMPLES // 3] = self.tilt
+        azimuth = 2.0 * np.pi * shares[:, 1]
+        # z' = (sin(tilt) cos(azimuth), ..): pitch by its x, roll by what is left.
+        pitch = np.arcsin(np.sin(tilt) * np.cos(azimuth))
+        roll = np.arctan2(-np.sin(tilt) * np.sin(azimuth), np.cos(tilt))
+        poses = np.broadcast_to(np.array(self.center), (_SAMPLES, len(self.center))).copy()
+        poses[:, self.angles[0]], poses[:, self.angles[1]] = roll, pitch
+        if self.lengths:
+            away = 2.0 * shares[:, 2:] - 1.0
+            size = np.linalg.norm(away, axis=1, keepdims=True)
+            inside = away / np.maximum(size, 1.0)
+            inside[_SAMPLES // 3 : 2 * _SAMPLES // 3] /= np.linalg.norm(
+                inside[_SAMPLES // 3 : 2 * _SAMPLES // 3], axis=1, keepdims=True
+            )
+            poses[:, self.lengths] += self.radius * inside
+        return poses
+
+
+@dataclass(frozen=True)
+class LargestTilt:
+    """The largest tilt, or ball, that is proved to lie in the workspace.
+
+    Attributes
+    ----------
+    tilt : float
+        rad: to every side, at every place of the ball.
+    radius : float
+        Of the ball of places, m.
+    region : TiltedBall
+        Both.
+    proof : Proof
+        The proof.
+    """
+
+    tilt: float
+    radius: float
+    region: TiltedBall
+    proof: Proof = field(repr=False)
+
+
+def largest_tilt(
+    robot: RobotLike,
+    pose: PoseLike,
+    *,
+    radius: float = 0.0,
+    tolerance: float = 5e-3,
+    given: tuple[Condition, ...] | None = None,
+) -> LargestTilt:
+    """Return the largest tilt to every side at a place that is proved to lie in the workspace.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        A machine whose platform tilts, in its working mode.
+    pose : array, shape (m,)
+        The place and the yaw, m and rad; its roll and pitch do not count.
+    radius : float
+        At every place within this distance, m.
+    tolerance : float
+        By which share it may be smaller than the one that sampling found, so that it is proved.
+    given : tuple of Condition, optional
+        The conditions on a pose; by default `conditions(robot)`: reach and limits.
+
+    Returns
+    -------
+    LargestTilt
+
+    Raises
+    ------
+    ModelError
+        If the platform does not tilt by two angles, or the level pose does not serve.
+    """
+    robot, at = _checked(robot, pose)
+    return _largest(robot, at, _MOST, tolerance, given, lambda tilt: (radius, tilt))
+
+
+def largest_ball(
+    robot: RobotLike,
+    pose: PoseLike,
+    *,
+    tilt: float = 0.0,
+    tolerance: float = 5e-3,
+    given: tuple[Condition, ...] | None = None,
+) -> LargestTilt:
+    """Return the largest ball of places at each of which every tilt up to a given one is reached.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        A machine whose platform tilts and moves, in its working mode.
+    pose : array, shape (m,)
+        The ball's centre and the yaw, m and rad; its roll and pitch do not count.
+    tilt : float
+        The tilt that is reached to every side, rad.
+    tolerance, given
+        As for `largest_tilt`.
+
+    Returns
+    -------
+    LargestTilt
+
+    Raises
+    ------
+    ModelError
+        If the platform does not tilt and move, or the centre does not serve at that tilt.
+    """
+    robot, at = _checked(robot, pose)
+    if not robot.platform.lengths:
+        raise ModelError(
+            f"a {robot.platform.motion} platform has no places to move to: it only turns",
+            subject=robot.name,
+        )
+    if not 0.0 <= tilt < _MOST:
+        raise DataError(f"tilt: {tilt:g} rad given, one from 0 to below pi/2 expected")
+    far = sum(leg.size for leg in robot.legs)
+    return _largest(robot, at, far, tolerance, given, lambda radius: (radius, tilt))
+
+
+def _checked(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
+    machine = as_manipulator(robot)
+    platform = machine.platform
+    upright = not platform.second_axis or (
+        abs(dot(platform.axis, platform.second_axis)) <= PARALLEL_TOLERANCE
+        and max(abs(platform.axis[2]), abs(platform.second_axis[2])) <= PARALLEL_TOLERANCE
+    )
+    if not platform.tilts or not upright:
+        raise ModelError(
+            f"a {platform.motion} platform has no tilt to every side"
+            + ("" if platform.tilts else "; this is about platforms that tilt")
+            + ("" if upright else ": its axes are not level and at right angles"),
+            subject=machine.name,
+        )
+    return machine, checked_one(machine, pose, "pose")
+
+
+def _largest(
+    robot: Manipulator,
+    at: Array,
+    most: float,
+    tolerance: float,
+    given: tuple[Condition, ...] | None,
+    sizes: Callable[[float], tuple[float, float]],
+) -> LargestTilt:
+    asked = conditions(robot) if given is None else given
+    angular = np.flatnonzero(robot.platform.angular)
+    lengths = tuple(np.flatnonzero(~robot.platform.angular).tolist())
+    angles = int(angular[0]), int(angular[1])
+
+    def region(size: float) -> TiltedBall:
+        radius, tilt = sizes(size)
+        return TiltedBall(tuple(at.tolist()), radius, tilt, lengths, angles)
+
+    def served(size: float) -> bool:
+        return bool(keeps(robot, asked, region(size).sampled()).all())
+
+    low, high = 0.0, most
+    if not served(low):
+        raise ModelError(
+            f"not even the middle, pose {region(0.0).sampled()[-1].tolist()}, serves",
+            subject=robot.name,
+        )
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if served(middle) else (low, middle)
+    for k in range(1, _SHARES + 1):
+        size = low * (1.0 - tolerance) ** k
+        proof = prove(robot, region(size), given=asked)
+        if proof.holds:
+            radius, tilt = sizes(size)
+            return LargestTilt(tilt, radius, region(size), proof)
+    raise ModelError(f"nothing is proved about pose {at.tolist()}: {proof}", subject=robot.name)

@@ -1,0 +1,77 @@
+"""Tilts and balls of places that are proved to lie in the workspace of a platform that tilts."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+import tilting
+from mechanisms import NIGHTLY
+
+import pteron
+from pteron.errors import DataError, ModelError
+from pteron.workspace import conditions, largest_ball, largest_cube, largest_tilt
+from pteron.workspace.conditions import keeps
+
+drawn = lru_cache(tilting.machine)
+
+CASES = [("3R", ("UPS",)), ("3T3R", ("UPS",)), pytest.param("1T2R", ("RPS",), marks=NIGHTLY)]
+
+
+def leaning(robot, home, tilt, count=20_000, radius=0.0):
+    """Return poses of exactly a tilt, their platform's z drawn by its azimuth, on a ball's rim."""
+    rng = np.random.default_rng(1)
+    azimuth = rng.uniform(-np.pi, np.pi, count)
+    z = np.stack([np.cos(azimuth) * np.sin(tilt), np.sin(azimuth) * np.sin(tilt)], -1)
+    poses = np.tile(home, (count, 1))
+    angles = np.flatnonzero(robot.platform.angular)[:2]
+    # R ez = (sin(pitch) cos(roll), -sin(roll), cos(roll) cos(pitch)), but for the yaw.
+    poses[:, angles[0]] = -np.arcsin(z[:, 1])
+    poses[:, angles[1]] = np.arctan2(z[:, 0], np.cos(tilt))
+    lengths = np.flatnonzero(~robot.platform.angular)
+    way = rng.normal(size=(count, len(lengths)))
+    poses[:, lengths] += radius * way / np.maximum(np.linalg.norm(way, axis=1)[:, None], 1e-9)
+    axis = robot.platform.at(poses)[1][:, 2] @ np.array(robot.platform.frame[2])
+    np.testing.assert_allclose(np.arccos(axis), tilt, atol=1e-7)
+    return poses
+
+
+@pytest.mark.parametrize(("motion", "kinds"), CASES)
+def test_every_pose_of_the_largest_tilt_serves_and_not_all_beyond(motion, kinds):
+    robot, home = drawn(motion, kinds, 4)
+    asked = conditions(robot)
+    found = largest_tilt(robot, home, tolerance=0.02)
+    assert found.proof.holds
+    assert keeps(robot, asked, leaning(robot, home, found.tilt)).all()
+    beyond = min(1.04 * found.tilt, 1.55)
+    assert beyond == 1.55 or not keeps(robot, asked, leaning(robot, home, beyond)).all()
+
+
+@pytest.mark.parametrize(
+    ("motion", "kinds"), [("1T2R", ("RPS",)), pytest.param("3T3R", ("UPS",), marks=NIGHTLY)]
+)
+def test_every_place_of_the_largest_ball_serves_at_a_tilt(motion, kinds):
+    robot, home = drawn(motion, kinds, 4)
+    asked = conditions(robot)
+    found = largest_ball(robot, home, tilt=0.1, tolerance=0.03)
+    assert found.proof.holds
+    assert keeps(robot, asked, leaning(robot, home, 0.1, radius=found.radius)).all()
+    far = leaning(robot, home, 0.1, count=200_000, radius=1.07 * found.radius)
+    assert not keeps(robot, asked, far).all()
+
+
+def test_what_has_no_tilt_or_no_place_is_told():
+    wrist, home = drawn("3R", ("UPS",), 4)
+    with pytest.raises(ModelError, match="3R platform has no places to move to"):
+        largest_ball(wrist, home)
+    with pytest.raises(ModelError, match="only turns; ask for its `largest_tilt`"):
+        largest_cube(wrist, home)
+    with pytest.raises(ModelError, match="3T platform has no tilt to every side"):
+        largest_tilt("delta", pteron.workspace.home_pose("delta"))
+    ankle, home = drawn("2R", ("RSS",), 4)
+    with pytest.raises(ModelError, match="its axes are not level"):
+        largest_tilt(ankle, home)
+    tripod, home = drawn("1T2R", ("RPS",), 4)
+    with pytest.raises(DataError, match="tilt: 2 rad given"):
+        largest_ball(tripod, home, tilt=2.0)
+    with pytest.raises(ModelError, match="not even the middle"):
+        largest_tilt(tripod, home + 10.0)
