@@ -12,6 +12,7 @@ import mechanisms
 import mujoco
 import numpy as np
 import pytest
+import tilting
 import trees
 from mechanisms import CATALOG, random_machine, relative_error, with_elbows
 
@@ -25,7 +26,12 @@ COUNT = 20
 RANDOM = ["PPP", "SSS", "PRSU", "PRSSI", "RRRR", "CL", "CCU", "CPR"]
 """The letters are those of `random_machine`."""
 
+TILTING = [f"{motion} {' '.join(kinds)}" for motion, kinds in tilting.LEGS.items()]
+XYZ = "3T3R UPS xyz"
+EACH = [f"{motion} {kind}" for motion, kinds in tilting.LEGS.items() for kind in kinds]
+
 GATE = ("quadrupteron", "tripteron", "delta-4", "par4", "five-bar", "3-prr", "PRSU", "PRSSI", "CL")
+GATE += tuple(TILTING)
 """Every closure under every platform, every kind of leg; see `mechanisms.GATE`."""
 
 ENGINES = {
@@ -38,27 +44,34 @@ NEEDS = {"MuJoCo": "mujoco", "Pinocchio": "pinocchio", "Drake": "pydrake"}
 
 
 def machine(name):
-    """Return a machine of the catalog, or one drawn at random, and states of it."""
+    """Return a machine of the catalog, or one drawn at random, states of it and a home pose."""
     if name in CATALOG:
-        return CATALOG[name], mechanisms.states(CATALOG[name], COUNT)
+        return CATALOG[name], mechanisms.states(CATALOG[name], COUNT), None
+    motion, *kinds = name.split()
+    if kinds:
+        angles = "xyz" if kinds[-1] == "xyz" else "rpy"
+        robot, home = tilting.machine(motion, [k for k in kinds if k != "xyz"], 3, angles)
+        return robot, tilting.states(robot, home, COUNT), home
     robot = random_machine(1, name)
-    return robot, descriptions.states(descriptions.describe(robot), COUNT, 1)
+    return robot, descriptions.states(descriptions.describe(robot), COUNT, 1), None
 
 
-@pytest.fixture(scope="module", params=mechanisms.gated([*CATALOG, *RANDOM], GATE))
+@pytest.fixture(
+    scope="module", params=mechanisms.gated([*CATALOG, *RANDOM, *TILTING, *EACH, XYZ], GATE)
+)
 def case(request):
     return machine(request.param)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_forces_through_the_closure(case, engine):
-    robot, motion = case
+    robot, motion, home = case
     pytest.importorskip(NEEDS[engine.split()[-1]])
     if robot.platform.slides and engine == "Python in Pinocchio":
         with pytest.raises(pteron.ModelError, match="coupled joints"):
             pinocchio_model(robot)
         return
-    forces, jacobian, gap = trees.projected(robot, ENGINES[engine](robot), *motion)
+    forces, jacobian, gap = trees.projected(robot, ENGINES[engine](robot, home), *motion)
     assert gap < 1e-13
     assert relative_error(jacobian, pteron.jacobian(robot, motion[0])) < 1e-10
     assert relative_error(forces, pteron.inverse_dynamics(robot, *motion)) < 1e-8
@@ -76,18 +89,20 @@ def test_working_modes_and_turned_machines():
 def test_accelerations_by_constrained_dynamics(case):
     """Pinocchio's constraintDynamics, with three rows a loop, against `forward_dynamics`."""
     pin = pytest.importorskip("pinocchio")
-    robot, (pose, velocity, _) = case
+    robot, (pose, velocity, _), home = case
     if robot.platform.slides:
         pytest.skip("the halves of a platform that slides are coupled joints")
     robot = trees.without_drives(robot)
-    closed = pinocchio_model(robot)
+    closed = pinocchio_model(robot, home=home)
     model, constraints, datas = closed.model, closed.constraints, closed.constraint_datas
-    data, m = model.createData(), robot.freedom
+    data = model.createData()
     pin.initConstraintDynamics(model, data, constraints, datas)
-    opened = tree(robot)
+    opened = tree(robot, home)
     names = [joint.name for joint in opened.joints]
-    order = [names.index(name) for name in list(model.names)[1:]]
-    assert list(model.names)[1 : m + 1] == list(robot.coordinates)
+    moved = list(model.names)[1:]
+    order = [names.index(name) for name in moved]
+    free = [moved.index(name) for name in robot.coordinates]
+    bound = np.setdiff1d(np.arange(model.nv), free)
     forces = 10.0 * np.random.default_rng(0).normal(size=pose.shape)
     found = []
     for q, dx, force in zip(coordinates(opened, pose)[:, order], velocity, forces, strict=True):
@@ -95,11 +110,13 @@ def test_accelerations_by_constrained_dynamics(case):
         for constraint, its_data in zip(constraints, datas, strict=True):
             constraint.calc(model, data, its_data)
         rows = pin.getConstraintsJacobian(model, data, constraints, datas)
-        v = np.concatenate([dx, -np.linalg.pinv(rows[:, m:], rcond=1e-10) @ rows[:, :m] @ dx])
+        v = np.zeros(model.nv)
+        v[free] = dx
+        v[bound] = -np.linalg.pinv(rows[:, bound], rcond=1e-10) @ rows[:, free] @ dx
         settings = pin.ProximalSettings(1e-14, 1e-8, 100)
         load = closed.motors.T @ force
         found.append(
-            pin.constraintDynamics(model, data, q, v, load, constraints, datas, settings)[:m]
+            pin.constraintDynamics(model, data, q, v, load, constraints, datas, settings)[free]
         )
     expected = pteron.forward_dynamics(robot, pose, velocity, forces)
     assert relative_error(found, expected) < 1e-7
@@ -129,8 +146,8 @@ def test_a_drives_inertia_is_armature():
 
 def test_mjcf_opens_at_the_home_pose_with_its_loops_closed(case):
     mujoco = pytest.importorskip("mujoco")
-    robot, _ = case
-    opened = tree(robot)
+    robot, _, home = case
+    opened = tree(robot, home)
     model = mujoco.MjModel.from_xml_string(mjcf(opened))
     data = mujoco.MjData(model)
     np.testing.assert_array_equal(model.key_qpos[0], model.qpos0)
@@ -174,22 +191,22 @@ def test_mjcf_has_drives_and_limits():
 
 def test_the_parts_are_the_whole_machine(case):
     """Mass, and every body real: no moment above the sum of the other two."""
-    robot, _ = case
-    opened = tree(robot)
+    robot, _, home = case
+    opened = tree(robot, home)
     listed = zip(pteron.parameter_data(robot), pteron.parameters(robot), strict=True)
     mass = sum(value for parameter, value in listed if parameter.kind == "m")
     np.testing.assert_allclose(sum(body.mass for body in opened.bodies), mass, rtol=1e-12)
     for body in opened.bodies:
-        low, middle, high = np.sort(body.moments)
+        low, middle, high = np.linalg.eigvalsh(body.tensor)
         assert 0.0 < low <= middle <= high <= low + middle, body.name
         np.testing.assert_allclose(body.axes.T @ body.axes, np.eye(3), atol=1e-14)
     names = [joint.name for joint in opened.joints] + [body.name for body in opened.bodies]
     assert len(set(names)) == len(names)
-    assert opened.joints[: robot.freedom] == opened.free[: robot.freedom]
+    assert set(robot.coordinates) <= set(names)
 
 
 def test_coordinates_close_the_loops(case):
-    robot, (pose, *_) = case
+    robot, (pose, *_), _ = case
     opened = tree(robot, pose[0])
     names = [joint.name for joint in opened.joints]
     for row in coordinates(opened, pose):
@@ -210,7 +227,7 @@ def test_coordinates_close_the_loops(case):
 def test_rates_of_the_chain_are_those_of_the_coordinates():
     """The joints' rates by the legs' own rows, against differences of the tree's coordinates."""
     for name in ("quadrupteron-oblique", "delta-4", "five-bar", "linear-delta"):
-        robot, (pose, velocity, _) = machine(name)
+        robot, (pose, velocity, _), _ = machine(name)
         opened, dt = tree(robot), 1e-6
         ahead, back = (coordinates(opened, pose + way * dt * velocity) for way in (1.0, -1.0))
         found = dict(
@@ -354,8 +371,8 @@ def test_the_looks_join_up(case):
     """A leg is seen as one line: each body's looks begin where those of the one before end."""
     from pteron.export.engines.shapes import dressed
 
-    robot, _ = case
-    opened = dressed(tree(robot))
+    robot, _, home = case
+    opened = dressed(tree(robot, home))
     for body in opened.bodies:
         assert body.shapes, body.name
         for shape in body.shapes:

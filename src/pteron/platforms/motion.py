@@ -110,6 +110,9 @@ class PlatformEquations(ABC):
     """Whether phi slides what the legs carry, and does not turn it."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()
     """The names of a wrench at P that acts on it; none where they are the coordinates' own."""
+    joints: ClassVar[tuple[str, ...]] = ()
+    """The slides and turns that lead from the base to it, in their order: named by coordinates,
+    also where planes hold some of them; none where they are the pose's own."""
 
     def __init__(
         self,

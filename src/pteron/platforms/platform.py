@@ -310,6 +310,14 @@ class Platform:
         return tuple(name for name in self.coordinates if COORDINATES[name].unit == "rad")
 
     @property
+    def angle_limits(self) -> dict[str, Limits]:
+        """Least and greatest value of each angle that is limited, by name, rad."""
+        if self.limits is None:
+            return {}
+        pairs = self.limits if self.tilts else (self.limits,)
+        return dict(zip(self.angles, pairs, strict=True))  # type: ignore[arg-type]
+
+    @property
     def wrench_columns(self) -> tuple[str, ...]:
         """Names of a wrench at P: a force and moments along its coordinates, all where it tilts."""
         own = equations_class(self).wrench_columns

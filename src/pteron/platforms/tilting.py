@@ -189,6 +189,7 @@ class RollPitchYaw(Tilting):
 
     coordinates = ("x", "y", "z", "roll", "pitch", "yaw")
     order = ("yaw", "pitch", "roll")
+    joints = ("x", "y", "z", *order)
 
 
 class TurnsXYZ(Tilting):
@@ -218,7 +219,7 @@ class CentredRollPitchYaw(_Centred):
     """3R: R = Rz(yaw) Ry(pitch) Rx(roll) about a ball joint."""
 
     coordinates = ("roll", "pitch", "yaw")
-    order = ("yaw", "pitch", "roll")
+    order = joints = ("yaw", "pitch", "roll")
 
 
 class CentredXYZ(_Centred):

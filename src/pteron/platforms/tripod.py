@@ -26,6 +26,7 @@ class Tripod(Tilting):
 
     coordinates = ("z", "roll", "pitch")
     order = ("yaw", "pitch", "roll")
+    joints = ("x", "y", "z", *order)
 
     def __init__(
         self,

@@ -8,6 +8,7 @@ from pteron.export.engines.chains import LegStance, leg_stances
 from pteron.export.engines.parts import Tree
 from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics
+from pteron.platforms.joints import platform_joints
 from pteron.shapes import PoseLike
 
 _LONG = 1e-3
@@ -41,7 +42,7 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
     given = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
     flat = given.reshape(-1, robot.freedom)
     joints = inverse_kinematics(robot, flat)
-    values = {name: flat[:, k] for k, name in enumerate(robot.coordinates)}
+    values = {joint.name: joint.values for joint in platform_joints(robot.platform, flat)}
     for i, (home, away) in enumerate(
         zip(leg_stances(robot, opened.home), leg_stances(robot, flat), strict=True)
     ):

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pteron.bodies.inertia import Inertia
+from pteron.bodies.inertia import Inertia, SpatialInertia
 from pteron.kernels import Array
 
 _ACROSS = (0.6, 0.7, 1.0)
@@ -54,6 +54,15 @@ def rod_moments(mass: float, moment: float, lever: float) -> Array:
     """Return the moments (3,) of a rod along its x."""
     across = max(moment, _LEAST * mass * lever**2, _TINY)
     return np.array([max(_SPIN * across, _TINY), across, across])
+
+
+def spatial_moments(inertia: SpatialInertia, lever: float) -> tuple[Array, Array]:
+    """Return moments and products (3,) about the centre of a body that turns about any axis."""
+    m, c = inertia.mass, np.array(inertia.center_of_mass)
+    tensor = inertia.tensor - m * (c @ c * np.eye(3) - np.outer(c, c))
+    least = max(_LEAST * m * lever**2, _TINY)
+    tensor += max(least - float(np.linalg.eigvalsh(tensor)[0]), 0.0) * np.eye(3)
+    return np.diag(tensor).copy(), tensor[[0, 0, 1], [1, 2, 2]]
 
 
 def cube_moments(mass: float, side: float) -> Array:

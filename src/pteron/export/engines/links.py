@@ -29,6 +29,7 @@ class Link(NamedTuple):
     """Whether it is the body itself, and not a light link between two joints of it."""
     mass: float
     moments: Array
+    products: Array
 
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
@@ -44,8 +45,9 @@ def links_of(bodies: Sequence[TreeBody]) -> list[Link]:
         for joint in body.joints:
             first, last = joint is body.joints[0], joint is body.joints[-1]
             name = body.name if last else f"{joint.name}_link"
-            inertia = body.mass, body.moments
-            inertia = inertia if last else between_joints(*inertia)
+            inertia = body.mass, body.moments, body.products
+            if not last:
+                inertia = *between_joints(body.mass, body.moments), np.zeros(3)
             found.append(Link(name, parent, body, joint, first, last, *inertia))
             parent = name
     return found

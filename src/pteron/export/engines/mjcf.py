@@ -117,7 +117,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
         local=lambda body, points: points if body is None else within(body, points),
         same=lambda shape: np.ptp(shape.ends, axis=0).max() < _SAME,
         half=lambda shape: float(np.linalg.norm(shape.ends[1] - shape.ends[0])) / 2.0,
-        moments=lambda body: " ".join(map(small, body.moments)),
+        inertia=_inertia,
         placed=lambda body: _placed(opened, body),
         joint_of=lambda body, joint: _joint(opened, body, joint),
         **_scene(opened),
@@ -144,6 +144,13 @@ def _placed(opened: Tree, body: TreeBody) -> str:
     text = f'pos="{row(there[:3, 3])}"'
     turned = row([w, x, y, z])
     return text if turned == "1 0 0 0" else f'{text} quat="{turned}"'
+
+
+def _inertia(body: TreeBody) -> str:
+    """Return a body's moments of inertia, and its products if there are any."""
+    if not body.products.any():
+        return f'diaginertia="{" ".join(map(small, body.moments))}"'
+    return f'fullinertia="{" ".join(map(small, [*body.moments, *body.products]))}"'
 
 
 def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> str:

@@ -7,7 +7,7 @@ engine's file may place its bodies there, or take their joints back to zero by `
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -83,7 +83,7 @@ class TreeBody:
     origin : array, shape (3,)
         The origin of its frame, on its last joint, m.
     axes : array, shape (3, 3)
-        The axes of its frame, as columns: those of its moments of inertia.
+        The axes of its frame, as columns.
     mass : float
         kg.
     center : array, shape (3,)
@@ -92,6 +92,8 @@ class TreeBody:
         Its moments of inertia about the centre of mass, kg m^2.
     color : int
         The leg it belongs to, from 1; 0 for the platform's.
+    products : array, shape (3,)
+        Ixy, Ixz and Iyz about the centre of mass, kg m^2.
     shapes : tuple of BodyShape
         Its shapes in pictures.
     """
@@ -105,7 +107,15 @@ class TreeBody:
     center: Array
     moments: Array
     color: int
+    products: Array = field(default_factory=lambda: np.zeros(3))
     shapes: tuple[BodyShape, ...] = ()
+
+    @property
+    def tensor(self) -> Array:
+        """Its inertia tensor (3, 3) about the centre of mass, kg m^2."""
+        tensor = np.diag(self.moments)
+        tensor[[0, 0, 1], [1, 2, 2]] = tensor[[1, 2, 2], [0, 0, 1]] = self.products
+        return tensor
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,7 @@ def pinocchio_source(opened: Tree) -> str:
         armature=armature,
         joints={joint.name: joint for joint in opened.joints},
         place_of=lambda body: _from_parent(opened, bodies, body)[:3],
+        symmetric=lambda body: body.tensor[np.tril_indices(3)],
         bound=_bound,
         list=_list,
     )

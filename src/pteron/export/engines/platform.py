@@ -11,12 +11,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from pteron.bodies.inertia import SpatialInertia
 from pteron.bodies.vectors import cross
-from pteron.export.engines.inertia import about_center, cube_moments, plane_moments, shared_masses
-from pteron.export.engines.parts import BASE, Closing, TreeBody, TreeJoint
+from pteron.export.engines.inertia import (
+    about_center,
+    cube_moments,
+    plane_moments,
+    shared_masses,
+    spatial_moments,
+)
+from pteron.export.engines.parts import BASE, Closing, TreeBody, TreeJoint, displacement
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.platforms import Platform
+from pteron.platforms.joints import platform_joints
 
 _COINCIDENT = 1e-9
 """Distance within which two hinges count as one, m; m/rad where the platform slides."""
@@ -36,10 +44,13 @@ def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
     platform = robot.platform
     if platform.slides:
         return _sliding(robot, pose)
-    if platform.angles:
+    if platform.turns:
         return _turning(robot, pose)
-    mass, center, about = about_center(platform.joined)
-    body = _plane_body(platform, pose, _moves(platform, pose), mass, center, about)
+    joints = _joints(platform, pose)
+    if isinstance(platform.joined, SpatialInertia):
+        body = _tilting_body(platform, pose, joints, platform.joined)
+    else:
+        body = _plane_body(platform, pose, joints, *about_center(platform.joined))
     return [body], [0] * len(robot.legs), []
 
 
@@ -53,8 +64,7 @@ def _turning(robot: Manipulator, pose: Array) -> Pieces:
     points = [np.array(leg.platform_point) for leg in robot.legs]
     hinges = _distinct([point for point, hangs in zip(points, hung, strict=True) if hangs])
     masses, shares, rest = _shared(platform, hinges, len(platform.geared))
-    joints = [*_moves(platform, pose), _turn(platform, pose)]
-    bodies = [_plane_body(platform, pose, joints, *rest)]
+    bodies = [_plane_body(platform, pose, _joints(platform, pose), *rest)]
     bodies += _gears(platform, pose, shares, 1.0)
     first, closings = len(bodies), []
     for j, (hinge, mass) in enumerate(zip(hinges, masses, strict=True), start=1):
@@ -86,9 +96,9 @@ def _sliding(robot: Manipulator, pose: Array) -> Pieces:
     halves = _distinct([point for point in points if np.abs(point).max() > _COINCIDENT])
     masses, shares, rest = _shared(platform, halves, 2 + len(platform.geared))
     mass, center, about = rest
-    carrier = _still_body(platform, "platform", BASE, _moves(platform, pose), p, float(shares[0]))
-    turn = [_turn(platform, pose)]
-    tool = _plane_body(platform, pose, turn, float(shares[1]), np.zeros(2), about)
+    *moves, turn = _joints(platform, pose)
+    carrier = _still_body(platform, "platform", BASE, moves, p, float(shares[0]))
+    tool = _plane_body(platform, pose, [turn], float(shares[1]), np.zeros(2), about)
     bodies = [carrier, replace(tool, name="tool", parent=0)]
     bodies += _gears(platform, pose, shares[2:], 0.0)
     first = len(bodies) + 1
@@ -143,23 +153,23 @@ def _shared(
     return masses, shares[len(without) :], (mass, center, inertia - mass * float(center @ center))
 
 
-def _moves(platform: Platform, pose: Array) -> list[TreeJoint]:
-    """Return the joints along which P slides."""
-    p = platform.at(pose)[0]
-    lengths = zip(platform.lengths, platform.directions, pose, strict=False)
-    return [TreeJoint(name, True, axis, p, float(at)) for name, axis, at in lengths]
+def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
+    """Return the joints by which the platform moves, the tool's where its halves slide."""
+    p, moved, found = platform.at(pose)[0], np.eye(4), []
+    limits = platform.angle_limits
+    for name, slides, axis, value in platform_joints(platform, pose):
+        axis = moved[:3, :3] @ axis
+        joint = TreeJoint(name, slides, axis, p, float(value), limits.get(name))
+        if not slides:
+            moved = displacement(joint, float(value)) @ moved
+        found.append(joint)
+    return found
 
 
 def _angle(platform: Platform, pose: Array) -> tuple[str, float]:
     """Return the name of the one angle that the platform has, and its value."""
     (name,), (value,) = platform.angles, pose[platform.angular].tolist()
     return name, value
-
-
-def _turn(platform: Platform, pose: Array) -> TreeJoint:
-    """Return the joint about which the platform turns."""
-    (name, angle), p = _angle(platform, pose), platform.at(pose)[0]
-    return TreeJoint(name, False, np.array(platform.axis), p, angle, platform.limits)
 
 
 def _plane_body(
@@ -175,6 +185,19 @@ def _plane_body(
     moments = plane_moments(mass, about, max(float(np.linalg.norm(center)), _SIDE))
     at = p + center @ axes[:2]
     return TreeBody("platform", BASE, tuple(joints), p, axes.T, mass, at, moments, 0)
+
+
+def _tilting_body(
+    platform: Platform, pose: Array, joints: Sequence[TreeJoint], inertia: SpatialInertia
+) -> TreeBody:
+    """Return a platform that turns about any axis."""
+    p, axes = platform.at(pose)
+    center = np.array(inertia.center_of_mass)
+    moments, products = spatial_moments(inertia, max(float(np.linalg.norm(center)), _SIDE))
+    at = p + center @ axes
+    return TreeBody(
+        "platform", BASE, tuple(joints), p, axes.T, inertia.mass, at, moments, 0, products
+    )
 
 
 def _still_body(

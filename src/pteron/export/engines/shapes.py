@@ -86,7 +86,7 @@ def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
     """Add the shapes of the platform's bodies: arms from their origins to where others close."""
     platform, bodies = opened.robot.platform, opened.bodies
     p, axes = platform.at(opened.home)
-    axis = np.array(platform.axis)
+    axis = axes[2]
     for closing in opened.closings:
         for k in (closing.one, closing.other):
             if bodies[k].color == 0:

@@ -1,0 +1,49 @@
+"""A platform's motion as that of a chain of joints: slides along its lengths, then turns."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.platforms.kinds import equations_class
+from pteron.platforms.platform import Platform
+
+Array = NDArray[np.float64]
+
+
+class PlatformJoint(NamedTuple):
+    """A joint between the base and the platform, that no machine has: it tells how P moves."""
+
+    name: str
+    """Of the coordinate that it moves by."""
+    slides: bool
+    axis: Array
+    """Unit vector (3,) where all coordinates are zero; joints before it move it."""
+    values: Array
+    """Its coordinate (...) in the poses given, m or rad."""
+
+
+def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
+    """Return the chain of joints whose motion is the platform's, at poses (..., m).
+
+    Of a tripod they have x, y and yaw too, which its planes hold.
+    """
+    kind = equations_class(platform)
+    x0, y0, k = (np.array(axis) for axis in platform.frame)
+    axes = {"x": x0, "y": y0, "z": k, "phi": k, "roll": x0, "pitch": y0, "yaw": k}
+    axes |= {"rx": x0, "ry": y0, "rz": k, "alpha": np.array(platform.axis)}
+    if platform.second_axis is not None:
+        axes["beta"] = np.array(platform.second_axis)
+    names = kind.joints or platform.coordinates
+    axes |= dict(zip(platform.lengths, platform.directions, strict=True))
+    values = {name: poses[..., i] for i, name in enumerate(platform.coordinates)}
+    if len(names) > len(values):
+        p, turned = platform.at(poses)
+        along = turned[..., 0, :] * np.sign(np.cos(values["pitch"]))[..., None]
+        held = {"x": p @ x0, "y": p @ y0, "yaw": np.arctan2(along @ y0, along @ x0)}
+        values = held | values
+    return [
+        PlatformJoint(name, name in ("x", "y", "z"), axes[name], values[name]) for name in names
+    ]
