@@ -270,7 +270,7 @@ def test_adaptive_control_learns_what_the_cycle_shows(name):
 
 
 @pytest.mark.parametrize("what", LAWS)
-@pytest.mark.parametrize("name", ["delta", "five-bar"])
+@pytest.mark.parametrize("name", gated(["delta", "five-bar"], ["five-bar"]))
 def test_coarse_encoders_and_forces_that_come_late_are_survived(name, what):
     """10 um or 10 urad a count, rates by differences, one sample of delay: by default gains."""
     robot = MACHINES[name]

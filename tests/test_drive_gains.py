@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from logs_of_motions import machine
 from test_payload import (
-    CENTRAL,
+    EACH,
     LOAD,
     NOISE,
     PERIOD,
-    SOME,
     base_of,
     halves,
     laden,
@@ -42,13 +41,7 @@ def current_log(name, **options):
     return in_currents(make_log(name, **options), gains_of(name))
 
 
-@pytest.mark.parametrize(
-    ("name", "processing"),
-    [
-        *((name, None) for name in SOME),
-        ("quadrupteron-oblique", CENTRAL),
-    ],
-)
+@EACH
 def test_they_are_exact_without_noise(name, processing):
     found = identify_drive_gains(
         machine(name), current_log(name), processing=processing, base=base_of(name)

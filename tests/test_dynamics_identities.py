@@ -15,7 +15,7 @@ from pteron.kernels import program
 from pteron.legs.leg import LegEquations
 
 EVERY = pytest.mark.parametrize("name", gated(MACHINES))
-TWO_LINKS = pytest.mark.parametrize("name", MECHANISMS)
+TWO_LINKS = pytest.mark.parametrize("name", gated(MECHANISMS))
 FEW = ["quadrupteron-oblique", "delta", "random 3T 0", "random PRR 0"]
 COUNT = 100
 

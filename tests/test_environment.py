@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from mechanisms import CATALOG, random_machine, with_elbows
+from mechanisms import CATALOG, NIGHTLY, random_machine, with_elbows
 from scipy.integrate import solve_ivp
 from test_sizing import driven
 
@@ -53,8 +53,15 @@ def moved(name):
     return pick_and_place(world.robot, world.home, scale=0.1, duration=0.6)
 
 
-@pytest.mark.parametrize("follow", [False, True])
-@pytest.mark.parametrize("name", ["delta-4", "five-bar"])
+@pytest.mark.parametrize(
+    ("name", "follow"),
+    [
+        ("delta-4", False),
+        ("five-bar", True),
+        pytest.param("delta-4", True, marks=NIGHTLY),
+        pytest.param("five-bar", False, marks=NIGHTLY),
+    ],
+)
 def test_many_environments_are_the_single_ones_step_for_step(name, follow):
     robot, motion = MACHINES[name], moved(name) if follow else None
     singles = gymnasium.vector.SyncVectorEnv(

@@ -146,7 +146,7 @@ def library(name, real="double"):
     return call
 
 
-@pytest.mark.parametrize("name", gated(ROBOTS, ["quadrupteron", "delta", "mixed", "par4"]))
+@pytest.mark.parametrize("name", gated(ROBOTS, ["quadrupteron", "delta", "mixed", "five_bar"]))
 def test_random_states_give_the_bits_that_casadi_gives(name):
     robot, call = ROBOTS[name], library(name)
     given = {"parameters": pteron.parameters(robot), "drives": drive_numbers(robot)}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanisms import NIGHTLY
 
 import pteron
 from pteron.identification import (
@@ -49,7 +50,10 @@ def recorded(name, duration):
     return robot, built, friction, recording
 
 
-@pytest.mark.parametrize(("name", "duration"), [("tripteron", 2.5), ("delta", 0.5), ("par4", 0.5)])
+@pytest.mark.parametrize(
+    ("name", "duration"),
+    [("tripteron", 2.5), ("delta", 0.5), pytest.param("par4", 0.5, marks=NIGHTLY)],
+)
 def test_its_forces_are_those_of_the_model(name, duration):
     _, built, friction, recording = recorded(name, duration)
     poses = pteron.follow(built, recording.joints, recording.poses[0])
