@@ -29,7 +29,7 @@ PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE"
 POSES = "x,y,z,phi\n0.01,0.02,-0.03,0.1\n0.02,-0.01,0.03,-0.2\n"
 COMMANDS = (
     *("catalog", "check", "report", "inverse", "direct", "forces", "base", "excite", "identify"),
-    *("cycle", "simulate", "size", "film", "play", "table1", "workspace", "design"),
+    *("cycle", "cue", "simulate", "size", "film", "play", "table1", "workspace", "design"),
 )
 
 

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from pteron.cli.arguments import Command, NumbersCommand, without_types
 from pteron.cli.base_parameters import base, table1
+from pteron.cli.cue import cue
 from pteron.cli.cycle import cycle
 from pteron.cli.design import design
 from pteron.cli.excite import excite
@@ -117,7 +118,7 @@ _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Machines": (catalog, new, check, report),
     "See it": (view, play, film, workspace),
     "Compute": (inverse, direct, forces, base, table1),
-    "Move": (cycle, simulate, size),
+    "Move": (cycle, cue, simulate, size),
     "Design": (design,),
     "From a log to a controller": (excite, identify, export),
 }

@@ -1,6 +1,7 @@
 """Motions of the platform, the forces that they need, and simulation of the machine."""
 
 from pteron.arguments import check_arguments
+from pteron.motion.cueing import Cue, Washout, cue
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
 from pteron.motion.motion import Motion
 from pteron.motion.overloads import overloads
@@ -25,6 +26,7 @@ from pteron.motion.trajectories.time_law import along, shortest
 from pteron.motion.trajectories.time_optimal import TimeOptimal, time_optimal
 
 __all__ = [
+    "Cue",
     "Fit",
     "FourierSeries",
     "Guide",
@@ -42,6 +44,7 @@ __all__ = [
     "Sizing",
     "Span",
     "TimeOptimal",
+    "Washout",
     "advance",
     "along",
     "best_ratio",
@@ -49,6 +52,7 @@ __all__ = [
     "check_motion",
     "check_path",
     "choose",
+    "cue",
     "cycle_path",
     "fourier_motion",
     "jerk_limited",
@@ -72,7 +76,7 @@ __all__ = [
     "time_optimal",
     "with_payload",
 ]
-check_arguments(__name__, classes=("FourierSeries", "Motor", "MotionLimits"))
+check_arguments(__name__, classes=("FourierSeries", "Motor", "MotionLimits", "Washout"))
 
 
 def __dir__() -> list[str]:

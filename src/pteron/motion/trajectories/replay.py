@@ -70,7 +70,7 @@ def replay(
     names = robot.column_names
     poses, joints = names["pose"], names["joints"]
     whole = [*poses, *names["velocity"], *names["acceleration"]]
-    rows = _rows(table, [TIME, *whole, *joints])
+    rows = rows_of(table, [TIME, *whole, *joints])
     has = set(rows.columns)
     m = robot.freedom
     if has.issuperset(whole):
@@ -94,7 +94,7 @@ def _place(rows: Table, motion: Motion, at: float) -> str:
     return f"{rows.place(max(k, 0))}, at {at:.4g} s"
 
 
-def _rows(given: str | File | Table | Columns, useful: Sequence[str]) -> Table:
+def rows_of(given: str | File | Table | Columns, useful: Sequence[str]) -> Table:
     """Return a table with its useful columns, or the file's of that name."""
     if isinstance(given, Table):
         return given

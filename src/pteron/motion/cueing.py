@@ -1,0 +1,220 @@
+"""Washout: the accelerations and turns of a vehicle as a motion of its simulator's platform.
+
+A classical washout (L. D. Reid, M. A. Nahon, UTIAS Report 296, 1985): what is quick is moved, what
+lasts is tilted into, and the platform always returns to the middle. Its poses are then pressed into
+a box of poses that is proved to lie in the workspace, so that none of them leaves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy import signal  # type: ignore[import-untyped]
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.motion import Motion
+from pteron.motion.trajectories.replay import rows_of
+from pteron.shapes import Columns, PoseLike
+from pteron.tables import Table
+from pteron.workspace import Box, Proof, conditions, home_pose, prove
+from pteron.workspace.conditions import Condition, keeps
+
+COLUMNS = ("t", "ax", "ay", "az", "wx", "wy", "wz")
+"""The columns of a vehicle's motion: s; accelerations without gravity, m/s^2, and angular rates,
+rad/s, both in its own axes: x ahead, y to the left, z up."""
+
+_GRAVITY = 9.81
+_DAMPING = 1.0
+
+_SAMPLES, _ROOM, _TRIES = 4096, 3.0, 30
+"""Random poses of a box by which its size is found; how many times the demand it is at most; and
+sizes, each nine tenths of the last, that are tried until one is proved."""
+
+
+@dataclass(frozen=True)
+class Washout:
+    """The filters of a washout.
+
+    Parameters
+    ----------
+    scale : float
+        Share of the vehicle's accelerations and rates that is shown.
+    translation : float
+        rad/s: accelerations quicker than that are moved.
+    return_speed : float
+        rad/s, with which the platform comes back to the middle.
+    tilting : float
+        rad/s: accelerations slower than that are tilted into.
+    tilt_rate : float
+        Greatest rate of that tilt, rad/s: people do not notice what is slower than some 0.05.
+    rotation : float
+        rad/s: turns quicker than that are turned.
+    smoothing : float
+        rad/s, above which nothing is shown.
+    """
+
+    scale: float = 0.5
+    translation: float = 2.5
+    return_speed: float = 0.25
+    tilting: float = 2.0
+    tilt_rate: float = 0.05
+    rotation: float = 0.7
+    smoothing: float = 30.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0.0 < value < np.inf:
+                raise DataError(f"{name}: {value!r} given, a number above 0 expected")
+
+
+@dataclass(frozen=True, repr=False)
+class Cue(Motion):
+    """A motion of the platform that shows a vehicle's, within a box that is proved.
+
+    Attributes
+    ----------
+    region : Box
+        The poses that it keeps within.
+    proof : Proof
+        That all of them lie in the workspace.
+    pressed : float
+        The largest share of its demand that the box took away, of any coordinate; 0 where it fits.
+    """
+
+    region: Box
+    proof: Proof = field(repr=False)
+    pressed: float
+
+
+def cue(
+    robot: RobotLike,
+    table: str | Path | Table | Columns,
+    *,
+    washout: Washout | None = None,
+    pose: PoseLike | None = None,
+    type_ii: float = 0.0,
+) -> Cue:
+    """Return the motion of a simulator's platform that shows the motion of a vehicle.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        A machine whose platform moves and turns freely (3T3R), x ahead, y to the left, z up.
+    table : path, Table or mapping
+        The vehicle's motion: t, ax, ay, az, wx, wy, wz; see `COLUMNS`.
+    washout : Washout, optional
+        The filters.
+    pose : array, shape (m,), optional
+        The middle, to which it returns; by default the home pose.
+    type_ii : float
+        Least type-II measure in the box.
+
+    Returns
+    -------
+    Cue
+        With the table's own times.
+
+    Raises
+    ------
+    ModelError
+        If the platform is another, or no box about the middle is proved.
+    DataError
+        If a column is missing, or times do not ascend.
+    """
+    robot = as_manipulator(robot)
+    if robot.platform.motion != "3T3R":
+        raise ModelError(
+            f"a {robot.platform.motion} platform shows no vehicle's motion, which has six "
+            "coordinates; take a 3T3R one",
+            subject=robot.name,
+        )
+    middle = home_pose(robot) if pose is None else checked_one(robot, pose, "pose")
+    rows = rows_of(table, COLUMNS)
+    time, *columns = rows.numbers(COLUMNS).T
+    if len(time) < 2 or not (np.diff(time) > 0.0).all():
+        raise DataError(f"{rows.source}: t: two or more times expected that ascend, in seconds")
+    demand = _filtered(time - time[0], np.array(columns).T, washout or Washout())
+    region, proof = _box(robot, middle, np.abs(demand[0]).max(axis=0), type_ii)
+    half = 0.5 * np.ptp(region.box, axis=0)
+    parts = _pressed(demand, half)
+    took = 1.0 - np.abs(parts[0]).max(axis=0) / np.maximum(np.abs(demand[0]).max(axis=0), 1e-12)
+    moved = np.abs(demand[0]).max(axis=0) > 1e-9
+    pressed = float(np.max(took[moved], initial=0.0))
+    return Cue(time - time[0], middle + parts[0], parts[1], parts[2], region, proof, pressed)
+
+
+def _filtered(time: Array, given: Array, washout: Washout) -> Array:
+    """Return the demand (3, T, 6): x y z roll pitch yaw from the middle, with two derivatives."""
+    accelerations, rates = (washout.scale * part for part in (given[:, :3], given[:, 3:]))
+    w, s = washout.translation, washout.smoothing
+    resonance = [1.0, 2.0 * _DAMPING * w, w * w]
+    quick = np.polymul(resonance, [1.0, washout.return_speed])
+    moved = [_shown(time, a, [1.0, 0.0], quick) for a in accelerations.T]
+    # A level platform feels g along z; leaning it feels a share of it ahead or to the side.
+    lasting = [
+        _shown(time, a, [1.0], [1 / washout.tilting**2, 2 * _DAMPING / washout.tilting, 1.0])[0]
+        for a in (accelerations[:, 1], -accelerations[:, 0])
+    ]
+    w = washout.rotation
+    turned = [
+        _shown(time, r, [1.0, 0.0], np.polymul([1.0, 2.0 * _DAMPING * w, w * w], [1 / s, 1.0]))
+        for r in rates.T
+    ]
+    for angle, a in enumerate(lasting):
+        wanted = np.arcsin(np.clip(a / _GRAVITY, -0.9, 0.9))
+        steps = washout.tilt_rate * np.diff(time)
+        tilt = np.zeros(len(time))
+        for k, most in enumerate(steps):
+            tilt[k + 1] = tilt[k] + np.clip(wanted[k + 1] - tilt[k], -most, most)
+        turned[angle] = turned[angle] + _shown(time, tilt, [1.0], np.polymul(*[[1 / s, 1.0]] * 2))
+    return np.moveaxis(np.array([*moved, *turned]), 0, -1)
+
+
+def _shown(time: Array, value: Array, above: Sequence[float], below: Array) -> Array:
+    """Return a filter's output and two derivatives (3, T), of a value that was 0 before."""
+    return np.array(
+        [
+            signal.lsim((np.polymul(above, [1.0] + [0.0] * order), below), value, time)[1]
+            for order in range(3)
+        ]
+    )
+
+
+def _pressed(demand: Array, half: Array) -> Array:
+    """Return x / (1 + (x / L)^6)^(1 / 6) of x (T, 6), which stays within L, and its derivatives."""
+    x, dx, ddx = demand
+    share = x / half
+    whole = 1.0 + share**6
+    slope = whole ** (-7.0 / 6.0)
+    bend = -7.0 * share**5 * slope / whole / half
+    return np.array([x * whole ** (-1.0 / 6.0), slope * dx, slope * ddx + bend * dx * dx])
+
+
+def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tuple[Box, Proof]:
+    """Return a box about the middle, of the demand's proportions, that is proved to serve."""
+    asked: tuple[Condition, ...] = conditions(robot, type_ii=type_ii)
+    least = 1e-3 * max(float(demand.max()), 1e-3)
+    ways = np.random.default_rng(0).uniform(-1.0, 1.0, (_SAMPLES, len(middle)))
+    ways[: _SAMPLES // 2] = np.sign(ways[: _SAMPLES // 2])
+    half, low, high = np.maximum(demand, least), 0.0, _ROOM
+    for _ in range(_TRIES):
+        size = 0.5 * (low + high)
+        good = keeps(robot, asked, middle + size * half * ways).all()
+        low, high = (size, high) if good else (low, size)
+    for k in range(_TRIES):
+        size = low * 0.9**k
+        region = Box(tuple(middle - size * half), tuple(middle + size * half))
+        proof = prove(robot, region, given=asked)
+        if proof.holds:
+            return region, proof
+    raise ModelError(
+        f"no box of poses about {middle.round(6).tolist()} is proved to serve: {proof}; give "
+        "another middle",
+        subject=robot.name,
+    )
