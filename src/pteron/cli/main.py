@@ -162,6 +162,8 @@ pteron cycle quadrupteron
 pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv
 pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv
 pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv
+pteron cue drive.csv --robot simulator.toml --out cue.csv
+pteron cue flight.csv --robot simulator.toml --scale 0.3 --page cue.html
 pteron simulate delta --payload 1.0
 pteron simulate robot.toml --controller adaptive --model drawing.toml --cycles 10 --out run
 pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv
