@@ -18,19 +18,28 @@ The tests hold these forces against those of the bodies in motion.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import casadi as ca
 
 from pteron.bodies.motion import Expression, Moments
 from pteron.legs.circles import quarter_turn
 
-if TYPE_CHECKING:
-    from pteron.legs.prrr import PRRREquations
+
+class TwoBar(Protocol):
+    """The part of a leg's equations that its forces here need."""
+
+    lu: Expression
+    ll: Expression
+    sigma: Expression
+    e_plane: Expression
+    """e in the axes of the leg's plane, (2, 1)."""
+    aligned: bool
+    """Whether e is along d, so that sliding moves nothing in the plane."""
 
 
 def two_bar_needs(
-    leg: PRRREquations,
+    leg: TwoBar,
     u: list[Expression],
     sliding: Expression,
     gravity: Expression,

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pteron.html_table import Cell, Column, html_table
 
 if TYPE_CHECKING:
     from pteron.legs import LegKind
-    from pteron.manipulator.manipulator import Manipulator
 
 
-def machine_table(robot: Manipulator) -> str:
+def machine_table(robot: Any) -> str:
     """Return the legs of a machine as a table in HTML, and its platform above it."""
     driven = any(leg.drive for leg in robot.legs)
     columns = [
