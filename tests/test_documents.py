@@ -174,7 +174,10 @@ def blocks(text):
 WITH_BLOCKS = [name for name, text in TEXTS.items() if name != "README.md" and blocks(text)]
 
 
-SLOW = {"docs/plots.md", "docs/play.md", "docs/how-to/prove-a-workspace.md"}
+SLOW = {
+    *("docs/plots.md", "docs/play.md", "docs/simulation.md", "docs/controllers.md"),
+    *("docs/how-to/prove-a-workspace.md", "docs/how-to/singularities.md"),
+}
 
 
 @pytest.mark.parametrize(

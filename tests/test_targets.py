@@ -156,8 +156,8 @@ def assert_agrees(robot, what, target, **options):
 
 SOME_FUNCTIONS = (
     *("inverse_kinematics", "direct_kinematics", "direct_step", "reach", "constraint", "jacobian"),
-    *("joint_accelerations", "platform_motion", "inverse_dynamics", "forward_dynamics"),
-    *("joint_feed_forward", "computed_torque", "coriolis_matrix", "potential_energy", "regressor"),
+    *("platform_motion", "inverse_dynamics", "forward_dynamics", "joint_feed_forward"),
+    *("computed_torque", "potential_energy", "regressor"),
 )
 """Vectors, matrices and numbers, of poses and of motions, with parameters, drives and memory."""
 
@@ -194,7 +194,9 @@ def test_numba_returns_the_same_bits(name, what):
     assert_agrees(MECHANISMS[name], what, "numba")
 
 
-@pytest.mark.parametrize("name", ["quadrupteron-oblique", "tripteron", "delta"])
+@pytest.mark.parametrize(
+    "name", gated(["quadrupteron-oblique", "tripteron", "delta"], ["tripteron", "delta"])
+)
 def test_general_code_serves_every_machine_of_a_topology(name):
     robot = MECHANISMS[name]
     values = values_of(robot, DYNAMICS)
@@ -273,7 +275,7 @@ def test_float32_in_c(what):
     assert kernel(*(value[0].astype(np.float32) for value in values)).dtype == np.float32
 
 
-@pytest.mark.parametrize("what", SOME)
+@pytest.mark.parametrize("what", gated(SOME, ["direct_kinematics", DYNAMICS]))
 def test_jax(what):
     pytest.importorskip("jax")
     robot = CATALOG["quadrupteron-oblique"]
@@ -356,25 +358,25 @@ def test_the_cheapest_base_parameters_give_the_same_forces(name):
     assert relative_error(doubled(*motion), 2 * expected) < 1e-12
 
 
-def test_the_cheapest_base_parameters_know_no_unit_of_length():
+@pytest.mark.parametrize("size", gated([1e-3, 1e3], [1e-3]))
+def test_the_cheapest_base_parameters_know_no_unit_of_length(size):
     machine = random_machine(11, "PPP")
     names = pteron.cheapest_parameters(machine).names
-    for size in (1e-3, 1e3):
-        legs = tuple(
-            replace(
-                leg,
-                guide_point=tuple(size * np.array(leg.guide_point)),
-                platform_point=tuple(size * np.array(leg.platform_point)),
-                upper_length=size * leg.upper_length,
-                lower_length=size * leg.lower_length,
-                limits=None,
-            )
-            for leg in machine.legs
+    legs = tuple(
+        replace(
+            leg,
+            guide_point=tuple(size * np.array(leg.guide_point)),
+            platform_point=tuple(size * np.array(leg.platform_point)),
+            upper_length=size * leg.upper_length,
+            lower_length=size * leg.lower_length,
+            limits=None,
         )
-        assert pteron.cheapest_parameters(replace(machine, legs=legs)).names == names
+        for leg in machine.legs
+    )
+    assert pteron.cheapest_parameters(replace(machine, legs=legs)).names == names
 
 
-@pytest.mark.parametrize("name", NEAREST)
+@pytest.mark.parametrize("name", gated(NEAREST, ["quadrupteron", "delta"]))
 def test_any_choice_of_base_parameters_will_do(name):
     robot = CATALOG[name]
     motion = states(robot, 20)
