@@ -53,7 +53,7 @@ def test_a_step_is_no_longer_than_a_sample():
 
 
 def test_the_model_has_the_machines_working_mode():
-    given = ["quadrupteron", "--elbows=+-++", "--duration", 2, "--json"]
+    given = ["quadrupteron", "--elbows=+-++", "--duration", 0.5, "--json"]
     own, other = (json.loads(run(*given, *more).stdout) for more in ([], ["--model", given[0]]))
     assert own["tracking"] == other["tracking"]
 

@@ -1,6 +1,7 @@
 """Singularities: layouts that are singular everywhere, orientations, constraints, the nearest."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -261,20 +262,28 @@ def test_singular_poses_of_a_pose_beyond_its_joints_limits_are_found():
         pose = turned(pose)
 
 
-def test_distances_do_not_depend_on_the_unit_of_length():
-    robot, pose = CATALOG["delta"], np.array([0.1, -0.2, -0.8])
+AWAY = (0.1, -0.2, -0.8)
+
+
+@lru_cache
+def of_the_delta():
+    return nearest_singularities(CATALOG["delta"], AWAY, most=2000)
+
+
+@pytest.mark.parametrize("scale", gated([1e-3, 1e3], [1e-3]))
+def test_distances_do_not_depend_on_the_unit_of_length(scale):
+    robot, found = CATALOG["delta"], of_the_delta()
     lengths = ("guide_point", "platform_point", "fixed_offset", "upper_length", "lower_length")
-    found = nearest_singularities(robot, pose, most=2000)
-    for scale in (1e-3, 1e3):
-        legs = []
-        for leg in robot.legs:
-            values = {name: scale * np.array(getattr(leg, name)) for name in lengths}
-            legs.append(replace(leg, **{k: v.tolist() for k, v in values.items()}))
-        again = nearest_singularities(replace(robot, legs=tuple(legs)), scale * pose, most=2000)
-        assert [(one.kind, one.leg) for one in again] == [(one.kind, one.leg) for one in found]
-        sizes = [np.array([one.distance for one in told]) for told in (again, found)]
-        # As closely as it is searched: rounding leads to other boxes.
-        np.testing.assert_allclose(sizes[0], scale * sizes[1], rtol=5e-3)
+    legs = []
+    for leg in robot.legs:
+        values = {name: scale * np.array(getattr(leg, name)) for name in lengths}
+        legs.append(replace(leg, **{k: v.tolist() for k, v in values.items()}))
+    small = replace(robot, legs=tuple(legs))
+    again = nearest_singularities(small, scale * np.array(AWAY), most=2000)
+    assert [(one.kind, one.leg) for one in again] == [(one.kind, one.leg) for one in found]
+    sizes = [np.array([one.distance for one in told]) for told in (again, found)]
+    # As closely as it is searched: rounding leads to other boxes.
+    np.testing.assert_allclose(sizes[0], scale * sizes[1], rtol=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -308,8 +317,8 @@ def test_no_singular_pose_is_nearer_than_proved(name):
 
 
 def test_a_search_that_is_given_up_tells_its_bound():
-    robot, pose = CATALOG["delta"], [0.1, -0.2, -0.8]
-    whole = {(one.kind, one.leg): one for one in nearest_singularities(robot, pose, most=2000)}
+    robot, pose = CATALOG["delta"], AWAY
+    whole = {(one.kind, one.leg): one for one in of_the_delta()}
     short = nearest_singularities(robot, pose, most=1)
     assert {(one.kind, one.leg) for one in short} == set(whole)
     for one in short:
