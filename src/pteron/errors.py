@@ -104,15 +104,16 @@ class SingularPose(PteronError):
     Attributes
     ----------
     kind : str
-        ``"I"`` (a leg stretched or folded), ``"II"`` (the actuators do not hold the platform) or
-        ``"elbow"`` (the two ends of a leg coincide, so that its elbow may be anywhere).
+        ``"I"`` (a leg stretched or folded), ``"II"`` (the actuators do not hold the platform),
+        ``"elbow"`` (the two ends of a leg coincide, so that its elbow may be anywhere) or
+        ``"angles"`` (two of the pose's angles turn alike, while the machine may hold the platform).
     measure : float
-        The type-I measure of the leg, or the type-II measure of the machine: a number without unit
-        that is 0 at the singularity and 1 at best.
+        The type-I measure of the leg, the type-II measure of the machine, or the cosine of the
+        pose's second angle: a number without unit that is 0 at the singularity and 1 at best.
     index : tuple of int
         Which element of the batch; empty for a single pose.
     leg : int
-        The leg, counted from 1; 0 for kind II.
+        The leg, counted from 1; 0 for kind II and for angles.
     """
 
     def __init__(

@@ -35,28 +35,29 @@ def beyond_reach(machine: Machine, pose: Expression) -> Expression:
 
 
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
-    """Return the passive joints that have limits: the platform's angle first, then every leg's."""
+    """Return the passive joints that have limits: the platform's angles first, then every leg's."""
     state, platform = machine.state(pose), machine.robot.platform
     still, turned = ca.horzcat(*machine.platform.frame), state.platform.axes
-    angle = []
-    if platform.limits is not None:
-        radius = max(norm(leg.platform_point) for leg in machine.robot.legs)
-        angle = [Passive("phi", "rad", pose[-1], *platform.limits, radius or 1.0)]
+    radius = max(norm(leg.platform_point) for leg in machine.robot.legs) or 1.0
+    angles = [
+        Passive(name, "rad", pose[platform.coordinates.index(name)], *limits, radius)
+        for name, limits in platform.angle_limits.items()
+    ]
     pairs = zip(machine.robot.legs, state.legs, strict=True)
-    return [angle, *(leg.passive(motion, still, turned) for leg, motion in pairs)]
+    return [angles, *(leg.passive(motion, still, turned) for leg, motion in pairs)]
 
 
 def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
     """Return how far the passive joints of every leg (n, 1) are from their limits, the least.
 
     First as shares of half their ranges, then in metres that the leg moves meanwhile; negative
-    beyond, 1 and `FAR` for a leg without such limits. The platform's angle counts for every leg.
+    beyond, 1 and `FAR` for a leg without such limits. The platform's angles count for every leg.
     """
     shares, metres = [], []
-    angle, *legs = passive_joints(machine, pose)
+    angles, *legs = passive_joints(machine, pose)
     for joints in legs:
         share, way = ca.SX(1), ca.SX(FAR)
-        for joint in (*angle, *joints):
+        for joint in (*angles, *joints):
             room = ca.fmin(joint.value - joint.least, joint.most - joint.value)
             share = ca.fmin(share, room / (0.5 * (joint.most - joint.least)))
             way = ca.fmin(way, room * joint.lever)
@@ -110,6 +111,15 @@ def jacobian(state: State) -> Expression:
     pairs = zip(state.legs, state.platform.matrices, strict=True)
     rows = ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, matrix) for leg, matrix in pairs))
     return state.platform.pose_rows(rows)
+
+
+def twist_jacobian(state: State) -> Expression:
+    """Return the legs' rows (n, 6) against the twist of P: q' = rows (v, omega)."""
+    platform = state.platform
+    if not platform.point_twists:  # x' is the twist in orthonormal axes
+        return ca.mtimes(jacobian(state), platform.matrix.T)
+    pairs = zip(state.legs, platform.point_twists, strict=True)
+    return ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, shift) for leg, shift in pairs))
 
 
 def body_jacobian(state: State, i: int, letter: str) -> Expression | None:

@@ -40,9 +40,10 @@ expression with the shape it is to have."""
 Outputs = dict[str, Output]
 """Outputs by name, in order."""
 
-Need = Literal["rows", "reach", "type I", "type II"]
+Need = Literal["rows", "reach", "type I", "angles", "type II"]
 """A condition on the pose: in reach, not singular of type I, of type II; "rows" asks for the first
-two of those legs alone whose row [dq/dc | dq/dphi] depends on the pose."""
+two of those legs alone whose row [dq/dc | dq/dphi] depends on the pose; "angles" for angles of the
+platform that are not singular."""
 
 TYPE_I = 1e-4
 """Least type-I measure of a leg (0 where it is singular) where a result is divided by it: the
@@ -50,6 +51,9 @@ relative error is 1e-15 to 1e-14 over the measure's square, so that six digits a
 
 TYPE_II = 1e-9
 """Least type-II measure of the machine where a result needs J^-1: six digits are left here."""
+
+ANGLES = 1e-9
+"""Least measure of the platform's angles where a result is the rate of one: six digits are left."""
 
 Symbols = dict[str, Any]
 """The expressions an entry builds with, by name: the inputs, or what a caller puts for them."""
@@ -143,6 +147,18 @@ def _squared_type_i(m: Machine, v: Symbols) -> Outputs:
 def _type_ii(m: Machine, v: Symbols) -> Outputs:
     state = _state(m, v)
     return {"type_ii": m.closure.measure(state.platform, state.legs)}
+
+
+def _twist(m: Machine, v: Symbols) -> Outputs:
+    platform = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2)
+    return {"twist": ca.mtimes(platform.twist_rows, v["velocity"])}
+
+
+def _velocity_of_twist(m: Machine, v: Symbols) -> Outputs:
+    velocity, rest = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).velocity_of(
+        v["twist"]
+    )
+    return {"velocity": velocity, "rest": rest}
 
 
 def _link_jacobians(m: Machine, v: Symbols) -> Outputs:
@@ -324,6 +340,7 @@ _POSE, _RATE = ("pose",), ("pose", "velocity")
 _MOTION = ("pose", "velocity", "acceleration")
 _BENT: tuple[Need, ...] = ("reach", "type I")
 _HELD: tuple[Need, ...] = ("reach", "type I", "type II")
+_MOVED: tuple[Need, ...] = (*_BENT, "angles")
 _SAMPLE = (*_MOTION, "joints", "joint_rates", "memory", "gains")
 
 TABLE: dict[str, Entry] = {
@@ -365,6 +382,11 @@ TABLE: dict[str, Entry] = {
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),
+    "twist_jacobian": Entry(
+        _POSE, lambda m, v: {"rows": kinematics.twist_jacobian(_state(m, v))}, ("rows",)
+    ),
+    "twist": Entry(_RATE, _twist),
+    "velocity_of_twist": Entry((*_POSE, "twist"), _velocity_of_twist, ("angles",)),
     "link_jacobians": Entry(_POSE, _link_jacobians, _BENT),
     "joint_screws": Entry(
         _POSE, lambda m, v: {"screws": [s.T for s in kinematics.joint_screws(_state(m, v))]}, _BENT
@@ -372,11 +394,11 @@ TABLE: dict[str, Entry] = {
     "joint_rates": Entry(_RATE, _joint_motion, _BENT),
     "joint_accelerations": Entry(_MOTION, _joint_motion, _BENT),
     "platform_motion": Entry(
-        ("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD
+        ("pose", "joint_rates", "joint_accelerations"), _platform_motion, (*_MOVED, "type II")
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
-    "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
+    "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _MOVED),
     "drive_forces": Entry(
         (*_MOTION, "parameters", "drives"), partial(_drive_forces, smooth=False), _HELD
     ),
@@ -388,7 +410,7 @@ TABLE: dict[str, Entry] = {
         _joint_feed_forward,
     ),
     "drive_accelerations": Entry(
-        (*_RATE, "forces", "parameters", "drives"), _drive_accelerations, _BENT
+        (*_RATE, "forces", "parameters", "drives"), _drive_accelerations, _MOVED
     ),
     **{
         what: Entry(

@@ -21,7 +21,16 @@ from pteron.equations import control, kinematics
 from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
-from pteron.kernels.functions import FUNCTIONS, TABLE, TYPE_I, TYPE_II, Entry, Output, Symbols
+from pteron.kernels.functions import (
+    ANGLES,
+    FUNCTIONS,
+    TABLE,
+    TYPE_I,
+    TYPE_II,
+    Entry,
+    Output,
+    Symbols,
+)
 from pteron.kernels.kept import Program, kept
 from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimised
@@ -209,6 +218,7 @@ def _program(
     sizes = {
         "parameters": len(machine.parameters),
         "wrench": machine.wrench_size,
+        "twist": 6,
         "drives": len(Drives._fields) * machine.freedom,
         **control.input_sizes(what, machine.freedom, selected),
     }
@@ -275,6 +285,11 @@ def _status(
             if "reach" in entry.needs or not leg.row_is_constant:
                 least = -_TINY if entry.needs == ("reach",) else TYPE_I**2 * at.scale
                 status = ca.if_else(least < at.discriminant, status, 0)
+    if "angles" in entry.needs:
+        rest = ca.SX.zeros(machine.freedom)
+        measure = machine.platform.motion(symbols["pose"], rest, rest).angle_measure
+        if not measure.is_constant():
+            status = ca.if_else(measure * measure > ANGLES**2, status, 0)
     if "type II" in entry.needs:
         state = machine.state(symbols["pose"])
         measure = machine.closure.measure(state.platform, state.legs)

@@ -16,6 +16,14 @@ from pteron.kinematics.direct import (
 )
 from pteron.kinematics.following import follow
 from pteron.kinematics.joints import JointMotion, joint_accelerations, joint_rates, joint_screws
+from pteron.kinematics.pose_conversions import (
+    pose_of,
+    position_of,
+    rotation_of,
+    twist,
+    twist_jacobian,
+    velocity_of,
+)
 from pteron.kinematics.position import (
     inverse_kinematics,
     jacobian,
@@ -44,8 +52,14 @@ __all__ = [
     "link_vectors",
     "mode_of",
     "nearest",
+    "pose_of",
+    "position_of",
     "random_poses",
+    "rotation_of",
     "singular_orientations",
+    "twist",
+    "twist_jacobian",
+    "velocity_of",
     "working_mode",
 ]
 check_arguments(__name__)

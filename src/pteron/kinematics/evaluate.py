@@ -13,7 +13,7 @@ import numpy as np
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, Selects, as_array, needs_of, numeric
-from pteron.kernels.functions import TYPE_I, TYPE_II
+from pteron.kernels.functions import ANGLES, TYPE_I, TYPE_II
 from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 from pteron.kinematics.unlikely_values import warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -130,6 +130,21 @@ def _failure(
     return _bad_pose(robot, pose, needs_of(what), index, many, far=_some_far(robot, all_bad))
 
 
+def singular_angles(
+    robot: Manipulator, pose: Array, index: tuple[int, ...], many: str = ""
+) -> SingularPose:
+    """Return what is said where the pose's angles are singular."""
+    first, second, third = robot.platform.angles
+    return SingularPose(
+        f"{place('pose', index)}: the angles are singular where {second} is +-90 degrees, not the "
+        f"machine: {first} and {third} turn alike there, so that their rates are not determined; "
+        f"keep away from it, or give the machine's file other angles{many}",
+        kind="angles",
+        measure=float(robot.platform.angle_measures(pose)),
+        index=index,
+    )
+
+
 def place(name: str, index: tuple[int, ...]) -> str:
     """Return where an element of a batch is: "pose[3]", or "pose" where there is but one."""
     return f"{name}[{', '.join(map(str, index))}]" if index else name
@@ -190,6 +205,8 @@ def _bad_pose(
                 index=index,
                 leg=i + 1,
             )
+    if "angles" in needs and robot.platform.angle_measures(pose) <= ANGLES:
+        return singular_angles(robot, pose, index, many)
     if is_singular_everywhere(robot):
         return singular_everywhere(robot, index)
     measure = abs(float(numeric(robot, "type_ii")(pose)[0]))

@@ -24,7 +24,7 @@ class LimitedJoint:
     Attributes
     ----------
     leg : int
-        Its leg, from 1; 0 for the platform's angle.
+        Its leg, from 1; 0 for an angle of the platform.
     noun : str
         Its kind: "slider", "elbow", ...
     actuated : bool
@@ -59,8 +59,8 @@ def limited_joints(robot: RobotLike, pose: PoseLike) -> tuple[LimitedJoint, ...]
     robot = as_manipulator(robot)
     given = checked_one(robot, pose, "pose")
     joints = numeric(robot, "joint_coordinates")(given)[0]
-    angle, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(given)))
-    found = [_limited(0, joint) for joint in angle]
+    angles, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(given)))
+    found = [_limited(0, joint) for joint in angles]
     for i, (leg, q, passive) in enumerate(zip(robot.legs, joints, legs, strict=True), start=1):
         if leg.limits is not None:
             own = leg.joint

@@ -24,7 +24,9 @@ def random_poses(
     """Return poses drawn at random from those in reach and away from singularities.
 
     Uniformly in position and orientation, within a box that holds all but the rarest corners.
-    Passive joints and the platform's angle keep their limits; the actuated joints need not.
+    Passive joints and the platform's angle keep their limits; the actuated joints need not. A
+    platform that tilts is drawn within the limits of its angles, or where it has none with each of
+    them within 0.5 rad of 0, and its actuated joints keep their limits too: poses that it takes.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from operator import itemgetter
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,7 @@ from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.type_ii_sizes import type_ii_sizes
+from pteron.legs.leg import Passive
 from pteron.manipulator import Manipulator
 
 _BATCH = 4096
@@ -22,6 +24,12 @@ _ATTEMPTS = 250
 
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
+
+_LEADING = 20
+"""Steps of Newton's method that lead a pose to joint coordinates."""
+
+_TILT = 0.5
+"""rad from level to which a platform that tilts is drawn, where its file does not limit it."""
 
 _SEEN = 1000
 """Poses that tell how often limits are kept."""
@@ -46,16 +54,85 @@ def drawn_poses(
     ModelError
         If the legs have next to no common reach.
     """
-    center, radius = search_ball(robot)
-    low, high = center - radius, center + radius
-    coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, type_i, type_ii, limits)
-    if len(coarse) >= count:
-        return coarse[:count]
+    low, high = _widest_box(robot)
+    wanted = _Wanted(type_i, type_ii, limits)
+    coarse = _led(robot, low, high, rng, wanted)
+    free, share = np.ones(robot.freedom, dtype=bool), 0.05
+    if len(coarse) < _SCOUTS:
+        coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, wanted)
+        if len(coarse) >= count:
+            return coarse[:count]
+        free, share = ~robot.platform.angular, 0.25
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
-    least, most = (coarse[:, : len(low)].min(axis=0), coarse[:, : len(low)].max(axis=0))
-    margin = 0.25 * (most - least)
-    low, high = np.maximum(least - margin, low), np.minimum(most + margin, high)
-    return _drawn(robot, low, high, count, rng, type_i, type_ii, limits)[:count]
+    least, most = coarse.min(axis=0), coarse.max(axis=0)
+    margin = share * (most - least)
+    low = np.where(free, np.maximum(least - margin, low), low)
+    high = np.where(free, np.minimum(most + margin, high), high)
+    return _drawn(robot, low, high, count, rng, wanted)[:count]
+
+
+class _Wanted(NamedTuple):
+    """Conditions on a pose in reach."""
+
+    type_i: float
+    """Least measure."""
+    type_ii: float
+    limits: bool
+    """Whether limits are kept: those of passive joints, and of actuated ones where it tilts."""
+
+    def reached(self, robot: Manipulator, poses: Array) -> Array:
+        """Return those of the poses that are in reach and away from singularities."""
+        _, measures, _, _ = numeric(robot, "reach")(poses)
+        poses = poses[(measures >= self.type_i).all(axis=-1)]
+        if self.type_ii > 0.0 and len(poses):
+            poses = poses[type_ii_sizes(robot, poses) >= self.type_ii]
+        return poses
+
+    def kept(self, robot: Manipulator, poses: Array) -> Array:
+        """Return those of the poses that keep the limits."""
+        if self.limits:
+            poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
+        if self.limits and robot.platform.tilts:
+            low, high = _joint_limits(robot)
+            joints = numeric(robot, "joint_coordinates")(poses)[0]
+            poses = poses[((low <= joints) & (joints <= high)).all(axis=-1)]
+        return poses
+
+
+def _widest_box(robot: Manipulator) -> tuple[Array, Array]:
+    """Return the ends of a box (m,) of poses from which to draw."""
+    center, radius = search_ball(robot)
+    platform = robot.platform
+    # Beyond half a turn phi counts where the platform's shaft makes several.
+    turn = max((np.pi, *(abs(end) for pair in platform.angle_limits.values() for end in pair)))
+    ends = dict.fromkeys(platform.angles, (-turn, turn))
+    if platform.tilts:
+        ends = dict.fromkeys(platform.angles, (-_TILT, _TILT)) | platform.angle_limits
+    angles = np.array(list(ends.values())).reshape(-1, 2)
+    low = np.concatenate([center - radius, angles[:, 0]])
+    return low, np.concatenate([center + radius, angles[:, 1]])
+
+
+def _joint_limits(robot: Manipulator) -> Array:
+    return np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
+
+
+def _led(
+    robot: Manipulator, low: Array, high: Array, rng: np.random.Generator, wanted: _Wanted
+) -> Array:
+    """Return usable poses that Newton's method leads from a box to random joint coordinates.
+
+    Short rams leave so little of the box that next to no pose of it keeps their limits. None is led
+    where the platform does not tilt, or a joint has no limits.
+    """
+    if not (wanted.limits and robot.platform.tilts and all(leg.limits for leg in robot.legs)):
+        return np.empty((0, robot.freedom))
+    poses = rng.uniform(low, high, (_BATCH, robot.freedom))
+    joints = rng.uniform(*_joint_limits(robot), (_BATCH, robot.joint_count))
+    for _ in range(_LEADING):
+        poses = numeric(robot, "newton_step")(joints, poses)[0]
+    poses = poses[((low <= poses) & (poses <= high)).all(axis=-1)]
+    return wanted.kept(robot, wanted.reached(robot, poses))
 
 
 def _drawn(
@@ -64,36 +141,26 @@ def _drawn(
     high: Array,
     count: int,
     rng: np.random.Generator,
-    type_i: float,
-    type_ii: float,
-    limits: bool,
+    wanted: _Wanted,
 ) -> Array:
-    """Return at least `count` usable poses with positions drawn from a box."""
+    """Return at least `count` usable poses drawn from a box."""
     found: list[Array] = []
     total = reached = 0
     seen = np.empty((0, robot.freedom))
     for _ in range(_ATTEMPTS + count // 16):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
-        lengths = len(low)
-        poses[:, :lengths] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :lengths]
-        # Beyond half a turn phi counts where the platform's shaft makes several.
-        poses[:, lengths:] *= max((np.pi, *map(abs, robot.platform.limits or ())))
-        _, measures, _, _ = numeric(robot, "reach")(poses)
-        poses = poses[(measures >= type_i).all(axis=-1)]
-        if type_ii > 0.0 and len(poses):
-            poses = poses[type_ii_sizes(robot, poses) >= type_ii]
+        poses = wanted.reached(robot, 0.5 * (low + high) + 0.5 * (high - low) * poses)
         reached += len(poses)
         seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses])
-        if limits:
-            poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
-        found.append(poses)
-        total += len(poses)
+        found.append(wanted.kept(robot, poses))
+        total += len(found[-1])
         if total >= count:
             return np.concatenate(found)
     if reached >= count:
         raise ModelError(
             f"only {total} of {reached} random poses in reach of all legs keep the limits of "
-            f"passive joints: {_seldom_kept(robot, seen)}; widen these limits",
+            f"{'joints' if robot.platform.tilts else 'passive joints'}: "
+            f"{_seldom_kept(robot, seen)}; widen these limits",
             subject=robot.name,
         )
     raise ModelError(
@@ -105,9 +172,15 @@ def _drawn(
 
 def _seldom_kept(robot: Manipulator, poses: Array) -> str:
     """Return which passive joints seldom keep their limits at given poses, and how often."""
-    pose = ca.SX.sym("pose", robot.freedom)
-    angle, *legs = passive_joints(Machine.of(robot), pose)
-    found = [("", joint) for joint in angle]
+    pose, machine = ca.SX.sym("pose", robot.freedom), Machine.of(robot)
+    angles, *legs = passive_joints(machine, pose)
+    if robot.platform.tilts:
+        for leg, motion, own in zip(robot.legs, machine.state(pose).legs, legs, strict=True):
+            if leg.limits is not None:
+                own.append(
+                    Passive(leg.joint.noun, leg.joint.unit, motion.coordinate, *leg.limits, 1.0)
+                )
+    found = [("", joint) for joint in angles]
     found += [(f"leg {i}: ", joint) for i, leg in enumerate(legs, start=1) for joint in leg]
     value = ca.Function("value", [pose], [ca.vertcat(*(joint.value for _, joint in found))])
     low, high = np.array([(joint.least, joint.most) for _, joint in found]).T

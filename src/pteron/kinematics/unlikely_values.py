@@ -40,13 +40,13 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
     -------
     tuple of str
     """
-    length, turn = unlikely_length(robot), _turn(robot.platform.limits)
-    far = dict.fromkeys(COORDINATES, length) | dict.fromkeys(robot.platform.angles, turn)
-    angles = set(robot.platform.angles)
+    length, limits = unlikely_length(robot), robot.platform.angle_limits
+    turns = {name: _turn(limits.get(name)) for name in robot.platform.angles}
+    far, angles = dict.fromkeys(COORDINATES, length) | turns, set(turns)
     for name, leg in zip(robot.joint_names, robot.legs, strict=True):
         far[name] = length
         if leg.joint.unit == "rad":
-            far[name] = max(_turn(leg.limits), turn, _WOUND)
+            far[name] = max(_turn(leg.limits), *turns.values(), _WOUND)
             angles.add(name)
     found = []
     for turning, question in (

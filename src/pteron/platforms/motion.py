@@ -80,6 +80,28 @@ class PlatformMotion(NamedTuple):
         rates = ca.mtimes(self._angular_inverse, quasi[lengths:, :])
         return ca.vertcat(quasi[:lengths, :], rates)
 
+    @property
+    def twist_rows(self) -> Expression:
+        """The twist (v, omega) of P, (6, m), against the pose's rates."""
+        return self.pose_rows(self.matrix)
+
+    def velocity_of(self, twist: Expression) -> tuple[Expression, Expression]:
+        """Return x' (m, 1) of a twist of P (6, 1), and what is left of the twist at it.
+
+        What the motion cannot have of it is left, by the least squares of the quasi-velocities.
+        """
+        square, across = ca.mtimes(self.matrix.T, self.matrix), ca.mtimes(self.matrix.T, twist)
+        quasi = across if square.is_constant() else ca.mtimes(ca.inv_minor(square), across)
+        return self.pose_rates(quasi), twist - ca.mtimes(self.matrix, quasi)
+
+    @property
+    def angle_measure(self) -> Expression:
+        """Det E: 0 where the angles are singular, which the machine need not be; 1 at best."""
+        if self.angular is None:
+            return ca.SX(1)
+        a, b, c = ca.horzsplit(self.angular)
+        return ca.dot(a, ca.cross(b, c))
+
     def quasi_forces(self, forces: Expression) -> Expression:
         """Return forces (m, K) along the quasi-velocities from those along the pose."""
         if self.angular is None:

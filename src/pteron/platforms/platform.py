@@ -355,6 +355,16 @@ class Platform:
         axes = [cos * x + sin * y, cos * y - sin * x, np.broadcast_to(z, (*angle.shape[:-1], 3))]
         return poses[..., :count] @ self.directions, np.stack(axes, axis=-2)
 
+    def angle_measures(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a measure (...) of poses' angles, 1 at best: 0 where these are singular.
+
+        So they are where the second turn of three lays the third one's axis along the first.
+        """
+        middle = {"rpy": "pitch", "xyz": "ry"}[self.angle_order]
+        if len(self.angles) < 3:
+            return np.ones(poses.shape[:-1])
+        return np.abs(np.cos(poses[..., self.coordinates.index(middle)]))
+
     def _placed(
         self, poses: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

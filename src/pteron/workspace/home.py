@@ -1,7 +1,7 @@
 """The home pose: where a machine has the best margin to singularities and limits.
 
 The margin counts turning of the platform as a loss. Among poses of nearly equal margin a simple one
-is taken: on an axis of symmetry, with little joint travel, in round numbers.
+is taken: level, on an axis of symmetry, with little joint travel, in round numbers.
 """
 
 from __future__ import annotations
@@ -36,6 +36,9 @@ _SOURCES = (*EQUATIONS, "kinematics", "workspace")
 _STARTS = 12
 """Random poses, the best ones, that are improved by a local search."""
 
+_LEVELLED = 4
+"""The best of these, made level, that are improved by another."""
+
 _STEPS = (0.02, 0.2)
 """Size of a local search's first simplex: m and rad."""
 
@@ -51,6 +54,9 @@ _WORTH = 0.99
 _AXIS = 0.75
 """Share of the best margin from which on a pose on the axis of a machine's symmetry is
 preferred."""
+
+_LEVEL = 0.75
+"""Share of the best margin from which on a level pose of a platform that tilts is preferred."""
 
 _SAME = 1e-9
 """Differences of margins that are rounding."""
@@ -77,8 +83,9 @@ def home_pose(robot: RobotLike) -> Array:
     array, shape (m,)
         m and rad. Its margin is at least 98 % of the best one found. Of equals it is the one whose
         sliders are nearest to their guide points, and cranks to their zero; or the middle between
-        them, if that has 90 %. Of a machine that a turn about the platform's axis leaves as it is,
-        it is on that axis, if the best place there has 75 %.
+        them, if that has 90 %. A platform that tilts is level, all its angles 0, if the best level
+        pose has 75 %. Of a machine that a turn about the platform's axis leaves as it is, it is on
+        that axis, if the best place there has 75 %.
 
     Raises
     ------
@@ -122,6 +129,10 @@ def _best(robot: Manipulator) -> Array:
     if most <= 0.0:
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
         raise beyond_limits(robot, np.concatenate([refined[reached], drawn]))
+    level = _level(robot, refined)
+    worth = np.asarray(_worth(robot, level))
+    if worth.max(initial=0.0) >= _LEVEL * most:
+        refined, drawn, margins, most = level, drawn * ~robot.platform.angular, worth, worth.max()
     # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[margins >= _WORTH * most]
     best = _least_travel(robot, equals)
@@ -155,6 +166,18 @@ def _least_travel(robot: Manipulator, poses: Array) -> Array:
     return nearest
 
 
+def _level(robot: Manipulator, poses: Array) -> Array:
+    """Return locally best poses whose angles are all 0; none where the platform does not tilt."""
+    moved = ~robot.platform.angular
+    level = poses * moved
+    if not robot.platform.tilts:
+        return poses[:0]
+    if moved.any():
+        order = np.argsort(-np.asarray(_worth(robot, level)), kind="stable")
+        level = np.array([_refined(robot, level[i], moved) for i in order[:_LEVELLED]])
+    return level
+
+
 def _on_axis(robot: Manipulator, poses: Array) -> Array:
     """Return poses (K, m) moved onto the axis of the machine's symmetry; none if it has none.
 
@@ -163,16 +186,19 @@ def _on_axis(robot: Manipulator, poses: Array) -> Array:
     """
     center, _ = search_ball(robot)
     directions, axis = robot.platform.directions, np.array(robot.platform.axis)
-    lengths = len(center)
-    turn = Rotation.from_rotvec(2.0 * np.pi / len(robot.legs) * axis).as_matrix()
-    beside = poses[:, :lengths] - center
-    images = poses.copy()
-    images[:, :lengths] = center + beside @ (directions @ turn @ directions.T).T
-    if not np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):
-        return poses[:0]
-    along = directions @ axis
-    images[:, :lengths] = center + np.outer(beside @ along, along)
-    return images
+    lengths, count = len(center), len(robot.legs)
+    if robot.platform.tilts and poses[:, robot.platform.angular].any():
+        return poses[:0]  # the turn would turn their angles too
+    beside, along = poses[:, :lengths] - center, directions @ axis
+    # Legs of a hexapod stand in pairs.
+    for fold in (count, count // 2) if robot.platform.tilts else (count,):
+        turn = Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
+        images = poses.copy()
+        images[:, :lengths] = center + beside @ (directions @ turn @ directions.T).T
+        if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):
+            images[:, :lengths] = center + np.outer(beside @ along, along)
+            return images
+    return poses[:0]
 
 
 def _distinct(poses: Array, apart: Array) -> Array:
@@ -193,13 +219,21 @@ def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
     return np.where(robot.platform.angular, radians, metres)
 
 
-def _refined(robot: Manipulator, start: Array) -> Array:
-    """Return the pose of a locally best margin."""
-    simplex = np.vstack([start, start + np.diag(_steps(robot, *_STEPS))])
+def _refined(robot: Manipulator, start: Array, moved: Array | None = None) -> Array:
+    """Return the pose of a locally best margin, by moving those coordinates that are marked."""
+    free = np.ones(len(start), dtype=bool) if moved is None else moved
+
+    def pose(values: Array) -> Array:
+        whole = start.copy()
+        whole[free] = values
+        return whole
+
+    first = start[free]
+    simplex = np.vstack([first, first + np.diag(_steps(robot, *_STEPS)[free])])
     found = minimize(
-        lambda pose: -float(_worth(robot, pose)),
-        start,
+        lambda values: -float(_worth(robot, pose(values))),
+        first,
         method="Nelder-Mead",
         options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-6, "maxiter": 500},
     )
-    return np.asarray(found.x)
+    return pose(found.x)

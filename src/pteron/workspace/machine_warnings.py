@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.vectors import Vector, cross
 from pteron.errors import PteronError
 from pteron.kernels import Array
@@ -62,11 +63,13 @@ def machine_warnings(robot: Manipulator) -> tuple[str, ...]:
     found = _in_millimetres(far)
     if hypot(*robot.gravity) > _PULL:
         found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
-    if platform.limits and max(map(abs, platform.limits)) > 2.0 * pi:
-        found.append(
-            f"platform: limits: {list(platform.limits)} rad, more than a turn from "
-            f"{platform.angles[0]} = 0: are these degrees?"
-        )
+    turn, most = ("half a turn", pi) if platform.tilts else ("a turn", 2.0 * pi)
+    found += [
+        f"platform: limits: {list(limits)} rad, more than {turn} from {angle} = 0: are these "
+        "degrees?"
+        for angle, limits in platform.angle_limits.items()
+        if max(map(abs, limits)) > most
+    ]
     radius = max(hypot(*leg.platform_point) for leg in robot.legs)
     points = any("platform_point" in keys for keys in far.values())
     # Consequences of lengths in millimetres are not listed beside them.
@@ -212,10 +215,11 @@ def _spread(platform: Platform, radius: float) -> Iterator[str]:
     off = hypot(*body.center_of_mass)
     if off > size:
         yield f"center_of_mass: {off:g} m away: are these mm?"
-    if sqrt(body.inertia / body.mass) > 3.0 * size:
+    inertia = body.inertia if isinstance(body, PlanarInertia) else max(np.diag(body.tensor))
+    if sqrt(inertia / body.mass) > 3.0 * size:
         yield (
-            f"inertia: {body.inertia:g} kg m^2 with {body.mass:g} kg is mass "
-            f"{sqrt(body.inertia / body.mass):g} m away: is it in kg m^2?"
+            f"inertia: {inertia:g} kg m^2 with {body.mass:g} kg is mass "
+            f"{sqrt(inertia / body.mass):g} m away: is it in kg m^2?"
         )
     for i, bar in enumerate(platform.bars, start=1):
         off = hypot(*bar.hinge)

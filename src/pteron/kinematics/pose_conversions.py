@@ -1,0 +1,375 @@
+"""Poses to positions and rotations, and back; their rates to twists, and back.
+
+A rotation is a matrix (..., 3, 3) that takes vectors of the platform's frame to the base frame, or
+a quaternion (..., 4), scalar last, or tilt and torsion (..., 3).
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels import Array, as_array, numeric
+from pteron.kernels.functions import ANGLES
+from pteron.kinematics.evaluate import checked, evaluated, expect_choice, place, singular_angles
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.platforms.nearest_pose import nearest_pose
+from pteron.shapes import Matrices, OnFailure, PerCoordinate, PoseLike, Vectors
+
+RotationForm = Literal["matrix", "quaternion", "tilt-torsion"]
+"""How a rotation is written."""
+
+_SHAPES: dict[str, tuple[int, ...]] = {
+    "matrix": (3, 3),
+    "quaternion": (4,),
+    "tilt-torsion": (3,),
+}
+
+_ROUNDING = 1e-7
+"""m, rad and their rates, by which what is given may differ from what the motion can have; more is
+no rounding, not even that of numbers of 32 bits."""
+
+
+def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
+    """Return where P is, in the base frame; of a tripod the planes tell x and y.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+
+    Returns
+    -------
+    array, shape (..., 3)
+        m; NaN where a tripod's planes allow no such pose.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.position_of("wrist", [0.1, 0.2, 0.3])
+    array([0.  , 0.  , 0.12])
+    """
+    robot = as_manipulator(robot)
+    return robot.platform.at(checked(robot, pose, "pose"))[0]
+
+
+def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matrix") -> Array:
+    """Return the platform's rotation.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    form : {"matrix", "quaternion", "tilt-torsion"}
+        A matrix; a quaternion (x, y, z, w), as SciPy and ROS have it, with w >= 0; or (azimuth,
+        tilt, torsion) of R = Rz(azimuth) Ry(tilt) Rz(torsion - azimuth) in the platform's frame at
+        angles zero, of which the azimuth is 0 where the platform is level.
+
+    Returns
+    -------
+    array, shape (..., 3, 3), (..., 4) or (..., 3)
+        NaN where a tripod's planes allow no such pose.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> pteron.rotation_of("stewart", [0, 0, 2.0, 0, 0, np.pi / 2], form="quaternion").round(4)
+    array([0.    , 0.    , 0.7071, 0.7071])
+    """
+    robot = as_manipulator(robot)
+    _expect_form(form)
+    matrix = np.swapaxes(robot.platform.at(checked(robot, pose, "pose"))[1], -1, -2)
+    if form == "matrix":
+        return np.ascontiguousarray(matrix)
+    if form == "tilt-torsion":
+        return _tilt_torsion(_turned(robot) @ matrix)
+    return _quaternion(matrix)
+
+
+def pose_of(
+    robot: RobotLike,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    *,
+    form: RotationForm = "matrix",
+    on_failure: OnFailure = "raise",
+) -> PerCoordinate:
+    """Return the poses of a position of P and a rotation, which broadcast.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    position : array, shape (..., 3)
+        P in the base frame, m.
+    rotation : array, shape (..., 3, 3), (..., 4) or (..., 3)
+        The platform's rotation, written as `form` says; see `rotation_of`.
+    form : {"matrix", "quaternion", "tilt-torsion"}
+        How it is written. A quaternion may have any length but 0.
+    on_failure : {"raise", "nan"}
+        Whether what the motion cannot have raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., m)
+        m and rad. Where the angles are singular, at a pitch (ry) of +-90 degrees, roll (rx) is 0.
+
+    Raises
+    ------
+    DataError
+        If a matrix is no rotation, or the platform's motion has no such position and rotation: by
+        more than 1e-7 m or rad.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> pteron.pose_of("stewart", [0.0, 0.1, 2.0], [0, 0, 1, 1], form="quaternion").round(4)
+    array([0.    , 0.1   , 2.    , 0.    , 0.    , 1.5708])
+    """
+    robot = as_manipulator(robot)
+    _expect_form(form)
+    expect_choice(on_failure)
+    at = as_array(position, "position", (3,))
+    given = as_array(rotation, "rotation", _SHAPES[form])
+    matrix = _matrix(robot, given, form)
+    lead = np.broadcast_shapes(at.shape[:-1], matrix.shape[:-2])
+    at, matrix = np.broadcast_to(at, (*lead, 3)), np.broadcast_to(matrix, (*lead, 3, 3))
+    skewed = np.abs(np.swapaxes(matrix, -1, -2) @ matrix - np.eye(3)).max(axis=(-1, -2))
+    skewed = np.where(np.linalg.det(matrix) > 0.0, skewed, np.inf)
+    pose = nearest_pose(robot.platform, at, matrix)
+    found, axes = robot.platform.at(pose)
+    away = np.linalg.norm(found - at, axis=-1)
+    turned = np.linalg.norm(axes @ matrix - np.eye(3), axis=(-1, -2)) / np.sqrt(2.0)
+    good = (skewed <= _ROUNDING) & (away <= _ROUNDING) & (turned <= _ROUNDING)
+    if good.all():
+        return pose
+    if on_failure == "nan":
+        return np.where(good[..., None], pose, np.nan)
+    index = tuple(int(i) for i in np.argwhere(~good)[0])
+    numbers = np.isfinite(at[index]).all() and np.isfinite(matrix[index]).all()
+    if not numbers:
+        raise DataError(f"{place('position', index)}, rotation: finite numbers expected")
+    if not skewed[index] <= _ROUNDING:
+        raise DataError(
+            f"{place('rotation', index)}: no rotation: its columns are no unit vectors at right "
+            "angles that turn by the right hand"
+        )
+    raise DataError(
+        f"{place('position', index)}, rotation: a {robot.platform.motion} platform cannot have "
+        f"them: {_told(away[index], 2.0 * np.arcsin(min(turned[index] / 2.0, 1.0)))} from the "
+        f"nearest pose, {', '.join(robot.coordinates)} = "
+        f"{', '.join(f'{v:.4g}' for v in pose[index] + 0.0)}"
+    )
+
+
+def twist(
+    robot: RobotLike, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
+) -> Array:
+    """Return the twist of the platform: the velocity of P, then the angular velocity.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose, velocity : array, shape (..., m)
+        The poses and their derivatives with respect to time; m, rad and s.
+    on_failure : {"raise", "nan"}
+        Whether a pose that a tripod's planes do not allow raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., 6)
+        (v, omega) in the base frame, m/s and rad/s.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.twist("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5])
+    array([0.1, 0. , 0. , 0. , 0. , 0.5])
+    """
+    return evaluated(robot, "twist", on_failure, pose, velocity)
+
+
+def velocity_of(
+    robot: RobotLike, pose: PoseLike, twist: ArrayLike, *, on_failure: OnFailure = "raise"
+) -> PerCoordinate:
+    """Return the pose's derivative that goes with a twist of the platform.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    twist : array, shape (..., 6)
+        (v, omega) of P in the base frame, m/s and rad/s.
+    on_failure : {"raise", "nan"}
+        Whether a twist that the motion cannot have, or a pose with singular angles, raises, or
+        gives NaN.
+
+    Returns
+    -------
+    array, shape (..., m)
+        m/s and rad/s.
+
+    Raises
+    ------
+    DataError
+        If the platform cannot move so: by more than 1e-7 m/s or rad/s.
+    SingularPose
+        If the pose's angles are singular, which the machine need not be.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.velocity_of("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5])
+    array([0.1, 0. , 0. , 0. , 0. , 0.5])
+    """
+    robot = as_manipulator(robot)
+    expect_choice(on_failure)
+    if robot.platform.slides:
+        raise DataError(
+            "twist: phi slides the halves of this platform, of which no twist of P tells"
+        )
+    poses = checked(robot, pose, "pose", on_failure)
+    given = as_array(twist, "twist", (6,), columns=())
+    velocity, rest, _ = numeric(robot, "velocity_of_twist")(poses, given)
+    poses = np.broadcast_to(poses, (*velocity.shape[:-1], robot.freedom))
+    beyond = [np.linalg.norm(part, axis=-1) for part in (rest[..., :3], rest[..., 3:])]
+    size = _ROUNDING * np.maximum(1.0, np.abs(given).max(axis=-1))
+    known = robot.platform.angle_measures(poses) > ANGLES
+    good = known & (beyond[0] <= size) & (beyond[1] <= size)
+    if good.all():
+        return velocity
+    if on_failure == "nan":
+        return np.where(good[..., None], velocity, np.nan)
+    index = tuple(int(i) for i in np.argwhere(~good)[0])
+    if not np.isfinite(np.broadcast_to(given, (*good.shape, 6))[index]).all():
+        raise DataError(f"{place('twist', index)}: finite numbers expected")
+    if not known[index]:
+        raise singular_angles(robot, poses[index], index)
+    raise DataError(
+        f"{place('twist', index)}: a {robot.platform.motion} platform cannot move so at this pose: "
+        f"{_told(beyond[0][index], beyond[1][index], '/s')} are left of it"
+    )
+
+
+def twist_jacobian(
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
+) -> Matrices:
+    """Return the rows A of the legs against the twist: joint rates = A @ twist.
+
+    Where `jacobian` stands against the pose's derivative, they have no part in the singularities of
+    its angles: row i is (g, s x g), with g the row against the velocity of the leg's platform point
+    and s the way there from P.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., n, 6)
+        Of a platform that does not tilt the part of each row that its motion can have.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg whose row depends on the pose does not reach it.
+    SingularPose
+        If such a leg is stretched or folded (type I).
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.twist_jacobian("tripteron", [0.0, 0.0, 0.0])
+    array([[1., 0., 0., 0., 0., 0.],
+           [0., 1., 0., 0., 0., 0.],
+           [0., 0., 1., 0., 0., 0.]])
+    """
+    return evaluated(robot, "twist_jacobian", on_failure, pose)
+
+
+def _expect_form(form: str) -> None:
+    if form not in _SHAPES:
+        raise DataError(f"form: {form!r} is none of {', '.join(_SHAPES)}")
+
+
+def _turned(robot: Manipulator) -> Array:
+    """Return the axes (3, 3) of the platform at angles zero, one a row."""
+    return np.array(robot.platform.frame)
+
+
+def _told(length: float, angle: float, per: str = "") -> str:
+    """Return in words by how much something is off, of which rounding is no part."""
+    parts = [(length, f"{length:.3g} m{per}"), (angle, f"{angle:.3g} rad{per}")]
+    return " and ".join(text for size, text in parts if size > _ROUNDING)
+
+
+def _matrix(robot: Manipulator, given: Array, form: RotationForm) -> Array:
+    """Return rotations (..., 3, 3) as matrices."""
+    if form == "matrix":
+        return given
+    if form == "quaternion":
+        length = np.linalg.norm(given, axis=-1, keepdims=True)
+        x, y, z, w = np.moveaxis(given / np.where(length > 0.0, length, np.nan), -1, 0)
+        rows = [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+        return _stacked(rows)
+    azimuth, tilt, torsion = np.moveaxis(given, -1, 0)
+    ca, sa, ct, st = np.cos(azimuth), np.sin(azimuth), np.cos(tilt), np.sin(tilt)
+    cg, sg = np.cos(torsion - azimuth), np.sin(torsion - azimuth)
+    rows = [
+        [ca * ct * cg - sa * sg, -ca * ct * sg - sa * cg, ca * st],
+        [sa * ct * cg + ca * sg, -sa * ct * sg + ca * cg, sa * st],
+        [-st * cg, st * sg, ct],
+    ]
+    return _turned(robot).T @ _stacked(rows)
+
+
+def _stacked(rows: list[list[Array]]) -> Array:
+    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+
+
+def _tilt_torsion(turned: Array) -> Array:
+    """Return (azimuth, tilt, torsion), (..., 3), of rotations; level ones have azimuth 0."""
+    x, y, z = turned[..., 0, 2], turned[..., 1, 2], turned[..., 2, 2]
+    across, along = turned[..., 1, 0] - turned[..., 0, 1], turned[..., 0, 0] + turned[..., 1, 1]
+    parts = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z), np.arctan2(across, along)
+    return np.stack(parts, axis=-1)
+
+
+def _quaternion(matrix: Array) -> Array:
+    """Return quaternions (..., 4), scalar last and not negative, of rotations.
+
+    The largest of the four components is the root of a sum, the others are quotients by it.
+    """
+    trace = np.trace(matrix, axis1=-2, axis2=-1)
+    diagonal = np.diagonal(matrix, axis1=-2, axis2=-1)
+    squares = np.concatenate([1.0 + 2.0 * diagonal - trace[..., None], 1.0 + trace[..., None]], -1)
+    products = np.empty((*matrix.shape[:-2], 4, 4))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        products[..., i, j] = products[..., j, i] = matrix[..., i, j] + matrix[..., j, i]
+        products[..., i, 3] = products[..., 3, i] = matrix[..., k, j] - matrix[..., j, k]
+    for i in range(4):
+        products[..., i, i] = squares[..., i]
+    largest = np.where(np.isnan(squares), 0.0, squares).argmax(axis=-1)
+    row = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    found = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    return np.where(found[..., 3:] < 0.0, -found, found) + 0.0

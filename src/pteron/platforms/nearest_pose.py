@@ -1,0 +1,83 @@
+"""From a place of P and a rotation to a pose: the angles of a rotation, for every kind of platform.
+
+A rotation (..., 3, 3) takes vectors of the platform's frame to the base frame.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.platforms.platform import Platform
+
+Array = NDArray[np.float64]
+
+_SINGULAR = 1e-12
+"""Cosine of the middle angle below which the others are not told apart."""
+
+
+def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
+    """Return the pose (..., m) that has a position (..., 3) of P and a rotation, if one has.
+
+    Where the motion cannot have them it is a pose near to them. Roll, or rz, is 0 where the angles
+    are singular.
+    """
+    named = dict(zip(platform.angles, _angles(platform, rotation), strict=True))
+    lengths = np.moveaxis(position @ platform.directions.T, -1, 0)
+    named |= dict(zip(platform.lengths, lengths, strict=True))
+    parts = np.broadcast_arrays(*(named[name] for name in platform.coordinates))
+    return np.stack(parts, axis=-1)
+
+
+def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
+    """Return the pose's angles (...), in order."""
+    if not platform.angles:
+        return ()
+    if platform.second_axis is not None:
+        return _universal(np.array(platform.axis), np.array(platform.second_axis), rotation)
+    turned = np.array(platform.frame) @ rotation
+    if not platform.tilts:
+        return (np.arctan2(turned[..., 1, 0], turned[..., 0, 0]),)
+    if platform.angle_order == "xyz":
+        # Rx(rx) Ry(ry) Rz(rz) is the transpose of Rz(-rz) Ry(-ry) Rx(-rx).
+        x, y, z = _roll_pitch_yaw(np.swapaxes(turned, -1, -2))
+        return -x, -y, -z
+    roll, pitch, yaw = _roll_pitch_yaw(turned)
+    return (roll, pitch, yaw)[: len(platform.angles)]
+
+
+def _roll_pitch_yaw(turned: Array) -> tuple[Array, Array, Array]:
+    """Return the angles of Rz(yaw) Ry(pitch) Rx(roll)."""
+    cosine = np.hypot(turned[..., 0, 0], turned[..., 1, 0])
+    pitch = np.arctan2(-turned[..., 2, 0], cosine)
+    held = cosine < _SINGULAR
+    roll = np.where(held, 0.0, np.arctan2(turned[..., 2, 1], turned[..., 2, 2]))
+    yaw = np.where(
+        held,
+        np.arctan2(-turned[..., 0, 1], turned[..., 1, 1]),
+        np.arctan2(turned[..., 1, 0], turned[..., 0, 0]),
+    )
+    return roll, pitch, yaw
+
+
+def _universal(first: Array, second: Array, rotation: Array) -> tuple[Array, Array]:
+    """Return the angles of Rot(first, alpha) Rot(second, beta)."""
+    alpha = _turn(first, second, rotation @ second)
+    # As seen from the base the second axis is R b, and what is across it turns about it by beta.
+    moved = rotation @ second
+    across = np.cross(first, second)
+    carried = _rotated(first, alpha, across)
+    return alpha, _turn(moved, carried, rotation @ across)
+
+
+def _turn(axis: Array, start: Array, end: Array) -> Array:
+    """Return the angle (...) about an axis that takes one vector to another, across it."""
+    along = (axis * np.cross(start, end)).sum(axis=-1)
+    flat = (start * end).sum(axis=-1) - (axis * start).sum(axis=-1) * (axis * end).sum(axis=-1)
+    return np.asarray(np.arctan2(along, flat))
+
+
+def _rotated(axis: Array, angle: Array, vector: Array) -> Array:
+    """Return a vector across an axis (3,), turned about it."""
+    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    return np.asarray(cosine * vector + sine * np.cross(axis, vector))
