@@ -80,7 +80,7 @@ def test_what_a_motion_cannot_have_is_refused_with_by_how_much():
         pteron.pose_of(wrist, at + [0.0, 0.006, 0.008], level)
     with pytest.raises(DataError, match=r"cannot move so at this pose: 0\.5 m/s are"):
         pteron.velocity_of(wrist, [0.1, 0.2, 0.3], [0.0, 0.3, 0.4, 1.0, 2.0, 3.0])
-    with pytest.raises(DataError, match="3T platform cannot have them: 0\.2 rad"):
+    with pytest.raises(DataError, match=r"3T platform cannot have them: 0\.2 rad"):
         turned = Rotation.from_rotvec([0.0, 0.2, 0.0]).as_matrix()
         pteron.pose_of("tripteron", [0.0, 0.0, 0.0], turned)
     with pytest.raises(DataError, match=r"rotation\[1\]: no rotation"):
