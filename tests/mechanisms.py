@@ -281,7 +281,11 @@ def scaled(robot, factor):
     return replace(robot, legs=tuple(legs), platform=platform, radii=None)
 
 
-CATALOG = {name: pteron.load(name) for name in pteron.catalog()}
+_LOADED = {name: pteron.load(name) for name in pteron.catalog()}
+CATALOG = {name: robot for name, robot in _LOADED.items() if not robot.platform.tilts}
+"""The machines of the catalog that every loop over it takes."""
+TILTED = {name: robot for name, robot in _LOADED.items() if robot.platform.tilts}
+"""Those whose platforms tilt: tests choose among them, as programs of six legs take long."""
 
 
 def _turned(name, seed, **options):

@@ -14,6 +14,7 @@ import pytest
 import xarray
 import zarr
 from dying import dies_once, rows, slow_rows
+from mechanisms import CATALOG
 
 import pteron
 from pteron.errors import DataError, ModelError, OutputError
@@ -158,7 +159,7 @@ def test_axes_and_grids_check_what_they_are_given(delta, given, words):
 # Values.
 
 
-@pytest.mark.parametrize("name", pteron.catalog())
+@pytest.mark.parametrize("name", CATALOG)
 def test_the_status_says_which_leg_or_limit_ends_the_reach(name):
     """Against the legs' own reach and the room to limits, one by one."""
     robot = pteron.load(name)

@@ -77,11 +77,11 @@ def test_what_a_motion_cannot_have_is_refused_with_by_how_much():
     wrist = tilting.machine("3R", ("UPS",), 3)[0]
     at, level = np.array(wrist.platform.center), np.array(wrist.platform.frame).T
     with pytest.raises(DataError, match=r"3R platform cannot have them: 0\.01 m from"):
-        pteron.pose_of(wrist, at + [0.0, 0.006, 0.008], level)
+        pteron.pose_of(wrist, at + np.array([0.0, 0.006, 0.008]), level)
     with pytest.raises(DataError, match=r"cannot move so at this pose: 0\.5 m/s are"):
         pteron.velocity_of(wrist, [0.1, 0.2, 0.3], [0.0, 0.3, 0.4, 1.0, 2.0, 3.0])
+    turned = Rotation.from_rotvec([0.0, 0.2, 0.0]).as_matrix()
     with pytest.raises(DataError, match=r"3T platform cannot have them: 0\.2 rad"):
-        turned = Rotation.from_rotvec([0.0, 0.2, 0.0]).as_matrix()
         pteron.pose_of("tripteron", [0.0, 0.0, 0.0], turned)
     with pytest.raises(DataError, match=r"rotation\[1\]: no rotation"):
         pteron.pose_of(wrist, at, [level, level[:, ::-1]])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pteron
 
@@ -282,3 +283,54 @@ def test_the_3prr_s_home():
     _, lower = pteron.link_vectors(robot, home)
     along = [leg.slider_direction for leg in robot.legs]
     np.testing.assert_allclose(np.sum(lower * along, axis=-1), 0.2 * np.cos(np.pi / 6), rtol=1e-14)
+
+
+# Reachy Mini: pollen-robotics/reachy_mini, kinematics_data.json; the head level at z = 0.177 m.
+
+LEVEL = [0.6265471361608503, -0.6265425506844712, 0.6265402507582244]
+LEVEL += [-0.6265361796605952, 0.6265371961549016, -0.62653923545576]
+"""rad; twelve digits of its geometry stand in the catalog's file."""
+
+
+def test_reachy_minis_joint_angles_count_as_its_own():
+    found = pteron.inverse_kinematics("reachy-mini", [0.0, 0.0, 0.177, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(found, LEVEL, atol=1e-9)
+
+
+# The hexapods of the Rubin Observatory: lsst-ts/ts_mthexapod, constants.py, micrometres.
+
+PIVOTS = {"rubin-camera-hexapod": -2758400, "rubin-m2-hexapod": -703000}
+STRUTS = {
+    "rubin-camera-hexapod": (
+        [
+            *[[227600, 653800, -525000], [-227600, 653800, -525000], [-680000, -129700, -525000]],
+            *[[-452300, -524000, -525000], [452300, -524000, -525000], [680000, -129700, -525000]],
+        ],
+        [
+            *[[472800, 512200, -121400], [-472800, 512200, -121400], [-680000, 153300, -121400]],
+            *[[-207200, -665500, -121400], [207200, -665500, -121400], [680000, 153300, -121400]],
+        ],
+    ),
+    "rubin-m2-hexapod": (
+        [
+            *[[0, 1701800, 114300], [-1542350, -719210, 114300], [1542350, -719210, 114300]],
+            *[[790, 1460490, 228600], [-1503370, 7660, 228600], [1503370, 7660, 228600]],
+        ],
+        [
+            *[[0, 1701800, 607300], [-1542350, -719210, 607300], [1542350, -719210, 607300]],
+            *[[493790, 1460490, 228600], [-1256870, -419290, 228600], [1256870, -419290, 228600]],
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", [*STRUTS])
+def test_rubins_struts_are_as_long_as_its_software_says(name):
+    base, mirror = (np.array(points) * 1e-6 for points in STRUTS[name])
+    pivot = np.array([0.0, 0.0, PIVOTS[name] * 1e-6])
+    moves = np.random.default_rng(4).uniform(-1.0, 1.0, (1000, 6)) * np.repeat([0.01, 0.005], 3)
+    turned = Rotation.from_euler("XYZ", moves[:, 3:]).as_matrix()
+    # The mirror turns about the pivot, then moves.
+    ends = (mirror - pivot) @ np.swapaxes(turned, -1, -2) + pivot + moves[:, None, :3]
+    lengths = np.linalg.norm(ends - base, axis=-1)
+    np.testing.assert_allclose(pteron.inverse_kinematics(name, moves), lengths, atol=1e-9)

@@ -186,7 +186,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     where = "" if found["singular_at_every_position"] or not angles else " at the home position"
     singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
-    singular = singular if robot.platform.angles else []
+    singular = singular if robot.platform.angles and not robot.platform.tilts else []
     tool = [f"Tool: {_vector(found['tool'])} m from P, in the platform frame"]
     tool = tool if any(found["tool"]) else []
     work = "[green]This machine can work.[/green]"

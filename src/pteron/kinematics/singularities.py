@@ -92,7 +92,8 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
     Returns
     -------
     array, shape (A,)
-        The angles in rad, ascending, in (-pi, pi]; none where the platform does not turn.
+        The angles in rad, ascending, in (-pi, pi]; none where the platform does not turn, or where
+        it tilts, which is singular in whole families of orientations.
 
     Raises
     ------
@@ -120,7 +121,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
         a, b = (float(value) for value in orientation)
         one = np.arctan2(b, a) + np.pi / 2
         return np.sort(_wrapped(np.array([one, one - np.pi])))
-    if given is None or not robot.platform.angles:
+    if given is None or not robot.platform.angles or robot.platform.tilts:
         return np.empty(0)
     return _sign_changes(robot, given)
 

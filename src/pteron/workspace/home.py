@@ -144,6 +144,9 @@ def _best(robot: Manipulator) -> Array:
     if worth.max(initial=0.0) >= _AXIS * most:
         best = _least_travel(robot, on_axis[worth >= _WORTH * worth.max()])
     least = _WORTH * float(_worth(robot, best))
+    for k in range(robot.freedom if robot.platform.tilts else 0):
+        middle = np.where(np.arange(robot.freedom) == k, 0.0, best)
+        best = middle if _worth(robot, middle) >= least else best
     for metres, degrees in product(_METRES, _DEGREES):
         step = _steps(robot, metres, np.radians(degrees))
         rounded: Array = np.round(best / step) * step + 0.0  # -0.0 becomes 0.0
@@ -190,8 +193,9 @@ def _on_axis(robot: Manipulator, poses: Array) -> Array:
     if robot.platform.tilts and poses[:, robot.platform.angular].any():
         return poses[:0]  # the turn would turn their angles too
     beside, along = poses[:, :lengths] - center, directions @ axis
-    # Legs of a hexapod stand in pairs.
-    for fold in (count, count // 2) if robot.platform.tilts else (count,):
+    # Legs of a hexapod may stand in pairs, or in two halves.
+    folds = [count, *(k for k in (3, 2) if k < count)] if robot.platform.tilts else [count]
+    for fold in folds:
         turn = Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
         images = poses.copy()
         images[:, :lengths] = center + beside @ (directions @ turn @ directions.T).T
