@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from mechanisms import NIGHTLY
 
 pytest.importorskip("jax")
 
@@ -48,7 +49,14 @@ assert small(*state, parameters=early).dtype == np.float32
 """
 
 
-@pytest.mark.parametrize("code", [_STATE, _PARAMETERS, _BEFORE], ids=["state", "slopes", "early"])
+@pytest.mark.parametrize(
+    "code",
+    [
+        pytest.param(_STATE, id="state", marks=NIGHTLY),
+        pytest.param(_PARAMETERS, id="slopes"),
+        pytest.param(_BEFORE, id="early", marks=NIGHTLY),
+    ],
+)
 def test_digits_of_the_first_kernel_of_a_process(code):
     command = [sys.executable, "-W", "error", "-c", _BEGIN + code]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

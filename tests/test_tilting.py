@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
+from mechanisms import gated
 
 import pteron
 from pteron.errors import ModelError
@@ -13,9 +14,12 @@ from pteron.platforms import conformance as of_platforms
 
 MIXED = [(motion, kinds, "rpy") for motion, kinds in tilting.LEGS.items()]
 MIXED += [("3T3R", ("UPS",), "xyz"), ("3R", ("RSS",), "xyz"), ("1T2R", ("RPS",), "rpy")]
+SOME = [*MIXED[: len(tilting.LEGS)], ("3R", ("RSS",), "xyz")]
 
 
-@pytest.fixture(params=MIXED, ids=lambda case: f"{case[0]} {'-'.join(case[1])} {case[2]}")
+@pytest.fixture(
+    params=gated(MIXED, SOME), ids=lambda case: f"{case[0]} {'-'.join(case[1])} {case[2]}"
+)
 def drawn(request):
     motion, kinds, angles = request.param
     robot, home = tilting.machine(motion, kinds, 3, angles)
