@@ -106,10 +106,9 @@ def _driven(robot: Manipulator) -> Iterator[ca.Function]:
     The form that controllers have, by an exponential and a sign, has derivative zero there.
     """
     machine, n = Machine.of(robot), robot.freedom
-    symbols = {
-        name: ca.SX.sym(name, n)
-        for name in ("pose", "velocity", "acceleration", "forces", "wrench")
-    }
+    sizes = dict.fromkeys(("pose", "velocity", "acceleration", "forces"), n)
+    sizes["wrench"] = len(robot.platform.wrench_columns)
+    symbols = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
     pose, velocity, acceleration, forces, wrench = symbols.values()
     own = drives.Drives.of(ca.SX(ca.DM(drives.drive_numbers(robot))))
     rates = ca.mtimes(jacobian(machine.state(pose)), velocity)
@@ -195,7 +194,8 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "banner": banner(robot, "CasADi functions"),
         "prefix": prefix,
         "coordinates": robot.platform.coordinates,
-        "angles": robot.platform.angles,
+        "units": dict.fromkeys(robot.units),
+        "tilts": robot.platform.tilts,
         "functions": {name: str(function) for name, function in functions.items()},
         "casadi": ca.__version__,
         "driven": has_drives(robot),

@@ -88,26 +88,30 @@ def banner(robot: Manipulator, language: str) -> list[str]:
 
 def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     """Return the meaning of an input or an output, with its unit."""
-    lengths, angles = ", ".join(robot.platform.lengths), ", ".join(robot.platform.angles)
+    platform = robot.platform
     units = [leg.joint.unit for leg in robot.legs]
     joints = _by_leg(units)
     forces = _by_leg([leg.joint.force_unit for leg in robot.legs])
-    angle, rate, second, moment = (
-        (f", {angles} in rad", ", rad/s", ", rad/s^2", ", N m about k")
-        if angles
-        else ("", "", "", "")
-    )
+    kinds = [
+        (names, unit)
+        for names, unit in ((platform.lengths, "m"), (platform.angles, "rad"))
+        if names
+    ]
+    pose = ", ".join(f"{', '.join(names)} in {unit}" for names, unit in kinds)
+    rates, seconds = (", ".join(f"{unit}/{per}" for _, unit in kinds) for per in ("s", "s^2"))
+    moment = ", N m about k" if platform.angles else ""
+    wrench = "force, N, and moment about it, N m, in base axes" if platform.tilts else f"N{moment}"
     texts = {
-        "pose": f"platform pose: {lengths} in m{angle}",
-        "poses": f"poses by rows: {lengths} in m{angle}",
-        "found": f"platform pose that has the joint coordinates: {lengths} in m{angle}",
-        "velocity": f"the pose's rate: m/s{rate}",
-        "acceleration": f"the pose's acceleration: m/s^2{second}",
+        "pose": f"platform pose: {pose}",
+        "poses": f"poses by rows: {pose}",
+        "found": f"platform pose that has the joint coordinates: {pose}",
+        "velocity": f"the pose's rate: {rates}",
+        "acceleration": f"the pose's acceleration: {seconds}",
         "joints": f"joint coordinates, {joints}",
         "joint_rates": f"their rates, {_by_leg([f'{unit}/s' for unit in units])}",
         "joint_accelerations": "their accelerations, " + _by_leg([f"{unit}/s^2" for unit in units]),
         "forces": f"actuator forces, {forces}, positive the way the joint coordinates grow",
-        "wrench": f"wrench on the platform at P: N{moment}",
+        "wrench": f"wrench on the platform at P: {wrench}",
         "parameters": "inertial parameters, in kg, kg m and kg m^2",
         "base_parameters": "base parameters; see the table of the same name",
         "drives": "numbers of the drives; see the table of the same name",

@@ -119,6 +119,8 @@ def export_fmu(
         "number": CPrinter(prefix, "double").number,
         "freedom": robot.freedom,
         "joint_count": robot.joint_count,
+        "wrench_count": len(robot.platform.wrench_columns),
+        "tilts": robot.platform.tilts,
         "inertial": tables["parameters"],
         "drives": tables["drives"],
         "least_square": LEAST**2,

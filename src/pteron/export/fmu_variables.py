@@ -9,6 +9,7 @@ from typing import Literal
 from pteron.equations.drives import Drives, drive_numbers
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.platforms import Platform
 
 _UNITS = {
     "m": {"m": 1},
@@ -195,11 +196,8 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
     ]
     yield "forces", "INPUT", "offsetof(Values, forces)", inputs
     inputs = [
-        FmuVariable(
-            *(f"wrench.{name}", "N.m" if unit == "rad" else "N"),
-            *(f"What acts on the platform at P along {name}", 0.0),
-        )
-        for name, unit in zip(coordinates, units, strict=True)
+        FmuVariable(f"wrench.{name}", unit, f"What acts on the platform at P along {along}", 0.0)
+        for name, unit, along in _wrench(robot.platform)
     ]
     yield "wrench", "INPUT", "offsetof(Values, wrench)", inputs
     # Each state's rate is a variable of its own: some tools do not take an output in its place.
@@ -213,17 +211,43 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
     yield "drives", "START", "offsetof(Values, drives)", list(_drives(robot))
 
 
+def _wrench(platform: Platform) -> Iterator[tuple[str, str, str]]:
+    """Yield each part of a wrench: its name, its unit and along what it does work."""
+    if platform.tilts:
+        for name in platform.wrench_columns:
+            kind, axis = name
+            unit, what = ("N", "{}") if kind == "f" else ("N.m", "a turn about {}")
+            yield name, unit, what.format(f"the base frame's {axis}")
+        return
+    for name, unit in zip(platform.coordinates, platform.units, strict=True):
+        yield name, "N.m" if unit == "rad" else "N", name
+
+
 def _payload(robot: Manipulator) -> Iterator[_Part]:
     """Yield the payload's parameters: its mass, and what matters where the platform turns."""
     told = [FmuVariable("payload.mass", "kg", "A body that the platform carries", 0.0, 0.0)]
     yield "payload.mass", "START", "offsetof(Values, payload)", told
+    tilts = robot.platform.tilts
     if robot.platform.rotation_axes:
         told = [
             FmuVariable(f"payload.{x}", "m", f"Its centre of mass in the platform frame, {x}", 0.0)
-            for x in "xy"
+            for x in ("xyz" if tilts else "xy")
         ]
         yield "payload.centre", "START", "offsetof(Values, payload) + sizeof(double)", told
-    if robot.platform.angles:
+    for name, place, pairs, least in (
+        ("inertia", 4, ("xx", "yy", "zz"), 0.0),
+        ("products", 7, ("xy", "xz", "yz"), None),
+    ):
+        if tilts:
+            told = [
+                FmuVariable(
+                    *(f"payload.i{pair}", "kg.m2", f"I{pair} about its own centre", 0.0, least)
+                )
+                for pair in pairs
+            ]
+            at = f"offsetof(Values, payload) + {place} * sizeof(double)"
+            yield f"payload.{name}", "START", at, told
+    if robot.platform.angles and not tilts:
         axis = "Its inertia about the axis through its own centre"
         told = [FmuVariable("payload.inertia", "kg.m2", axis, 0.0, 0.0)]
         yield "payload.inertia", "START", "offsetof(Values, payload) + 3 * sizeof(double)", told

@@ -17,6 +17,7 @@ from pteron.equations.kinematics import platform_rates
 from pteron.equations.machine import Machine
 from pteron.kernels import Array, Graph, Program
 from pteron.kernels.graph import CONSTANT, INPUT, expression
+from pteron.platforms.coordinates import are_angles
 
 _SAME = 1e-12
 """Relative difference below which two values are the same quantity."""
@@ -82,9 +83,9 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
     platform = state.platform
     for name, coordinate in zip(machine.platform.coordinates, ca.vertsplit(pose), strict=True):
         yield name, 0, coordinate
-    if platform.rotation.angle is not None:
-        yield "cos_phi", 0, ca.cos(platform.rotation.angle)
-        yield "sin_phi", 0, ca.sin(platform.rotation.angle)
+        if are_angles([name]):
+            yield f"cos_{name}", 0, ca.cos(coordinate)
+            yield f"sin_{name}", 0, ca.sin(coordinate)
     for i, (equations, leg, point) in enumerate(
         zip(machine.legs, state.legs, platform.points, strict=True), start=1
     ):
