@@ -40,7 +40,8 @@ TOPICS: dict[str, tuple[str, ...]] = {
         *("joint_accelerations", "JointMotion", "joint_screws", "link_vectors", "link_jacobians"),
         *("working_mode", "working_modes", "assembly_mode", "singular_orientations"),
         *("architecture", "Architecture", "is_singular_everywhere", "constraint_measure"),
-        "random_poses",
+        *("random_poses", "pose_of", "position_of", "rotation_of", "twist", "velocity_of"),
+        "twist_jacobian",
     ),
     "Dynamics": (
         *("inverse_dynamics", "forward_dynamics", "regressor", "drive_forces"),

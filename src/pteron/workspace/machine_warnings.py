@@ -77,7 +77,7 @@ def machine_warnings(robot: Manipulator) -> tuple[str, ...]:
         found += [f"platform: {text}" for text in _spread(platform, radius)]
     axis = platform.rotation_axes[0] if len(platform.rotation_axes) == 1 else None
     for i, leg in enumerate(robot.legs, start=1):
-        own = () if i in far else _leg_warnings(leg)
+        own = () if i in far else _leg_warnings(leg, platform)
         found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis), *drive_warnings(leg))]
     if axis is not None:
         found += _turning_offsets(robot.legs, axis, platform.angles[0])
@@ -161,10 +161,11 @@ def _in_millimetres(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[st
     return [f"{where}: {f'beyond {_LARGE:g}' if others else size} m: are these mm?"]
 
 
-def _leg_warnings(leg: LegKind) -> Iterator[str]:
+def _leg_warnings(leg: LegKind, platform: Platform) -> Iterator[str]:
     """Yield warnings about a leg, one line each."""
     far = hypot(*leg.platform_point)
-    if 0.0 < leg.size < far:
+    # A platform that tilts may have a pivot far away for its P.
+    if 0.0 < leg.size < far and not platform.tilts:
         yield (
             f"platform_point: {far:g} m from P, farther than the leg is long: is it in the "
             "platform's frame?"
