@@ -675,9 +675,38 @@ STUBS = {
         extern KINEMATICS_TYPE kinematicsType(void);
         #define EXPORT_SYMBOL(x) extern int symbol_##x
         #define KINS_NOT_SWITCHABLE
+
+        #include <stdarg.h>
+        #include <stdio.h>
+        #include <stdlib.h>
+        #include <string.h>
+        typedef volatile double hal_float_t;
+        typedef volatile double hal_bit_t;
+        typedef enum { HAL_IN = 16, HAL_OUT = 32 } hal_pin_dir_t;
+        static struct { char name[48]; hal_float_t value; } PINS[64];
+        static int pin_count, comp_id __attribute__((unused)) = 7;
+        double *pin(const char *name) {
+            for (int i = 0; i < pin_count; i++)
+                if (strcmp(PINS[i].name, name) == 0) return (double *)&PINS[i].value;
+            return 0;
+        }
+        __attribute__((unused, format(printf, 4, 5))) static int hal_pin_float_newf(
+            hal_pin_dir_t way, hal_float_t **place, int id, const char *format, ...) {
+            va_list rest;
+            va_start(rest, format);
+            vsnprintf(PINS[pin_count].name, sizeof PINS->name, format, rest);
+            va_end(rest);
+            *place = &PINS[pin_count++].value;
+            return way && id == 7 ? 0 : -1;
+        }
+        #define hal_pin_bit_newf hal_pin_float_newf
+        #define hal_malloc(size) malloc((size_t)(size))
+        #define hal_set_unready(id) ((id) == 7 ? 0 : -1)
+        #define hal_ready(id) ((void)(id))
     """,
 }
-"""What the component needs of LinuxCNC 2.9: of kinematics.h, emcpos.h, posemath.h, rtapi_math.h."""
+"""What the component needs of LinuxCNC 2.9: of kinematics.h, emcpos.h, posemath.h, rtapi_math.h
+and, for its pins, of hal.h."""
 
 
 class EmcPose(ctypes.Structure):

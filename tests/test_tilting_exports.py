@@ -1,5 +1,8 @@
 """Code and models of machines whose platforms tilt, run by the tools that they are for."""
 
+import ctypes
+from dataclasses import replace
+
 import fmpy.validation
 import numpy as np
 import pytest
@@ -7,7 +10,7 @@ import tilting
 from mechanisms import gated
 from scipy.integrate import solve_ivp
 from test_export import compiled
-from test_other_tools import KINDS, driven, simulated, started
+from test_other_tools import KINDS, EmcPose, driven, kinematics, simulated, started
 from test_structured_text import Runner
 
 import pteron
@@ -135,3 +138,54 @@ def test_an_fmu_of_a_tilting_machine_moves_as_the_librarys_equations(tmp_path, m
         coordinates = robot.platform.coordinates
         found = [result[-1][f"{word}.{c}"] for word in ("pose", "velocity") for c in coordinates]
         np.testing.assert_allclose(found, expected, 0.0, 1e-7)
+
+
+LETTERS = dict(
+    zip(("x", "y", "z", "roll", "pitch", "yaw", "alpha", "beta"), "xyzabcab", strict=True)
+)
+
+
+@pytest.mark.parametrize("motion", gated(tilting.LEGS, ["2R", "3T3R"]))
+def test_linuxcnc_moves_a_tilting_machine_as_genhexkins_does(tmp_path, motion):
+    """With a tool of its own, and one that the tool table makes longer: both turn about the tip."""
+    robot, (poses, *_) = drawn(motion)
+    tool, length = np.array([0.01, -0.02, 0.03]), 40.0
+    robot = replace(robot, platform=replace(robot.platform, tool=tuple(tool)))
+    library, files = kinematics(robot, tmp_path)
+    assert library.kinematicsType() == 4
+    name, n = files["comp"].stem, robot.freedom
+    library.pin.restype = ctypes.POINTER(ctypes.c_double)
+    pin = {
+        key: library.pin(f"{name}.{key}".encode())
+        for key in ("tool-offset", "fwd-kins-fail", "measure", "base.0.x", "platform.1.z", *"abc")
+    }
+    assert pin["base.0.x"][0] == pytest.approx(1e3 * robot.legs[0].guide_point[0])
+    assert pin["platform.1.z"][0] == pytest.approx(1e3 * robot.legs[1].platform_point[2])
+    lengths = "tool-offset" in files["hal"].read_text()
+    assert lengths == bool(robot.platform.lengths) == bool(pin["tool-offset"])
+    if lengths:
+        pin["tool-offset"][0] = length
+    degrees, upright = 180.0 / np.pi, np.array(robot.platform.frame[2])
+    units = [degrees if leg.joint.unit == "rad" else 1000.0 for leg in robot.legs]
+    joints = (ctypes.c_double * 16)(*[77.0] * 16)
+    for pose in poses:
+        p, axes = robot.platform.at(pose)
+        tip = 1e3 * (p + tool @ axes) + length * (upright - axes[2])
+        seen = np.concatenate([robot.platform.directions @ tip, degrees * pose])[: len(pose)]
+        seen[robot.platform.angular] = degrees * pose[robot.platform.angular]
+        given = {LETTERS[c]: v for c, v in zip(robot.coordinates, seen, strict=True)}
+        world = EmcPose(**given)
+        assert library.kinematicsInverse(ctypes.byref(world), joints, None, None) == 0
+        np.testing.assert_allclose(
+            joints[:n] / np.array(units), pteron.inverse_kinematics(robot, pose), 1e-11, 1e-12
+        )
+        near = EmcPose(**{key: value + 0.3 for key, value in given.items()}, w=5.0)
+        assert library.kinematicsForward(joints, ctypes.byref(near), None, None) == 0
+        for key, _ in EmcPose._fields_:
+            assert getattr(near, key) == pytest.approx(given.get(key, 0.0), abs=1e-8)
+        assert pin["fwd-kins-fail"][0] == 0.0
+        assert pin["a"][0] == near.a
+        assert pin["measure"][0] == pytest.approx(abs(numeric(robot, "type_ii")(pose)[0]))
+    nowhere = (ctypes.c_double * 16)(*[1e6 * (k + 1) for k in range(16)])
+    assert library.kinematicsForward(nowhere, ctypes.byref(near), None, None) == -1
+    assert pin["fwd-kins-fail"][0] == 1.0

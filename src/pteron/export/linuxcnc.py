@@ -27,6 +27,7 @@ from pteron.kinematics import inverse_kinematics, jacobian
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms import Platform
+from pteron.platforms.joints import platform_joints
 
 _MILLIMETRES = 1000.0
 """LinuxCNC's unit of length, how many in a metre."""
@@ -42,6 +43,11 @@ _THEIRS = (
     *("rose", "rotarydelta", "rotate", "scara", "tripod", "triv", "user"),
 )
 """Names of LinuxCNC 2.9's own kinematics modules, before "kins"."""
+
+
+_LETTERS = dict.fromkeys(("roll", "rx", "alpha"), "A") | dict.fromkeys(("pitch", "ry", "beta"), "B")
+_LETTERS |= dict.fromkeys(("yaw", "rz"), "C") | {"x": "X", "y": "Y", "z": "Z"}
+"""Axes of LinuxCNC for the coordinates of platforms that tilt."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +106,28 @@ class _Arm:
         parts = (part.tolist() for part in (self.still, self.cosine, self.sine))
         return [list(row) for row in zip(*parts, strict=True)]
 
-    def at(self, angle: float) -> Array:
-        """Return it at an angle of the platform."""
-        return np.asarray(self.still + np.cos(angle) * self.cosine + np.sin(angle) * self.sine)
+
+@dataclass(frozen=True)
+class _TurnedArm:
+    """The vector from P to the tool of a platform that tilts, which turns as that does."""
+
+    zero: Array
+    """At angles zero, m, in the base frame."""
+    turns: tuple[tuple[Array, int], ...]
+    """Axes and the places of their angles in the pose, in the order in which they turn it."""
+    upright: Array
+    """The platform's z at angles zero, along which HAL's offsets of the tool count."""
+    directions: Array
+
+    @classmethod
+    def of(cls, platform: Platform, pose: Array) -> _TurnedArm:
+        places = {name: k for k, name in enumerate(platform.coordinates)}
+        # A tripod's yaw, which is none of the pose, does not move the tool along its z.
+        chain = platform_joints(platform, pose)
+        turns = [(j.axis, places[j.name]) for j in chain if not j.slides and j.name in places]
+        *_, upright = frame = np.array(platform.frame)
+        zero = np.array(platform.tool) @ frame
+        return cls(zero, tuple(reversed(turns)), upright, platform.directions)
 
 
 def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
@@ -113,6 +138,11 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     of the tool, in mm; for planar machines X and Y are its two lengths; phi, in degrees, is A, B or
     C where the platform turns about x, y or z, else C. Joints are in mm or degrees. Of the poses
     that joints allow, forward kinematics return the one nearest to the last.
+
+    Of a platform that tilts, A, B and C are roll, pitch and yaw (rx, ry and rz; A and B are alpha
+    and beta), in degrees, as `genhexkins` has them, in whose place the component may stand: it has
+    its pins `tool-offset` and `spindle-offset`, `x` to `c` and `fwd-kins-fail`, and shows the
+    machine's points at `base.N.x` to `platform.N.z`; what else that one sets is here the file's.
 
     Parameters
     ----------
@@ -146,15 +176,16 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     robot = as_manipulator(robot)
     prefix = prefix_of(robot)
     closed = closure_of(robot).closed_form
+    closed = closed and not robot.platform.tilts  # whose poses are many, and the last one is near
     names = ("inverse_kinematics", "direct_kinematics" if closed else "direct_step")
     exported = chosen(robot, names, specialised=True, wrench=False, output="force", base=None)
     texts = c_texts(robot, exported)
     home = start_pose(robot)
     axes, joints = _axes(robot), tuple(_joints(robot, home))
-    arm = _Arm.of(robot.platform)
-    angular = robot.platform.angular
-    seen = home.copy()
-    seen[~angular] += arm.at(float(home[angular].sum()))
+    platform, seen = robot.platform, home.copy()
+    seen[~platform.angular] += platform.directions @ (platform.tool @ platform.at(home)[1])
+    tilted = _TurnedArm.of(platform, home) if platform.tilts else None
+    arm = None if tilted else _Arm.of(platform)
     places = {a.letter: f"{a.scale * at:.6f}" for a, at in zip(axes, seen, strict=True)}
     values = {
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
@@ -167,11 +198,16 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "joints": joints,
         "freedom": robot.freedom,
         "modes": exported[1].outputs[0].shape[0] if closed else 0,
-        "lengths": len(robot.platform.lengths),
-        "free": bool(robot.wraps.any()),
+        "lengths": len(platform.lengths),
+        "free": bool(robot.wraps.any()) and not platform.tilts,
         "places": [places.get(letter, "0") for letter in "XYZABC"],
-        "planar": robot.platform.planar,
-        "arm": arm,
+        "planar": platform.planar,
+        "arm": arm if tilted is None else bool(platform.lengths),
+        "tilted": tilted,
+        "points": [
+            (_MILLIMETRES * np.array([leg.guide_point, leg.platform_point])).tolist()
+            for leg in robot.legs
+        ],
         "number": repr,
     }
     files = {
@@ -179,7 +215,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         f"{prefix}.ini": rendered("pteron.export", "linuxcnc.ini.j2", **values),
         f"{prefix}.hal": rendered("pteron.export", "linuxcnc.hal.j2", **values),
     }
-    if _linear(robot):
+    if arm is not None and _linear(robot):
         rows = np.asarray(jacobian(robot, np.zeros(3)))
         zero = np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3)))
         offsets = _MILLIMETRES * (zero - rows @ arm.still)
@@ -211,6 +247,11 @@ def _axes(robot: Manipulator) -> tuple[_Axis, ...]:
     letters = iter("XYZ")
     found = []
     for name, unit in zip(robot.coordinates, robot.units, strict=True):
+        if robot.platform.tilts:
+            letter, angle = _LETTERS[name], unit == "rad"
+            field = letter.lower() if angle else f"tran.{letter.lower()}"
+            found.append(_Axis(letter, field, name, _DEGREES if angle else _MILLIMETRES))
+            continue
         if unit == "m":
             letter = next(letters)
             found.append(_Axis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
