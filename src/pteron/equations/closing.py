@@ -102,6 +102,24 @@ def _counted(
     return ca.mtimes(directions, ca.mtimes(directions.T, v))
 
 
+def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
+    """Return the centers (n, 3) of spheres on which joints (n, 1) hold platform points, and r^2.
+
+    Where a plane holds a point too the center lies in it.
+    """
+    centers, squares = [], []
+    for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True):
+        locus = leg.locus(q)
+        assert isinstance(locus, Sphere | Circle)  # legs under platforms that tilt have no other
+        center = locus.center
+        if leg.holds is not None:
+            away = ca.dot(leg.holds.normal, center - leg.holds.point)
+            center = center - away * leg.holds.normal
+        centers.append(center.T)
+        squares.append(locus.radius * locus.radius)
+    return ca.vertcat(*centers), ca.vertcat(*squares)
+
+
 class Misses(NamedTuple):
     """The distances by which a pose misses closures whose joints are held."""
 

@@ -7,7 +7,7 @@ import math
 import os
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from pteron.kernels.c import Code, compiler
 from pteron.kernels.compilers import end_all
+from pteron.kernels.kept import Program, kept
 from pteron.kernels.kernel import Array, Kernel, sliced
 from pteron.kernels.programs import Columns, bare, program
 from pteron.kernels.targets import FIXED, Selects, columns_of
@@ -79,11 +80,21 @@ def guarded(
     return kind(built.name, built.function, built.inputs, built.outputs, fixed)
 
 
+def adaptive(key: tuple[Any, ...], build: Callable[[], Program]) -> Adaptive:
+    """Return the kernel of a program that is not a machine's own, kept under a key."""
+    built = kept(key, build)
+    parts = built.name, built.function, built.inputs, built.outputs
+    return Adaptive(VirtualMachine(*parts), _tier_of(Code(*parts)))
+
+
 @lru_cache(maxsize=512)
 def _tier(layout: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Tier:
     """Return the code that machines of one layout share, whatever their inertial parameters."""
     built = program(layout, what, columns, wrench=wrench, guarded=True)
-    code = Code(built.name, built.function, built.inputs, built.outputs)
+    return _tier_of(Code(built.name, built.function, built.inputs, built.outputs))
+
+
+def _tier_of(code: Code) -> Tier:
     return Tier(code, math.inf if os.environ.get(VARIABLE) == "vm" else 0.1)
 
 

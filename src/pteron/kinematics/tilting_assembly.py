@@ -1,74 +1,86 @@
-"""Every pose of given joint coordinates of a machine whose platform tilts."""
+"""Every pose of given joint coordinates of a machine whose platform tilts.
+
+With its joint held a leg keeps its platform point on a sphere, or on a circle where a plane of the
+base holds it too; `pose_paths` finds where they all meet.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.kernels import Array, numeric
+from pteron.equations.pose_paths import Closed
+from pteron.kernels import Array
+from pteron.kernels.path_programs import spheres_kernel
+from pteron.kinematics.pose_paths import generic, placed, real_poses
 from pteron.manipulator import Manipulator
+from pteron.platforms.nearest_pose import nearest_pose
 
-_STARTS = 160
-"""Poses to start from for each state."""
+_HUGE = 1e30
+"""Sizes beyond which joints have no pose."""
 
-_STEPS = 30
-"""Newton's steps from each."""
-
-_ROUNDING = 1e-13
-"""Greatest miss of a pose's closures, as a share of their terms."""
-
-_SAME = 1e-7
-"""Two poses within this, in rad and sizes of the machine, are one, found twice."""
+_ANOTHER = 1e-6
+"""Greatest difference, in sizes of the machine and of rotations, from the pose that is meant."""
 
 
 def tilting_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], Array]:
     """Return which row of joint coordinates (B, n) each pose is of, in order, and the poses (K, m).
 
-    Newton's steps lead there from many poses.
+    Poses of a tripod with the yaw on the other side of those that it has are left out.
     """
-    step, size = numeric(robot, "newton_step"), max(leg.size for leg in robot.legs)
-    rows, poses = [np.empty(0, dtype=np.int64)], [np.empty((0, robot.freedom))]
-    for row, q in enumerate(joints):
-        if not np.isfinite(q).all():
-            continue
-        at = _starts(robot, size)
-        with np.errstate(all="ignore"):
-            for _ in range(_STEPS):
-                before = at
-                at = step(q, before)[0]
-                at = at[np.isfinite(at).all(axis=-1)]
-            missed = step(q, at)[1]
-        found = _canonical(robot, at[missed <= _ROUNDING])
-        place, axes = robot.platform.at(found)
-        all_of = np.concatenate([place / size, axes.reshape(len(found), 9)], axis=-1)
-        near = np.abs(all_of[:, None] - all_of).max(axis=-1, initial=0.0) < _SAME
-        kept = found[near.argmax(axis=-1) == np.arange(len(found))] if len(found) else found
-        rows.append(np.full(len(kept), row))
-        poses.append(kept)
-    return np.concatenate(rows), np.concatenate(poses)
+    centers, squares = spheres_kernel(robot)(joints)
+    good = np.flatnonzero(
+        (np.abs(centers) < _HUGE).all(axis=(-2, -1)) & (np.abs(squares) < _HUGE).all(axis=-1)
+    )
+    platform = robot.platform
+    frame = np.array(platform.frame)
+    a, b, r = _equations(robot, centers[good], squares[good])
+    closed = Closed(
+        len(robot.legs) + (platform.second_axis is not None),
+        len(platform.planes),
+        platform.center is None,
+    )
+    base, top = np.zeros((len(good), 3)), np.zeros(3)
+    if closed.moves:
+        base, top = a[:, : closed.spheres].mean(axis=1), b[: closed.spheres].mean(axis=0)
+    elif platform.center is not None:
+        base = np.broadcast_to(np.array(platform.center), base.shape)
+    spheres = slice(0, closed.spheres)
+    r[:, closed.spheres :] -= (a[:, closed.spheres :] * base[:, None]).sum(axis=-1)
+    a[:, : len(robot.legs)] -= base[:, None]
+    b = b - top
+    own = (a[:, spheres] ** 2).sum(axis=-1) + (b[spheres] ** 2).sum(axis=-1)
+    size = np.sqrt(own.mean(axis=-1)) / generic(closed).size
+    machines = np.concatenate([a, np.broadcast_to(b, a.shape), r[..., None]], axis=-1)
+    machines[:, spheres, :6] /= size[:, None, None]
+    machines[:, closed.spheres :, 3:6] /= size[:, None, None]
+    machines[:, spheres, 6] /= size[:, None] ** 2
+    machines[:, closed.spheres :, 6] /= size[:, None]
+    which, z = real_poses(closed, machines)
+    place, turned = placed(z)
+    place = size[which, None] * place + base[which] - turned @ top
+    rotation = turned @ frame.T
+    poses = nearest_pose(platform, place, rotation)
+    found, axes = platform.at(poses)
+    away = np.abs(found - place).max(axis=-1) / size[which]
+    away += np.abs(np.swapaxes(axes, -1, -2) - rotation).max(axis=(-2, -1))
+    own_side = away < _ANOTHER
+    return good[which[own_side]], poses[own_side]
 
 
-def _starts(robot: Manipulator, size: float) -> Array:
-    rng = np.random.default_rng(0)
-    middle = np.mean([leg.guide_point for leg in robot.legs], axis=0)
-    way = rng.normal(size=(_STARTS, 3))
-    way *= size * np.cbrt(rng.uniform(size=(_STARTS, 1))) / np.linalg.norm(way, axis=-1)[:, None]
-    angles = rng.uniform(-np.pi, np.pi, (_STARTS, len(robot.platform.angles)))
-    lengths = (middle + way) @ robot.platform.directions.T
-    return np.concatenate([lengths, angles], axis=-1)
-
-
-def _canonical(robot: Manipulator, poses: Array) -> Array:
-    """Return poses whose middle angle is within half a turn."""
-    around = 2.0 * np.pi * np.round(poses / (2.0 * np.pi))
-    poses = np.where(robot.platform.angular, poses - around, poses)
-    for name, others in (("pitch", ("roll", "yaw")), ("ry", ("rx", "rz"))):
-        if name in robot.coordinates:
-            k = robot.coordinates.index(name)
-            over = np.abs(poses[:, k]) > 0.5 * np.pi
-            poses[over, k] = np.copysign(np.pi, poses[over, k]) - poses[over, k]
-            for other in others:
-                if other in robot.coordinates:
-                    j = robot.coordinates.index(other)
-                    poses[over, j] -= np.copysign(np.pi, poses[over, j])
-    return poses
+def _equations(robot: Manipulator, centers: Array, squares: Array) -> tuple[Array, Array, Array]:
+    """Return a, b and r of spheres |P + R b - a|^2 = r and planes a.(P + R b) = r."""
+    platform, count = robot.platform, len(centers)
+    points = np.array([leg.platform_point for leg in robot.legs]) @ np.array(platform.frame)
+    if platform.second_axis is not None:  # whose angle with the first does not change
+        first, second = np.array(platform.axis), np.array(platform.second_axis)
+        centers = np.concatenate([centers, np.broadcast_to(first, (count, 1, 3))], axis=1)
+        squares = np.column_stack([squares, np.full(count, 2.0 - 2.0 * first @ second)])
+        points = np.vstack([points, second])
+    if platform.planes:
+        normals, origins = (np.array([p[k] for p in platform.planes]) for k in (0, 1))
+        offsets = (normals * origins).sum(axis=-1)
+        centers = np.concatenate([centers, np.broadcast_to(normals, (count, 3, 3))], axis=1)
+        squares = np.column_stack([squares, np.broadcast_to(offsets, (count, 3))])
+        points = np.vstack([points, points])
+    return centers, points, squares

@@ -1,0 +1,91 @@
+"""Programs of the paths that lead to all poses of joints of a machine whose platform tilts."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.equations.closing import held_spheres
+from pteron.equations.machine import Machine
+from pteron.equations.pose_paths import Closed, OnPath, numbers, rows, stepped
+from pteron.kernels.choice import Adaptive, adaptive
+from pteron.kernels.kept import Program
+from pteron.kernels.kernel import Port
+from pteron.kernels.passes import optimised
+from pteron.kernels.programs import bare
+from pteron.manipulator import Manipulator
+
+Parts = tuple[tuple[float, ...], tuple[float, ...]]
+"""Real and imaginary parts."""
+
+
+@lru_cache(maxsize=8)
+def path_kernel(closed: Closed, start: Parts | None) -> Adaptive:
+    """Return the kernel of a step along a path from a machine in numbers to a real one.
+
+    It takes and returns where the path is, see `OnPath`; its other input is the machine that the
+    path leads to. With no start that is an input too, and both are complex: real parts first.
+    """
+    count = 7 * closed.equations
+
+    def build() -> Program:
+        at = ca.SX.sym("at", 8 * closed.size + 3)
+        ends, given = [], {"at": at}
+        for name, known in (("start", start), ("target", None)):
+            if known is not None:
+                ends.append(numbers(*(ca.SX(list(part)) for part in known)))
+                continue
+            real = start is not None
+            given[name] = ca.SX.sym(name, count if real else 2 * count)
+            ends.append(numbers(given[name][:count], None if real else given[name][count:]))
+        after, left = stepped(closed, ends[0], ends[1], OnPath.of(at, closed))
+        return _program("path_step", given, {"after": after.vector(), "left": left})
+
+    return adaptive(("path_step", *closed, start), build)
+
+
+@lru_cache(maxsize=8)
+def rows_kernel(closed: Closed) -> Adaptive:
+    """Return the kernel of what a real z misses the closures of a machine by, and of its slopes."""
+
+    def build() -> Program:
+        z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", 7 * closed.equations)
+        slopes, missed = rows(closed, numbers(machine), numbers(z))
+        return _program(
+            "path_rows", {"z": z, "machine": machine}, {"rows": slopes, "missed": missed}
+        )
+
+    return adaptive(("path_rows", *closed), build)
+
+
+def spheres_kernel(robot: Manipulator) -> Adaptive:
+    """Return the kernel of the spheres on which joints hold platform points; see `closing`."""
+    return _spheres(bare(robot))
+
+
+@lru_cache(maxsize=64)
+def _spheres(robot: Manipulator) -> Adaptive:
+    def build() -> Program:
+        joints = ca.SX.sym("joints", robot.joint_count)
+        centers, squares = held_spheres(Machine.of(robot), joints)
+        return _program(
+            "held_spheres", {"joints": joints}, {"centers": centers, "squares": squares}
+        )
+
+    return adaptive(("held_spheres", robot), build)
+
+
+def _program(name: str, given: dict[str, Expression], found: dict[str, Expression]) -> Program:
+    dense = [ca.densify(value).T for value in found.values()]
+    function = ca.Function(name, list(given.values()), ca.cse(dense), list(given), list(found))
+    inputs = tuple(Port(key, (value.shape[0],)) for key, value in given.items())
+    outputs = tuple(
+        Port(
+            key,
+            value.shape if value.shape[1] > 1 else value.shape[:1] if value.shape[0] > 1 else (),
+        )
+        for key, value in found.items()
+    )
+    return Program(name, optimised(function), inputs, outputs)

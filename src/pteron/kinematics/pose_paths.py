@@ -1,0 +1,311 @@
+"""All poses of platforms that may turn any way, at the ends of paths from a machine that is known.
+
+`equations.pose_paths` is the page that explains them. Beside this file lie, for each kind of
+closures, a machine in general complex numbers and its poses; `generic_machines` finds others.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.equations.pose_paths import Closed
+from pteron.kernels import Array, Kernel
+from pteron.kernels.path_programs import path_kernel, rows_kernel
+
+Complex = NDArray[np.complex128]
+
+_FILE = Path(__file__).with_name("generic_machines.npz")
+
+_PATHS = 4096
+"""Paths followed at a time."""
+
+_STEPS = 500
+"""Most steps of a path: one in a thousand takes more than a third of it."""
+
+_GONE, _FIRST = 0.1, 0.05
+"""The straight line before a path, and its first step."""
+
+_LEAST = 1e-8
+"""A path whose steps are shorter is lost: it leads to no pose, or all but meets another."""
+
+_TRIALS = 4
+"""Most bundles of paths for a machine of which some were lost."""
+
+_ALIKE = 1e-6
+"""Sine of the angle between two z below which they are one."""
+
+_REAL = 1e-3
+"""Greatest imaginary part of a z, |z| = 1, from which Newton's steps may lead to a real one."""
+
+_POLISHING = 5
+"""Calls that polish a real pose, two of Newton's steps each."""
+
+_ROUNDING = 2e-14
+"""Greatest miss, as a share of its terms, of a pose that is no farther proved: two that meet."""
+
+_NO_ROTATION = 1e-7
+"""|x| of |z| = 1 below which P is nowhere."""
+
+
+class Generic(NamedTuple):
+    """A machine in general complex numbers, and its poses."""
+
+    closed: Closed
+    machine: Complex
+    """(7 k,)."""
+    poses: Complex
+    """(N, d): z, |z| = 1."""
+
+    @property
+    def size(self) -> float:
+        """The root of the mean squares of its points, on the base and on the platform."""
+        points = self.machine.reshape(-1, 7)[: self.closed.spheres, :6]
+        return float(np.sqrt((np.abs(points) ** 2).sum(axis=-1).mean()))
+
+
+@lru_cache
+def generic(closed: Closed) -> Generic:
+    """Return what is kept of a kind of closures."""
+    name = "-".join(map(str, (closed.spheres, closed.planes, int(closed.moves))))
+    with np.load(_FILE) as file:
+        return Generic(closed, file[f"machine {name}"], file[f"poses {name}"])
+
+
+def real_poses(closed: Closed, machines: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return which machine (B, k, 7) each pose is of, in order, and the poses z (K, d), |z| = 1.
+
+    See `stepped` for the numbers of a machine; they should be about 1.
+    """
+    known = generic(closed)
+    share = max(_PATHS // len(known.poses), 1)
+    found = [
+        _real_poses(known, machines[start : start + share], start)
+        for start in range(0, len(machines), share)
+    ]
+    if not found:
+        return np.empty(0, dtype=np.int64), np.empty((0, closed.size))
+    return np.concatenate([part[0] for part in found]), np.concatenate([part[1] for part in found])
+
+
+def _real_poses(known: Generic, machines: Array, first: int) -> tuple[NDArray[np.int64], Array]:
+    rng = np.random.default_rng(1)
+    left = np.arange(len(machines))
+    which, poses = np.empty(0, dtype=np.int64), np.empty((0, known.closed.size))
+    certain = np.empty(0)
+    for trial in range(_TRIALS):
+        turns = _unit_quaternion(rng), _unit_quaternion(rng)
+        turned = _turned(machines[left], *turns)
+        ends, arrived = followed(known, turned)
+        own, real = _candidates(ends, arrived)
+        real = _polished(known, turned[own], real)
+        real = _turned_back(real, *turns)
+        good, radius = _proved(known.closed, machines[left[own]], real)
+        counts = np.bincount(which, minlength=len(machines))
+        which = np.concatenate([which, left[own[good]]])
+        poses, certain = (
+            np.concatenate([poses, real[good]]),
+            np.concatenate([certain, radius[good]]),
+        )
+        order = np.argsort(which, kind="stable")
+        which, poses, certain = which[order], poses[order], certain[order]
+        kept = ~_found_twice(which, poses, certain)
+        which, poses, certain = which[kept], poses[kept], certain[kept]
+        missing = ~(arrived.all(axis=-1) & _all_differ(ends))
+        if trial:  # paths that are always lost lead nowhere
+            missing &= (np.bincount(which, minlength=len(machines)) > counts)[left]
+        left = left[missing]
+        if not len(left):
+            break
+    return which + first, poses
+
+
+def _step(known: Generic) -> Kernel:
+    machine = known.machine
+    return path_kernel(known.closed, (tuple(machine.real.tolist()), tuple(machine.imag.tolist())))
+
+
+def followed(known: Generic, targets: Array) -> tuple[Complex, NDArray[np.bool_]]:
+    """Return the ends z (B, N, d) of the paths to machines (B, k, 7), and whether they arrived."""
+    step = _step(known)
+    count, d = known.poses.shape
+    target = np.repeat(targets.reshape(len(targets), 7 * known.closed.equations), count, axis=0)
+    z = np.tile(_parts(known.poses), (len(targets), 1))
+    at, arrived = _arrived(step, target, z, d)
+    return _whole(at, d).reshape(-1, count, d), arrived.reshape(-1, count)
+
+
+def _arrived(step: Kernel, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the ends (K, 2 d) of paths from z to machines, real parts first."""
+    at = _standing(z, d)
+    at, _ = step(at, target)  # for dz/dt
+    at[:, 4 * d : 8 * d] = at[:, : 4 * d]
+    at[:, 4 * d : 6 * d] -= _GONE * at[:, 2 * d : 4 * d]
+    at[:, -3:] = _GONE, 0.0, _FIRST
+    ends, arrived = np.zeros_like(z), np.zeros(len(z), dtype=bool)
+    rows = np.arange(len(z))
+    for k in range(_STEPS):
+        at, _ = step(at, target)
+        there = at[:, -2] >= 1.0
+        over = there | ~(at[:, -1] >= _LEAST)
+        # Those that are there go on to stay: it costs less than to leave them out one by one.
+        if 8 * over.sum() >= len(over) or k == _STEPS - 1:
+            arrived[rows], ends[rows] = there, at[:, : 2 * d]
+            at, target, rows = at[~over], target[~over], rows[~over]
+        if not len(rows):
+            break
+    return ends, arrived
+
+
+def _standing(z: Array, d: int) -> Array:
+    """Return paths that stay at z (K, 2 d)."""
+    at = np.zeros((len(z), 8 * d + 3))
+    at[:, : 2 * d] = z
+    at[:, 4 * d : 6 * d] = z
+    at[:, -3] = 1.0
+    return at
+
+
+def _parts(z: Complex) -> Array:
+    return np.concatenate([z.real, z.imag], axis=-1)
+
+
+def _whole(parts: Array, d: int) -> Complex:
+    return parts[..., :d] + 1j * parts[..., d : 2 * d]
+
+
+def _all_differ(ends: Complex) -> NDArray[np.bool_]:
+    """Return whether all of z (B, N, d) differ; where they do all poses are found."""
+    alike = np.abs(ends.conj() @ np.swapaxes(ends, -1, -2)) ** 2
+    pairs = np.triu(np.ones(alike.shape[1:], dtype=bool), 1)
+    return ~((alike > 1.0 - _ALIKE**2) & pairs).any(axis=(-2, -1))
+
+
+def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
+    """Return those of z (B, N, d) that may be real: which machine's (K,), and z (K, d)."""
+    largest = np.abs(ends).argmax(axis=-1)[..., None]
+    phase = np.take_along_axis(ends, largest, axis=-1)
+    with np.errstate(all="ignore"):
+        turned = ends * (phase.conj() / np.abs(phase))
+    real = arrived & (np.abs(turned.imag).max(axis=-1) <= _REAL)
+    found = turned.real[real]
+    return np.nonzero(real)[0], found / np.linalg.norm(found, axis=-1, keepdims=True)
+
+
+def _polished(known: Generic, machines: Array, z: Array) -> Array:
+    """Return real poses z (K, d) after Newton's steps."""
+    d = z.shape[1]
+    step, target = _step(known), machines.reshape(len(machines), 7 * known.closed.equations)
+    for _ in range(_POLISHING):
+        at = _standing(_parts(z.astype(complex)), d)
+        at[:, -2] = 1.0
+        z = step(at, target)[0][:, :d]
+    return z
+
+
+def _proved(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Return which z (K, d) are poses, and within which radius they are the only ones.
+
+    By Kantorovich's theorem: closures are quadrics, whose second derivatives do not change. A pose
+    next to a singularity, where it proves nothing, counts if it misses them by rounding alone; the
+    radius is then 0.
+    """
+    if not len(z):
+        return np.zeros(0, dtype=bool), np.zeros(0)
+    rows, missed = rows_kernel(closed)(z, machines.reshape(len(z), 7 * closed.equations))
+    a, b, r = machines[..., :3], machines[..., 3:6], np.abs(machines[..., 6])
+    length_a, length_b = (np.linalg.norm(v, axis=-1) for v in (a, b))
+    bends = (length_a + length_b) ** 2 + 4.0 * closed.moves + r
+    bends[:, closed.spheres :] = (2.0 * length_a * (2.0 + length_b) + 2.0 * r)[:, closed.spheres :]
+    bend = np.sqrt((bends**2).sum(axis=-1) + closed.moves)
+    rounding = 16.0 * np.finfo(float).eps * bend
+    whole = np.concatenate([rows, z[:, None]], axis=1)
+    with np.errstate(all="ignore"):
+        inverse = np.linalg.norm(_inverted(whole), axis=(-2, -1))
+        newton = inverse * (np.linalg.norm(missed, axis=-1) + rounding)
+        proof = 2.0 * inverse * bend * newton
+        radius = np.where(proof <= 1.0, 1.0 / (inverse * bend), 0.0)
+    close = np.linalg.norm(missed, axis=-1) <= _ROUNDING * bend
+    nowhere = np.linalg.norm(z[:, :4], axis=-1) <= _NO_ROTATION
+    return (close | (radius > 0.0)) & ~nowhere, radius
+
+
+def _inverted(matrices: Array) -> Array:
+    """Return inverses, infinite where there are none."""
+    try:
+        return np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:
+        singular = np.linalg.cond(matrices) > 1.0 / np.finfo(float).eps
+        safe = np.where(singular[:, None, None], np.eye(matrices.shape[-1]), matrices)
+        return np.where(singular[:, None, None], np.inf, np.linalg.inv(safe))
+
+
+def _found_twice(which: NDArray[np.int64], z: Array, radius: Array) -> NDArray[np.bool_]:
+    """Return which poses (K, d) another before them is, of the same machine; in order."""
+    count = np.arange(len(which)) - np.searchsorted(which, which)
+    found = np.zeros(len(which), dtype=bool)
+    for back in range(1, int(count.max(initial=0)) + 1):
+        later = np.flatnonzero(count >= back)
+        one, other = z[later - back], z[later]
+        along = (one * other).sum(axis=-1, keepdims=True)
+        with np.errstate(all="ignore"):
+            apart = np.linalg.norm(other / along - one, axis=-1)
+        proved = radius[later - back] * (radius[later] > 0.0)
+        found[later[apart <= np.where(proved > 0.0, 0.5 * proved, _ALIKE)]] = True
+    return found
+
+
+def _unit_quaternion(rng: np.random.Generator) -> Array:
+    drawn = rng.normal(size=4)
+    return np.asarray(drawn / np.linalg.norm(drawn))
+
+
+def _turned(machines: Array, base: Array, platform: Array) -> Array:
+    """Return machines (B, k, 7) in other frames."""
+    turned = machines.copy()
+    for columns, q in ((slice(0, 3), base), (slice(3, 6), platform)):
+        turned[..., columns] = machines[..., columns] @ _rotation(q).T
+    return turned
+
+
+def _turned_back(z: Array, base: Array, platform: Array) -> Array:
+    """Return u* x v and u* y v of poses z = (x, y), whose frames u and v have turned."""
+    u, v = base * [1.0, -1.0, -1.0, -1.0], platform
+    matrix = _left(u) @ _right(v)
+    return np.concatenate([z[:, k : k + 4] @ matrix.T for k in range(0, z.shape[1], 4)], axis=-1)
+
+
+def _left(q: Array) -> Array:
+    """Return the matrix (..., 4, 4) of x -> q x."""
+    w, i, j, k = np.moveaxis(q, -1, 0)
+    rows = [[w, -i, -j, -k], [i, w, -k, j], [j, k, w, -i], [k, -j, i, w]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _right(q: Array) -> Array:
+    """Return the matrix (..., 4, 4) of x -> x q."""
+    w, i, j, k = np.moveaxis(q, -1, 0)
+    rows = [[w, -i, -j, -k], [i, w, k, -j], [j, -k, w, i], [k, j, -i, w]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _rotation(x: Array) -> Array:
+    """Return the rotation (..., 3, 3) of a quaternion, of any length."""
+    conjugate = x * [1.0, -1.0, -1.0, -1.0]
+    whole = _left(x) @ _right(conjugate) / (x * x).sum(axis=-1)[..., None, None]
+    return np.asarray(whole[..., 1:, 1:])
+
+
+def placed(z: Array) -> tuple[Array, Array]:
+    """Return P (K, 3), the origin where it stays, and the rotation (K, 3, 3) of poses z (K, d)."""
+    x, square = z[:, :4], (z[:, :4] ** 2).sum(axis=-1)[:, None]
+    place = np.zeros((len(z), 3))
+    if z.shape[1] > 4:
+        conjugate = x * [1.0, -1.0, -1.0, -1.0]
+        product = (_right(conjugate) @ z[:, 4:, None])[..., 0]
+        place = 2.0 * product[:, 1:] / square
+    return place, _rotation(x)

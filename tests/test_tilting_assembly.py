@@ -1,0 +1,123 @@
+"""All poses of joint coordinates of machines whose platforms tilt."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+import tilting
+
+import pteron
+from pteron.bodies.inertia import RodInertia, SpatialInertia
+from pteron.kernels import numeric
+from pteron.legs import UPS
+from pteron.platforms import Platform
+
+CASES = {
+    "3T3R": ("3T3R", ("UPS", "PSS", "RSS"), "rpy"),
+    "xyz": ("3T3R", ("UPS",), "xyz"),
+    "3R": ("3R", ("RSS",), "xyz"),
+    "2R": ("2R", ("UPS", "PSS"), "rpy"),
+    "1T2R": ("1T2R", ("RPS", "PRS", "RRS"), "rpy"),
+}
+
+# P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures, 1998.
+BASE = [
+    (0.0, 0.0, 0.0),
+    (1.107915, 0.0, 0.0),
+    (0.549094, 0.756063, 0.0),
+    (0.735077, -0.223935, 0.525991),
+    (0.514188, -0.526063, -0.368418),
+    (0.590473, 0.094733, -0.205018),
+]
+TOP = [
+    (0.0, 0.0, 0.0),
+    (0.542805, 0.0, 0.0),
+    (0.956919, -0.528915, 0.0),
+    (0.665885, -0.353482, 1.402538),
+    (0.478359, 1.158742, 0.107672),
+    (-0.137087, -0.235121, 0.353913),
+]
+LENGTHS = [1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071]
+
+
+@lru_cache
+def drawn(name):
+    motion, kinds, angles = CASES[name]
+    robot, home = tilting.machine(motion, kinds, 11, angles)
+    return robot, tilting.states(robot, home, 6)[0]
+
+
+def hexapod(base, top):
+    rods = (RodInertia.of_body(1.0, (x,), 0.1) for x in (0.1, -0.1))
+    upper, lower = rods
+    legs = tuple(
+        UPS(tuple(r), tuple(s), upper, lower, (0.1, 5.0)) for r, s in zip(base, top, strict=True)
+    )
+    body = SpatialInertia(1.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
+    return pteron.Manipulator("hexapod", Platform("3T3R", body), legs, (0.0, 0.0, -9.81))
+
+
+def counts(poses):
+    return np.isfinite(poses).all(axis=-1).sum(axis=-1)
+
+
+def same(one, other, angular):
+    apart = one - other
+    apart[..., angular] = (apart[..., angular] + np.pi) % (2.0 * np.pi) - np.pi
+    return np.abs(apart).max(axis=-1)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_direct_inverts_inverse(name):
+    robot, x = drawn(name)
+    joints = pteron.inverse_kinematics(robot, x)
+    poses = pteron.direct_kinematics(robot, joints)
+    angular = robot.platform.angular
+    whole = ~np.isnan(poses[..., 0])
+    back = pteron.inverse_kinematics(robot, poses[whole])
+    given = np.broadcast_to(joints[:, None], (*whole.shape, joints.shape[-1]))[whole]
+    np.testing.assert_allclose(np.exp(1j * back), np.exp(1j * given), atol=1e-10)
+    assert (np.abs(poses[whole][:, angular]) <= np.pi).all()
+    mode = pteron.assembly_mode(robot, x)
+    rows = np.take_along_axis(poses, mode[:, None, None], axis=1)[:, 0]
+    assert (same(rows, x, angular) < 1e-10).all()
+    for side in (poses[..., -1], poses[..., 0]):
+        assert (np.diff(np.isnan(side).astype(int), axis=-1) >= 0).all()
+    assert (np.diff(poses[..., -1], axis=-1)[whole[:, 1:]] > -1e-8).all()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_poses_are_counted_another_way(name):
+    """By Newton's steps from many poses."""
+    robot, x = drawn(name)
+    joints = pteron.inverse_kinematics(robot, x[0])
+    poses = pteron.direct_kinematics(robot, joints, all_branches=True)
+    step = numeric(robot, "newton_step")
+    rng = np.random.default_rng(1)
+    found = []
+    lengths = len(robot.platform.lengths)
+    at = np.concatenate(
+        [
+            x[0, :lengths] + 1.5 * rng.normal(size=(400, lengths)),
+            rng.uniform(-np.pi, np.pi, (400, len(robot.platform.angles))),
+        ],
+        axis=-1,
+    )
+    with np.errstate(all="ignore"):
+        for _ in range(40):
+            at = step(joints, at)[0]
+    at = at[np.isfinite(at).all(axis=-1)]
+    good = at[step(joints, at)[1] < 1e-12]
+    for pose in good:
+        place, axes = robot.platform.at(pose)
+        known = np.append(place, axes)
+        if not any(np.abs(known - other).max() < 1e-6 for other in found):
+            found.append(known)
+    assert len(found) == counts(poses)
+
+
+def test_dietmaiers_machine_has_forty_poses():
+    poses = pteron.direct_kinematics(hexapod(BASE, TOP), LENGTHS)
+    assert counts(poses) == 40
+    back = pteron.inverse_kinematics(hexapod(BASE, TOP), poses)
+    np.testing.assert_allclose(back, np.broadcast_to(LENGTHS, back.shape), atol=1e-12)
