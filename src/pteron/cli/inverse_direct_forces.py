@@ -42,7 +42,7 @@ def inverse(
         list[str] | None,
         Argument(
             metavar="POSE",
-            help="x y z phi, or those that the machine has; m and rad.",
+            help="x y z phi, x y z roll pitch yaw, or those that the machine has; m and rad.",
             show_default=False,
         ),
     ] = None,
@@ -54,8 +54,8 @@ def inverse(
 ) -> None:
     """Compute the joint coordinates at poses.
 
-    A table has the columns x y z phi, those that the machine has; the result has its columns and
-    rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad.
+    A table has the columns x y z phi or x y z roll pitch yaw, those that the machine has; the
+    result has its columns and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad.
     """
     from pteron.kinematics import inverse_kinematics
 
@@ -102,7 +102,7 @@ def direct(
 
     A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row
     for each real pose, with the table's row (from 1) and its columns, the assembly mode (from 1)
-    and x y z phi. Where there is no real pose, these are empty.
+    and x y z phi, those that the machine has. Where there is no real pose, these are empty.
     """
     from pteron.kinematics import direct_kinematics
 
@@ -154,7 +154,8 @@ def forces(
         str | None, _vector("acceleration", "The rate of that; zero if left out.")
     ] = None,
     wrench: Annotated[
-        str | None, _vector("wrench", "fx fy fz mk on the platform at P; N and N m.")
+        str | None,
+        _vector("wrench", "fx fy fz mk, or fx fy fz mx my mz where it tilts, at P; N and N m."),
     ] = None,
     drives: Annotated[
         bool, option("drives", "What the drives must give: with friction and the motors' inertia.")
@@ -168,10 +169,11 @@ def forces(
     """Compute the actuator forces of a motion.
 
     A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi and, if a wrench acts on the
-    platform, fx fy fz mk: of each four those that the machine's pose has. The result has its
-    columns and force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m.
-    They are those of the bodies or, with --drives, those of the drives. Where these are more than
-    a drive's limits in the machine's file, a note says so.
+    platform, fx fy fz mk: of each four those that the machine's pose has, or roll, pitch and yaw in
+    place of phi; a platform that tilts has fx fy fz mx my mz. The result has its columns and
+    force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m. They are those of
+    the bodies or, with --drives, those of the drives. Where these are more than a drive's limits in
+    the machine's file, a note says so.
     """
     import numpy as np
 
@@ -201,7 +203,8 @@ def forces(
 
     def serve(values: NDArray[Any]) -> NDArray[Any]:
         """Return forces to deliver, and forces and rates to hold against the drives' limits."""
-        parts = [values[..., k : k + m] for k in range(0, len(columns), m)]
+        # A wrench has six components where the platform tilts.
+        parts = np.split(values, [k for k in (m, 2 * m, 3 * m) if k < len(columns)], axis=-1)
         if not (drives or limited):
             return inverse_dynamics(machine, *parts, on_failure=on_failure)
         driven = drive_forces(machine, *parts, on_failure=on_failure)
@@ -218,7 +221,7 @@ def forces(
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> Rows:
-    m = len(loads)
+    m = len(motion) // 3
     if typed[0] is None:
         raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}")
     names: list[str] = []
@@ -228,5 +231,5 @@ def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...
         if given is None and name == "--wrench":
             continue
         names += own
-        values += [0.0] * m if given is None else parsed_numbers([given], own, name)
+        values += [0.0] * len(own) if given is None else parsed_numbers([given], own, name)
     return single_row(names, values)

@@ -165,7 +165,9 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
 def _poses(robot: Manipulator) -> Array:
     """Return some poses in reach, singular (type II) or not; none where none is found."""
     try:
-        return drawn_poses(robot, _SAMPLES, np.random.default_rng(0), type_i=1e-3)
+        # Limits, short rams' above all, leave few poses of a platform that tilts.
+        limits, rng = not robot.platform.tilts, np.random.default_rng(0)
+        return drawn_poses(robot, _SAMPLES, rng, type_i=1e-3, limits=limits)
     except ModelError:
         return np.empty((0, robot.freedom))
 
@@ -210,9 +212,13 @@ def _reason(robot: Manipulator) -> str:
             "platform"
         )
     if _points_are_in_line(robot):
+        where = " through P" if robot.platform.center else ""
+        where = where if robot.platform.tilts else " along the platform's axis"
+        return f"all platform points lie on one line{where}, about which no force then has a moment"
+    if (factor := _alike(robot)) is not None:
         return (
-            "all platform points lie on one line along the platform's axis, about which no "
-            "force then has a moment"
+            "the guide points and the platform points are similar figures, the latter "
+            f"{factor:.4g} times the former"
         )
     if closure_of(robot).orientation is not None and _has_fourfold_symmetry(robot, forces[0]):
         return (
@@ -236,11 +242,33 @@ def _reason(robot: Manipulator) -> str:
 
 def _points_are_in_line(robot: Manipulator) -> bool:
     """Say whether the platform turns about an axis through all its points, but for rounding."""
-    if not robot.wraps.any():
+    platform = robot.platform
+    if not robot.wraps.any() or (platform.tilts and len(platform.angles) < 3):
         return False
     points = np.array([leg.platform_point for leg in robot.legs])
     size = max(float(np.abs(points).max()), 1e-9)
+    if platform.tilts:
+        beside = points if platform.center else points - points.mean(axis=0)
+        return bool(np.linalg.svd(beside, compute_uv=False)[1] <= 1e-9 * size)
     return bool(np.ptp(points[:, :2], axis=0).max() <= 1e-9 * size)
+
+
+def _alike(robot: Manipulator) -> float | None:
+    """Return how large the platform's figure is beside the base's, if they are similar.
+
+    Where rams join similar figures, the lengths of all six leave the platform free to move.
+    """
+    if len(robot.platform.angles) < 3 or not robot.platform.lengths:
+        return None
+    base = np.array([leg.guide_point for leg in robot.legs])
+    points = np.array([leg.platform_point for leg in robot.legs])
+    base, points = (figure - figure.mean(axis=0) for figure in (base, points))
+    left, _, right = np.linalg.svd(base.T @ points)
+    turned = base @ left @ right
+    size = float((turned * turned).sum())
+    factor = float((turned * points).sum()) / size if size > 0.0 else 0.0
+    off = np.linalg.norm(points - factor * turned)
+    return factor if off <= 1e-9 * factor * np.sqrt(size) else None
 
 
 def _always_free(rows: Array) -> Array | None:

@@ -41,12 +41,14 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
     tuple of str
     """
     length, limits = unlikely_length(robot), robot.platform.angle_limits
-    turns = {name: _turn(limits.get(name)) for name in robot.platform.angles}
+    # Angles of a platform that tilts repeat beyond half a turn.
+    least = np.pi if robot.platform.tilts else 2.0 * np.pi
+    turns = {name: _turn(limits.get(name), least) for name in robot.platform.angles}
     far, angles = dict.fromkeys(COORDINATES, length) | turns, set(turns)
     for name, leg in zip(robot.joint_names, robot.legs, strict=True):
         far[name] = length
         if leg.joint.unit == "rad":
-            far[name] = max(_turn(leg.limits), *turns.values(), _WOUND)
+            far[name] = max(_turn(leg.limits, 2.0 * np.pi), *turns.values(), _WOUND)
             angles.add(name)
     found = []
     for turning, question in (
@@ -63,9 +65,9 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
     return tuple(found)
 
 
-def _turn(limits: tuple[float, float] | None) -> float:
-    """Return the angle beyond which degrees are likelier: a turn, or more where limits allow it."""
-    return max((2.0 * np.pi, *map(abs, limits or ())))
+def _turn(limits: tuple[float, float] | None, least: float) -> float:
+    """Return the angle beyond which degrees are likelier, at least one: more where limits allow."""
+    return max((least, *map(abs, limits or ())))
 
 
 def warn_of_unlikely(robot: Manipulator, columns: Sequence[str], values: Array) -> None:

@@ -1,0 +1,108 @@
+"""Bad input to machines whose platforms tilt: one clear line each, in Python and commands."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import tilting
+from mechanisms import NIGHTLY, TILTED
+from test_cli import run
+
+import pteron
+from pteron.errors import ModelError, SingularPose, UnlikelyValue
+from pteron.workspace.machine_warnings import machine_warnings
+
+
+def edited(robot, folder, *changes):
+    """Return the path of a machine's file, in which texts are replaced."""
+    path = pteron.save(robot, folder / "machine.toml")
+    text = path.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def test_similar_hexagons_are_refused_with_the_reason(tmp_path):
+    robot = TILTED["stewart"]
+    legs = []
+    for leg in robot.legs:
+        legs.append(replace(leg, platform_point=tuple(0.4 * np.array(leg.guide_point))))
+    alike = replace(robot, legs=tuple(legs))
+    words = "guide points and the platform points are similar figures, the latter 0.4 times"
+    assert words in pteron.architecture(alike).reason
+    with pytest.raises(SingularPose, match=words):
+        pteron.random_poses(alike, 1)
+    done = run(f"check {pteron.save(alike, tmp_path / 'alike.toml')}")
+    assert done.exit_code == 2
+    assert words in done.stderr
+
+
+@NIGHTLY
+def test_points_in_line_are_the_reason():
+    robot = tilting.machine("3R", ("UPS",), 4)[0]
+    legs = [
+        replace(leg, platform_point=(0.1 * k, 0.2 * k, 0.1 * k))
+        for k, leg in enumerate(robot.legs, start=1)
+    ]
+    found = pteron.architecture(replace(robot, legs=tuple(legs)))
+    assert "all platform points lie on one line through P" in found.reason
+
+
+def test_degrees_are_asked_about(tmp_path):
+    wrist = TILTED["wrist"]
+    robot = replace(
+        wrist, platform=replace(wrist.platform, limits=((-30, 30), (-0.5, 0.5), (-9, 9)))
+    )
+    first, second = machine_warnings(robot)
+    assert first == (
+        "platform: limits: [-30.0, 30.0] rad, more than half a turn from roll = 0: are these "
+        "degrees?"
+    )
+    assert "yaw = 0" in second
+    with pytest.warns(UnlikelyValue, match="roll, pitch, yaw up to 5: are these degrees"):
+        pteron.inverse_kinematics(wrist, [5.0, 2.0, 0.0])
+    done = run(f"check {edited(wrist, tmp_path, ('angle = 1.2', 'angle = 70.0'))}")
+    assert done.exit_code == 2
+    assert "leg 1: platform_cone.angle: 70 rad given" in done.stderr
+    assert "degrees" in done.stderr
+
+
+def test_an_inertia_that_no_body_has_is_refused(tmp_path):
+    path = edited(TILTED["wrist"], tmp_path, ("inertia = [0.0041,", "inertia = [0.0241,"))
+    with pytest.raises(ModelError, match="belongs to no real body"):
+        pteron.load(path)
+    done = run(f"check {path}")
+    assert done.exit_code == 2
+    assert "platform.inertia: [0.0241" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_the_command_line_takes_angles_and_wrenches_of_a_platform_that_tilts(tmp_path):
+    robot = TILTED["wrist"]
+    pose, wrench = [0.1, 0.05, 0.02], [1.0, 2.0, 3.0, 0.0, 0.1, 0.2]
+    words = " ".join(map(str, wrench))
+    typed = json.loads(run(f"forces wrist --pose 0.1 0.05 0.02 --wrench {words} --json").stdout)
+    expected = pteron.inverse_dynamics(robot, pose, [0.0] * 3, [0.0] * 3, wrench)
+    np.testing.assert_allclose([typed[name] for name in robot.force_names], expected, rtol=1e-12)
+    names = robot.column_names
+    header = [*names["pose"], *names["velocity"], *names["acceleration"], *names["wrench"]]
+    table = tmp_path / "motion.csv"
+    row = [*pose, *[0.0] * 6, *wrench]
+    table.write_text(f"{','.join(header)}\n{','.join(map(str, row))}\n", encoding="utf-8")
+    (found,) = json.loads(run(f"forces wrist --table {table} --json").stdout)
+    np.testing.assert_allclose([found[name] for name in robot.force_names], expected, rtol=1e-12)
+    joints = json.loads(run("inverse wrist 0.1 0.05 0.02 --json").stdout)
+    assert [*joints] == ["roll", "pitch", "yaw", "rho1", "rho2", "rho3"]
+
+
+def test_random_poses_are_those_that_a_hexapod_takes():
+    robot = TILTED["rubin-m2-hexapod"]
+    poses = pteron.random_poses(robot, 50)
+    joints = pteron.inverse_kinematics(robot, poses)
+    low, high = np.array([leg.limits for leg in robot.legs]).T
+    assert ((low <= joints) & (joints <= high)).all()
+    assert np.abs(poses[:, 3:]).max() < 0.5
+    assert np.ptp(poses[:, 2]) > 0.01
