@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+import tilting
 from differences import OFFSETS
 from mechanisms import CATALOG, gated, random_machine, scaled, states
 
@@ -76,6 +77,47 @@ def test_what_the_base_gives_changes_the_momentum():
     found = reactions(robot, pose, velocity, acceleration, wrench)
     total = found.forces[:, 0].sum(axis=0) + wrench[:3]
     np.testing.assert_allclose(total, needed, rtol=0, atol=1e-5 * np.abs(needed).max())
+
+
+@pytest.mark.parametrize("motion", gated(tilting.LEGS, ("1T2R", "2R")))
+def test_a_platform_that_tilts_gets_from_its_legs_what_newton_and_euler_ask(motion):
+    """Its momentum by differences: with S(t) the integral of r(0) r(t)^T dm, that of r x r''."""
+    robot, home = tilting.machine(motion, tilting.LEGS[motion], 3)
+    pose, velocity, acceleration = (part[0] for part in tilting.states(robot, home, 1))
+    wrench = 10.0 * np.random.default_rng(1).normal(size=6)
+    found = reactions(robot, pose, velocity, acceleration, wrench)
+    forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration, wrench)
+    np.testing.assert_allclose(found.actuators, forces, rtol=0, atol=1e-11 * np.abs(forces).max())
+    assert found.redundancy == 0
+    assert found.unheld < 1e-9
+    if robot.platform.center:  # the joint there gives the rest
+        return
+    step = 2e-4
+    t = (OFFSETS * step)[:, None]
+    way = pose + t * velocity + 0.5 * t * t * acceleration
+    body = robot.platform.inertia
+    spread = 0.5 * np.trace(body.tensor) * np.eye(3) - body.tensor
+    place, axes = robot.platform.at(np.vstack([way, pose]))
+    arm = body.first_moment @ axes
+    first, now, here = body.mass * place + arm, axes[-1].T, place[-1]
+    integral = np.einsum("i,bj->bij", first[-1], place) + np.einsum("i,bj->bij", here, arm)
+    integral = integral + now @ spread @ axes
+    side = [-1 / 560, 8 / 315, -1 / 5, 8 / 5]
+    weights = np.array([*side, *side[::-1], -205 / 72]) / step**2
+    bent = [np.tensordot(weights, part, 1) for part in (first, integral)]
+    needed = bent[0] - body.mass * np.array(robot.gravity)
+    turning = bent[1] - bent[1].T
+    about = np.array([turning[1, 2], turning[2, 0], turning[0, 1]])
+    about -= np.cross(first[-1], robot.gravity)
+    last = [np.flatnonzero(np.isfinite(leg[:, 0]))[-1] for leg in found.points]
+    points, passed, moments = (
+        np.array([leg[k] for leg, k in zip(part, last, strict=True)])
+        for part in (found.points, found.forces, found.moments)
+    )
+    np.testing.assert_allclose(moments, 0.0, atol=1e-9)
+    np.testing.assert_allclose(passed.sum(0) + wrench[:3], needed, atol=1e-5)
+    whole = np.cross(points, passed).sum(0) + np.cross(here, wrench[:3]) + wrench[3:]
+    np.testing.assert_allclose(whole, about, atol=1e-5)
 
 
 def test_least_norm_and_what_is_no_load():

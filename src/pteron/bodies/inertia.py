@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,6 +172,11 @@ class PlanarInertia(_TurningInertia):
 
     kinds: ClassVar = ("m", "mgx", "mgy", "I")
 
+    @classmethod
+    def shares_of_point(cls, x: Any, y: Any, z: Any) -> dict[str, Any]:
+        """Return the parameters, by kind, of a unit mass at a point of its frame."""
+        return dict(zip(cls.kinds, (1, x, y, x * x + y * y), strict=True))
+
 
 @dataclass(frozen=True)
 class SpatialInertia:
@@ -242,6 +247,12 @@ class SpatialInertia:
         x, y, z = numbers(center_of_mass, "center_of_mass", 3)
         xx, xy, xz, yy, yz, zz = numbers(inertia, "inertia", 6)
         return cls(mass, (mass * x, mass * y, mass * z), (xx, xy, xz, yy, yz, zz))
+
+    @classmethod
+    def shares_of_point(cls, x: Any, y: Any, z: Any) -> dict[str, Any]:
+        """Return the parameters, by kind, of a unit mass at a point of its frame."""
+        tensor = y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y
+        return dict(zip(cls.kinds, (1, x, y, z, *tensor), strict=True))
 
     @classmethod
     def of_values(cls, values: Sequence[float]) -> SpatialInertia:

@@ -23,9 +23,15 @@ PLATFORM_KINDS = ("m", "mgx", "mgy", "I")
 PREFERENCE = (
     *(("m", "p"), ("mgx", "u"), ("mgy", "u"), ("I", "u"), ("mgx", "l"), ("mgy", "l"), ("m", "e")),
     *(("m", "l"), ("mgx", "e"), ("mgy", "e"), ("I", "e"), ("I", "l"), ("m", "u")),
-    *((kind, "e") for kind in ("mgz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
 )
 """Kinds and bodies of parameters, those that base parameters keep first in front, as Table 1."""
+
+TILTING_PREFERENCE = (
+    *PREFERENCE[:6],
+    *((kind, "e") for kind in LENGTH_POWERS if kind != "I"),
+    *(("I", "l"), ("m", "l"), ("m", "u")),
+)
+"""The same under a platform that tilts: its own parameters are kept, before masses on it."""
 
 JOINED = (("m", "u"), ("mgx", "l"))
 """Parameters that the cheapest model drops: m_u joins the slider, and m gamma_x of a lower link is

@@ -48,9 +48,11 @@ class Equilibrium(NamedTuple):
     """b, where nothing but motion and gravity acts on the platform."""
     presumed_rows: Expression
     """Equations of a platform that its legs hold as its motion presumes: the forces on it, the
-    moments about P, and those on its bars."""
+    moments about P, and those on its bars; none of a platform on a joint with the base."""
     presumed_right: Expression
     legs: tuple[LegForces, ...]
+    loads: Expression
+    """(m, k): what a wrench on the platform takes of b."""
     driven_rows: Expression
     """(n, 6 n) and (n, 1): the actuator forces are driven_rows w + driven."""
     driven: Expression
@@ -86,13 +88,16 @@ def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equil
     shared = [tuple(sum(parts) for parts in zip(*bar, strict=True)) for bar in bars.values()]
     needs = machine.platform.needs(platform, machine.gravity, own)
     whole = machine.platform.needed_wrench(platform, machine.gravity, own)
+    held = [(ca.horzcat(*sums), ca.vertcat(*whole))] if machine.platform.on_legs_alone else []
+    held += [(row, -rest) for row, rest in shared]
+    presumed = [ca.vertcat(*part) for part in zip(*held, strict=True)]
     wanted = (ca.vertcat(*part) for part in zip(*driven, strict=True))
     return Equilibrium(
         ca.vertcat(ca.horzcat(*works), *(row for row, _ in released)),
         ca.vertcat(needs, *(-rest for _, rest in released)),
-        ca.vertcat(ca.horzcat(*sums), *(row for row, _ in shared)),
-        ca.vertcat(*whole, *(-rest for _, rest in shared)),
+        *(presumed or (ca.SX(0, 6 * count), ca.SX(0, 1))),
         tuple(legs),
+        machine.platform.applied(platform, ca.SX.eye(machine.wrench_size)),
         *wanted,
     )
 
@@ -192,7 +197,8 @@ def _released(leg: LegKind, motion: LegMotion, found: LegForces, hinges: int) ->
     # Rods: what is no force along them is their couple, the same at both of their ends.
     length = ca.norm_2(motion.links[1])
     n, couple = motion.links[1] / length, couple / length
-    across, tip = motion.chain[2].axis, found.wrenches[1]
+    first, second = [k for k, joint in enumerate(motion.chain) if not joint.driven][:2]
+    across, tip = motion.chain[second].axis, found.wrenches[first]
     blocked = ca.horzsplit(ca.SX.eye(3))
     if not couple.is_zero():
         blocked = [n, ca.cross(n, couple)]

@@ -24,6 +24,7 @@ class Equations(NamedTuple):
     right: Array
     presumed_rows: Array
     presumed_right: Array
+    loads: Array
     driven_rows: Array
     driven: Array
     ends: Array
@@ -101,6 +102,8 @@ def _range(projectors: Array) -> Array:
 def on_platform(robot: Manipulator, wrench: Array, moment: Array) -> Array:
     """Return the force and the moment at P (..., 6) of a wrench and of a moment beside it."""
     count, platform = len(robot.platform.lengths), robot.platform
+    if platform.tilts:
+        return np.concatenate(np.broadcast_arrays(wrench[..., :3], wrench[..., 3:] + moment), -1)
     force = wrench[..., :count] @ platform.directions
     turning = np.zeros(3)
     if platform.rotation_axes:

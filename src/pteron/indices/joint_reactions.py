@@ -95,7 +95,9 @@ def reactions(
     velocity, acceleration : array, shape (..., m), optional
         The platform's motion; at rest by default.
     wrench : array, shape (..., m), optional
-        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m.
+        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m;
+        where it tilts a force and a moment, (..., 6). A joint between platform and base, at the
+        centre of a 3R or 2R platform, bears what the legs do not.
     moment : array, shape (..., 3), optional
         A moment on the platform beside it, in the base frame, N m; what of it turns the platform
         belongs in `wrench`.
@@ -129,10 +131,11 @@ def reactions(
     by = size_of(robot) if length is None else float(length)
     if not by > 0.0:
         raise DataError(f"length: {by:g} m given, a number above 0 expected")
+    none = {"wrench": np.zeros(len(robot.platform.wrench_columns))}
     rest = np.zeros(robot.freedom)
     given = {"pose": pose, "velocity": velocity, "acceleration": acceleration, "wrench": wrench}
     states = [
-        rest if part is None else checked(robot, part, name, on_failure)
+        none.get(name, rest) if part is None else checked(robot, part, name, on_failure)
         for name, part in given.items()
     ]
     states.append(np.zeros(3) if moment is None else as_array(moment, "moment", (3,)))
@@ -186,8 +189,8 @@ def _solved(
     g = Equations(*(part[good] for part in found))
     load = on_platform(robot, wrench, moment)
     right, presumed = g.right.copy(), g.presumed_right.copy()
-    right[:, :n] -= wrench[good]
-    presumed[:, :6] -= load[good]
+    right[:, : robot.freedom] -= times(g.loads, wrench[good])
+    presumed[:, :6] -= load[good][:, : presumed.shape[-1]]
     held = hold(robot, g, right[..., None], presumed[..., None])
     w, redundancy = held.forces[..., 0], held.stresses.shape[-1]
     there = np.isfinite(g.passed[..., 0])

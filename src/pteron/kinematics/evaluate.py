@@ -85,7 +85,7 @@ def checked(
     expect_choice(on_failure)
     names = robot.column_names
     columns = names.get(name, names["pose"])
-    array = as_array(value, name, (robot.freedom,), columns=columns)
+    array = as_array(value, name, (len(columns),), columns=columns)
     good = np.isfinite(array)
     if good.all():
         return array

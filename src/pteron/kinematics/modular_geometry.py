@@ -60,6 +60,14 @@ def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
         return None
     for axis in known:
         found += axis
+    for name, values in robot.platform.quantities.items():
+        if name.endswith("axis"):
+            unit = _unit(values, field)
+            if unit is None:
+                return None
+            found += unit
+        else:
+            found += (field.number(_decimal(value)) for value in values)
     return [*found, *(field.number(_decimal(value)) for value in robot.gravity)]
 
 

@@ -130,6 +130,8 @@ class PlatformEquations(ABC):
     """The kinds of its inertial parameters."""
     slides: ClassVar[bool] = False
     """Whether phi slides what the legs carry, and does not turn it."""
+    on_legs_alone: ClassVar[bool] = True
+    """Whether its legs alone hold it, and no joint with the base."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()
     """The names of a wrench at P that acts on it; none where they are the coordinates' own."""
     joints: ClassVar[tuple[str, ...]] = ()

@@ -378,7 +378,10 @@ class Platform:
 
     @property
     def quantities(self) -> dict[str, tuple[float, ...]]:
-        """What its equations need of it beside its frame and its points, by name."""
+        """What its equations need of it beside its frame and its points, by name.
+
+        Names that end in "axis" are those of unit vectors.
+        """
         if self.motion == "1T2R":
             return {"side": (self._side,)}
         if self.center is None:

@@ -202,6 +202,8 @@ class TurnsXYZ(Tilting):
 class _Centred(Tilting):
     """A platform whose point P stays at `center`, on a joint there."""
 
+    on_legs_alone = False
+
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:

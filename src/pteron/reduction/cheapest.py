@@ -29,7 +29,8 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
     Any invertible combination of a base set is a base set. The masses that the lower links' m and
     m gamma_x amount to are left to the joints, and m_u to the slider, where there is a choice;
     among what remains (the lower links' masses or the platform's four parameters, for one) columns
-    are exchanged as long as the reduced model gets cheaper. It is a local search, from two starts;
+    are exchanged as long as the reduced model gets cheaper. It is a local search, from two starts,
+    of which the better is taken as it is where the platform tilts;
     what `base_parameters` keeps by itself is never cheaper than its result.
 
     Parameters
@@ -71,7 +72,9 @@ def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
     found = {base.kept}
     for order in (others, others[::-1]):
         start = _independent(grouping, [*own, *order, *joined])
-        found.add(_improved(model, grouping, start, [*own, *others]))
+        # The columns of a platform that tilts are too many to exchange one by one.
+        tilts = robot.platform.tilts
+        found.add(start if tilts else _improved(model, grouping, start, [*own, *others]))
     best = min(found, key=lambda kept: (_final_cost(robot, kept), kept))
     return base_parameters(robot, keep=[columns[k].name for k in best])
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from pteron.kernels import NoSquareRoot, PrimeField, RationalField, evaluate, general_program
+from pteron.kernels.graph import graph_of
 from pteron.legs.circles import random_fraction
 from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.exact_geometry import ExactGeometry
@@ -38,10 +39,11 @@ def modular_rows(
     rows: list[list[int]] = []
     for _ in range(_ATTEMPTS):
         pose = _draw(topology.freedom, prime, rng)
-        if not all(is_square(delta, prime) for delta in evaluate(deltas, field, [vector, pose])[0]):
-            continue
-        motion = _draw(topology.freedom, prime, rng), _draw(topology.freedom, prime, rng)
         try:
+            squares = evaluate(deltas, field, [vector, pose])[0]
+            if not all(is_square(delta, prime) for delta in squares):
+                continue
+            motion = _draw(topology.freedom, prime, rng), _draw(topology.freedom, prime, rng)
             values = evaluate(program, field, [vector, pose, *motion])[0]
         except (NoSquareRoot, ZeroDivisionError):
             continue
@@ -57,8 +59,10 @@ def rational_rows(
     """Return the regressor's rows, as fractions, at random rational configurations.
 
     Each leg is closed without a root, in a random pose of its own; the guide points follow. None
-    where a kind of leg does not say how.
+    where a kind of leg does not say how, or planes hold the platform, whose poses have a root.
     """
+    if topology.platform.planes:
+        return []
     field = RationalField()
     vector = geometry.within(field)
     points = general_program(topology, "platform_points").function
@@ -101,42 +105,105 @@ def _split(values: Sequence[Element], topology: Manipulator) -> list[list[Elemen
     return [list(values[i * n : (i + 1) * n]) for i in range(topology.freedom)]
 
 
-Degree = tuple[int, int]
-"""Bounds on the degrees of numerator and denominator."""
+class _Degree(NamedTuple):
+    """A bound on the degree of a value: of its numerator, over powers of known denominators."""
+
+    numerator: int
+    powers: dict[int, int]
+    """By the number of a value that was divided by, the power that the denominator has of it."""
+    name: int
+    """The same for values that are worked out alike."""
 
 
 class _DegreeField:
-    """Degrees in place of numbers; a root of Delta counts half of Delta's degree."""
+    """Degrees in place of numbers; a root of Delta counts half of Delta's degree.
 
-    def number(self, value: Fraction | int) -> Degree:
-        return (0, 0)
+    Fractions are brought to the least denominator that divisions as written allow.
+    """
 
-    def add(self, a: Degree, b: Degree) -> Degree:
-        return (max(a[0] + b[1], b[0] + a[1]), a[1] + b[1])
+    def __init__(self) -> None:
+        self.degrees: list[int] = []
+        self.names: dict[Any, int] = {}
 
-    subtract = add
+    def of(self, numerator: int, powers: dict[int, int], *told: Any) -> _Degree:
+        """Return a value that is worked out as told."""
+        return _Degree(numerator, powers, self.names.setdefault(told, len(self.names)))
 
-    def multiply(self, a: Degree, b: Degree) -> Degree:
-        return (a[0] + b[0], a[1] + b[1])
+    def over(self, powers: Mapping[int, int], a: _Degree) -> int:
+        """Return the degree of a value's numerator over a denominator that its own divides."""
+        more = (n - a.powers.get(k, 0) for k, n in powers.items())
+        pairs = zip(powers, more, strict=True)
+        return a.numerator + sum(self.degrees[k] * n for k, n in pairs)
 
-    def divide(self, a: Degree, b: Degree) -> Degree:
-        return (a[0] + b[1], a[1] + b[0])
+    def number(self, value: Fraction | int) -> _Degree:
+        return self.of(0, {}, value)
 
-    def square_root(self, a: Degree) -> Degree:
-        return (-(-a[0] // 2), -(-a[1] // 2))
+    def variable(self, name: str) -> _Degree:
+        return self.of(1, {}, name)
+
+    def add(self, a: _Degree, b: _Degree) -> _Degree:
+        powers = common_powers((a, b))
+        found = max(self.over(powers, a), self.over(powers, b))
+        return self.of(found, powers, "add", a.name, b.name)
+
+    def subtract(self, a: _Degree, b: _Degree) -> _Degree:
+        return self.add(a, b)._replace(name=self.of(0, {}, "subtract", a.name, b.name).name)
+
+    def multiply(self, a: _Degree, b: _Degree) -> _Degree:
+        powers = {k: a.powers.get(k, 0) + b.powers.get(k, 0) for k in {**a.powers, **b.powers}}
+        return self.of(a.numerator + b.numerator, powers, "multiply", a.name, b.name)
+
+    def divide(self, a: _Degree, b: _Degree) -> _Degree:
+        inverse = self.of(b.numerator, {}, "numerator", b.name).name
+        self.degrees += [0] * (inverse + 1 - len(self.degrees))
+        self.degrees[inverse] = b.numerator
+        powers = {k: n - b.powers.get(k, 0) for k, n in a.powers.items()}
+        left = {k: n for k, n in b.powers.items() if n > a.powers.get(k, 0)}
+        numerator = a.numerator + sum(
+            self.degrees[k] * (n - a.powers.get(k, 0)) for k, n in left.items()
+        )
+        powers = {k: n for k, n in powers.items() if n > 0}
+        powers[inverse] = powers.get(inverse, 0) + 1
+        return self.of(numerator, powers, "divide", a.name, b.name)
+
+    def square_root(self, a: _Degree) -> _Degree:
+        powers = {k: -(-n // 2) for k, n in a.powers.items()}
+        twice = self.over({k: 2 * n for k, n in powers.items()}, a)
+        return self.of(-(-twice // 2), powers, "root", a.name)
+
+
+def common_powers(values: Iterable[_Degree]) -> dict[int, int]:
+    """Return the least denominator of some values."""
+    found: dict[int, int] = {}
+    for value in values:
+        for k, n in value.powers.items():
+            found[k] = max(n, found.get(k, 0))
+    return found
 
 
 @lru_cache(maxsize=8)
 def degree_bound(topology: Manipulator) -> int:
     """Return a bound on the degree of any combination of a regressor row's entries.
 
-    In the pose (phi through the tangent of its half), velocity and acceleration, the geometry
-    being constants. Every entry is brought to a denominator of its own, hence generously.
+    In the pose (angles through the tangents of their halves), velocity and acceleration, the
+    geometry being constants.
     """
     program = general_program(topology, "regressor").function
-    constants: list[Degree] = [(0, 0)] * program.size1_in(0)
-    state: list[Degree] = [(1, 0)] * topology.freedom
-    entries = evaluate(program, _DegreeField(), [constants, state, state, state])[0]
+    field = _DegreeField()
+    constants = [field.number(Fraction(0))] * program.size1_in(0)
+    constants = [c._replace(name=-1 - k) for k, c in enumerate(constants)]
+    states = [
+        [field.variable(f"{name}{k}") for k in range(topology.freedom)]
+        for name in ("pose", "velocity", "acceleration")
+    ]
+    entries = evaluate(program, field, [constants, *states])[0]
     return max(
-        max(num for num, _ in row) + sum(den for _, den in row) for row in _split(entries, topology)
+        max(field.over(common_powers(row), entry) for entry in row)
+        for row in _split(entries, topology)
     )
+
+
+def roots(topology: Manipulator) -> int:
+    """Return the number of square roots in the regressor."""
+    graph = graph_of(general_program(topology, "regressor").function)
+    return sum(node.operation == "sqrt" for node in graph.nodes)

@@ -28,6 +28,7 @@ from pteron.reduction.configurations import (
     is_square,
     modular_rows,
     rational_rows,
+    roots,
 )
 from pteron.reduction.elimination import dependencies, reconstruct, remainder
 from pteron.reduction.exact_geometry import ExactGeometry, exact_geometry
@@ -42,8 +43,9 @@ _BITS = 61
 _MOST_PRIMES = 8
 """Primes whose residues are combined to fractions before that is given up."""
 
-_ROOTS_PRIMES = 3
-"""The same with roots in the geometry: shares are hardly ever fractions then."""
+_FEW_PRIMES = 3
+"""The same with roots in the geometry, where shares are hardly ever fractions, and where mass
+transfers, which give the shares, explain them all."""
 
 _SPARE_STATES = 4
 """Random states beyond those whose rows are as many as the columns."""
@@ -84,7 +86,7 @@ def exact_grouping(
 
     found: dict[int, tuple[list[int], Relations]] = {}
     shares: dict[int, dict[int, Fraction]] | None = None
-    most = _ROOTS_PRIMES if geometry.radicands else _MOST_PRIMES
+    most = _FEW_PRIMES
     while len(found) < most and shares is None:
         prime = next(primes)
         try:
@@ -97,12 +99,11 @@ def exact_grouping(
         found = {p: result for p, result in found.items() if len(result[0]) == best}
         if len(found) > 1:
             shares = _lifted(found)
-    kept, relations = next(iter(found.values()))
-    dropped = [column for column in order if column not in kept]
-    by_mass = [
-        _modular(transfer, geometry, columns, next(iter(found))) for transfer in mass_transfers
-    ]
-    extra = _unexplained(by_mass, relations, dropped, len(order), next(iter(found)))
+        first, (kept, relations) = next(iter(found.items()))
+        dropped = [column for column in order if column not in kept]
+        by_mass = [_modular(transfer, geometry, columns, first) for transfer in mass_transfers]
+        extra = _unexplained(by_mass, relations, dropped, len(order), first)
+        most = _MOST_PRIMES if extra and not geometry.radicands else _FEW_PRIMES
 
     if shares is None and not extra and not geometry.radicands:
         # Fractions of more digits than the primes hold.
@@ -141,9 +142,9 @@ def exact_grouping(
     assert all(_annihilate(each, rows, fresh) for each in (residues, *vectors))
 
     degree = degree_bound(topology)
-    # A pose is drawn among the 1 in 2^n whose Deltas are squares, and the 2^n choices of their
+    # A pose is drawn among the 1 in 2^n whose n radicands are squares, and the 2^n choices of their
     # roots multiply the degree.
-    odds = min(1.0, degree * 4.0**n / fresh) ** _MODULAR_CHECKS
+    odds = min(1.0, degree * 4.0 ** roots(topology) / fresh) ** _MODULAR_CHECKS
     certificate = ExactCertificate(
         method="exact",
         rank=len(kept),

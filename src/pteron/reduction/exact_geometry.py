@@ -42,6 +42,10 @@ _NEARLY = 1e-5
 
 ZERO = Surd(Fraction(0))
 
+_ONE = Surd(Fraction(1))
+
+_UNIT: tuple[ExactVector, ...] = (_ONE, ZERO, ZERO), (ZERO, _ONE, ZERO), (ZERO, ZERO, _ONE)
+
 
 @dataclass(frozen=True)
 class ExactLeg:
@@ -96,6 +100,13 @@ class ExactGeometry:
         The legs.
     gravity : vector of Surd
         In the machine's own frame, m/s^2.
+    platform : dict
+        The platform's quantities by name, in their order.
+    axes : tuple of vectors of Surd
+        The platform frame's x, y and z at angles zero. Of a platform that takes every orientation,
+        or every one that its planes allow, they are the own frame's.
+    tilts : bool
+        Whether the platform turns about more axes than one.
     frame : array, shape (3, 3)
         The machine's own frame: its rows are the axes, in the base frame. Where the platform turns
         or stays in a plane they are the platform frame's at some phi, where it slides the platform
@@ -110,6 +121,9 @@ class ExactGeometry:
 
     legs: tuple[ExactLeg, ...]
     gravity: ExactVector
+    platform: dict[str, tuple[Surd, ...]]
+    axes: tuple[ExactVector, ...]
+    tilts: bool
     frame: Array
     recognised: tuple[str, ...]
     approximated: tuple[str, ...]
@@ -120,6 +134,7 @@ class ExactGeometry:
     def radicands(self) -> frozenset[int]:
         """The s > 1 of all numbers q sqrt(s)."""
         numbers = [n for leg in self.legs for n in leg.numbers] + list(self.gravity)
+        numbers += [n for value in (*self.platform.values(), *self.axes) for n in value]
         return frozenset(n.s for n in numbers if n.s != 1)
 
     def symbols(self) -> dict[str, Surd]:
@@ -127,20 +142,20 @@ class ExactGeometry:
         values: dict[str, Surd] = {}
         for i, leg in enumerate(self.legs, start=1):
             values |= {f"{symbol}{i}": value for symbol, value in leg.lengths.items()}
-            values[f"s{i}x"], values[f"s{i}y"] = leg.platform_point[:2]
+            for axis, value in zip("xyz" if self.tilts else "xy", leg.platform_point, strict=False):
+                values[f"s{i}{axis}"] = value
         return values
 
     def within(self, field: Field[Element]) -> list[Element]:
         """Return the geometry vector of `Machine.symbols` in a field."""
-        one, zero = field.number(1), field.number(0)
-        frame = [one, zero, zero, zero, one, zero, zero, zero, one]
         numbers = [
             number
             for leg in self.legs
             for values in leg.within(field).values()
             for number in values
         ]
-        return numbers + frame + [g.within(field) for g in self.gravity]
+        rest = (*self.axes, *self.platform.values(), self.gravity)
+        return numbers + [number.within(field) for vector in rest for number in vector]
 
     @property
     def places(self) -> list[dict[str, slice]]:
@@ -169,6 +184,8 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
         for q in leg.quantities:
             if q.role == "direction":
                 unit[f"{q.symbol}{i}"] = np.array(q.value)
+    platform = robot.platform
+    unit |= {n: np.array(v) for n, v in platform.quantities.items() if n.endswith("axis")}
     size = float(np.linalg.norm(robot.gravity))
     if size > 0.0:
         unit["gravity"] = np.array(robot.gravity) / size
@@ -185,9 +202,16 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
         for name, vector in unit.items()
         if not any(n[1:] == name[1:] and n < name and (unit[n] == vector).all() for n in unit)
     }
+    own: dict[str, tuple[Surd, ...]] = {"center": (ZERO,) * 3}
+    own |= {n: (Surd(Fraction(v[0])),) for n, v in platform.quantities.items() if len(v) == 1}
+    # The whole machine but its platform's frame turns with a joint that has axes of its own.
+    axes = _rational_rotation(frame) if "second_axis" in platform.quantities else _UNIT
     return ExactGeometry(
         legs,
         gravity,
+        {name: (own | exact)[name] for name in platform.quantities},
+        axes,
+        platform.tilts,
         frame,
         tuple(notes.recognised),
         tuple(notes.approximated),
@@ -202,7 +226,8 @@ def _exact_leg(
     leg = robot.legs[i]
     # What does not turn only shifts what the leg is fixed to.
     shift = np.array(leg.fixed_offset)
-    if robot.platform.turns:
+    if robot.platform.angles:
+        shift = shift + np.array(robot.platform.center or (0.0, 0.0, 0.0))
         x, y = notes.planar(f"s{i + 1}", *leg.platform_point[:2])
         s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
     else:
@@ -215,7 +240,12 @@ def _exact_leg(
         if q.role == "point":
             # It enters the regressor only through c - r: no rank hangs on its last digits.
             at = frame @ (np.array(q.value) - shift)
-            values[q.name] = tuple(Surd(Fraction(float(c)).limit_denominator(10**9)) for c in at)
+            values[q.name] = tuple(_fraction(float(c)) for c in at)
+            if robot.platform.planes and abs(at @ frame @ leg.plane_normal) < _PARALLEL:
+                # Planes of legs that meet in one line do so exactly.
+                x, y, _ = exact[f"d{i + 1}"]
+                along = _fraction(float(at[1] * float(x) - at[0] * float(y))).q
+                values[q.name] = y.times(-along), x.times(along), values[q.name][2]
         elif q.role == "direction":
             directions.append(exact[f"{q.symbol}{i + 1}"])
             values[q.name] = directions[-1]
@@ -225,7 +255,12 @@ def _exact_leg(
         else:
             plain = () if q.role == "normal" else q.value
             values[q.name] = tuple(Surd(Fraction(v)) for v in plain)
-    return ExactLeg(values, directions[0], lengths, s0)
+    # A leg without one has no axis that a force depends on.
+    return ExactLeg(values, (directions or [_UNIT[2]])[0], lengths, s0)
+
+
+def _fraction(value: float) -> Surd:
+    return Surd(Fraction(value).limit_denominator(10**9))
 
 
 @dataclass(frozen=True)
@@ -283,7 +318,7 @@ class _Notes:
 def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
     """Return the frame, as rows, in which most components of the vectors are simple."""
     frames = []
-    if robot.platform.turns or robot.platform.planar:
+    if robot.platform.turns or robot.platform.planar or robot.platform.planes:
         x0, _, k = (np.array(axis) for axis in robot.platform.frame)
         firsts = [x0]
         if not robot.platform.slides:
@@ -298,6 +333,29 @@ def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
                 n = n / np.linalg.norm(n)
                 candidates.append(np.array([a, np.cross(n, a), n]))
     return max(candidates, key=lambda frame: _simplicity(frame, vectors))
+
+
+def _rational_rotation(frame: Array) -> tuple[ExactVector, ...]:
+    """Return the columns of a rotation near a frame, in fractions: Cayley's, of three numbers.
+
+    Two rows of a frame that is far from 1 change their signs first.
+    """
+    signs = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    sign = signs[np.argmax([np.trace(frame * s[:, None]) for s in signs])]
+    q = frame * sign[:, None]
+    axial = np.array([q[2, 1] - q[1, 2], q[0, 2] - q[2, 0], q[1, 0] - q[0, 1]]) / (1 + np.trace(q))
+    x, y, z = (
+        Fraction(0) if abs(v) < _PARALLEL else Fraction(float(v)).limit_denominator(_FINE)
+        for v in axial
+    )
+    square = 1 + x * x + y * y + z * z
+    rows = (
+        (1 + x * x - y * y - z * z, 2 * (x * y - z), 2 * (x * z + y)),
+        (2 * (x * y + z), 1 - x * x + y * y - z * z, 2 * (y * z - x)),
+        (2 * (x * z - y), 2 * (y * z + x), 1 - x * x - y * y + z * z),
+    )
+    turned = [[Surd(int(s) * v / square) for v in row] for s, row in zip(sign, rows, strict=True)]
+    return tuple((x, y, z) for x, y, z in zip(*turned, strict=True))
 
 
 def _simplicity(frame: Array, vectors: list[Array]) -> int:

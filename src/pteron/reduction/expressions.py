@@ -117,7 +117,8 @@ def _latex_name(parameter: Parameter) -> str:
     body = parameter.body + parameter.suffix
     if parameter.length_power == 1:
         return rf"m_{{{body}}}\gamma_{{{body},{parameter.kind[-1]}}}"
-    return f"{parameter.kind}_{{{body}}}"
+    index = ",".join(part for part in (parameter.kind[1:], body) if part)
+    return f"{parameter.kind[0]}_{{{index}}}"
 
 
 def html_name(parameter: Parameter) -> str:
@@ -125,7 +126,8 @@ def html_name(parameter: Parameter) -> str:
     body = parameter.body + parameter.suffix
     if parameter.length_power == 1:
         return f"<i>m\u03b3</i><sub>{parameter.kind[-1]},{body}</sub>"
-    return f"<i>{parameter.kind}</i><sub>{body}</sub>"
+    index = ",".join(part for part in (parameter.kind[1:], body) if part)
+    return f"<i>{parameter.kind[0]}</i><sub>{index}</sub>"
 
 
 def html_symbol(name: str) -> str:

@@ -82,7 +82,9 @@ def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Ar
     """Return regressors at random states, stacked, columns scaled to length 1; the lengths."""
     rng = np.random.default_rng(seed)
     states = _STATES_PER_COLUMN * sharing.shape[1]
-    poses = random_poses(robot, states, seed=rng, type_i=0.2, type_ii=0.2)
+    # Six forces on one body are hardly ever as far from singular as three or four may be.
+    apart = 0.2 if robot.freedom < 6 else 0.002
+    poses = random_poses(robot, states, seed=rng, type_i=0.2, type_ii=apart)
     # In the machine's own units of length and time, so that its size does not matter.
     size = max(leg.size for leg in robot.legs)
     second = np.sqrt(size / _ACCELERATION)

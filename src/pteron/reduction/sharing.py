@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pteron.bodies.parameters import PREFERENCE, Parameter
+from pteron.bodies.parameters import PREFERENCE, TILTING_PREFERENCE, Parameter
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameter_data
@@ -60,9 +60,11 @@ def share(
 
 def default_order(columns: Sequence[Parameter]) -> list[int]:
     """Return the columns in order of preference, those to keep first in front."""
+    given = {(parameter.kind, parameter.body) for parameter in columns}
+    preference = PREFERENCE if given <= set(PREFERENCE) else TILTING_PREFERENCE
 
     def rank(column: int) -> tuple[int, int]:
         parameter = columns[column]
-        return PREFERENCE.index((parameter.kind, parameter.body)), column
+        return preference.index((parameter.kind, parameter.body)), column
 
     return sorted(range(len(columns)), key=rank)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Add, Integer, Mul, Symbol
+from sympy import Integer, Mul, Symbol
 
 from pteron.bodies.parameters import PLATFORM, Parameter
 from pteron.manipulator import Manipulator
@@ -60,7 +60,11 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer
         platform = {p.kind: p for p in columns if p.body == PLATFORM}
         for letter in legs[0].equations_class.rides:
             found.append(_platform_point(robot, group, place["m", letter], platform))
-    if not robot.platform.turns:
+    if robot.platform.center is not None:
+        found.append(
+            Transfer("the platform turns about a fixed point", {platform["m"]: Integer(1)})
+        )
+    if not robot.platform.angles:
         reason = "the platform does not turn"
         turning = (p for p in columns if p.body == PLATFORM and p.kind != "m")
         found += [Transfer(reason, {p: Integer(1)}) for p in turning]
@@ -74,17 +78,10 @@ def _platform_point(
     platform: Mapping[str, Parameter],
 ) -> Transfer:
     name = robot.legs[group[0] - 1].names[mass.body]
-    points = []
+    entries: dict[Parameter, Any] = {mass: Integer(1)}
     for leg in group:
-        given = zip("xy", robot.legs[leg - 1].platform_point, strict=False)
-        points.append([Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in given])
-    return Transfer(
-        f"{name}{mass.suffix} and platform carry the platform point",
-        {
-            mass: Integer(1),
-            platform["m"]: Integer(-len(group)),
-            platform["mgx"]: -Add(*(x for x, _ in points)),
-            platform["mgy"]: -Add(*(y for _, y in points)),
-            platform["I"]: -Add(*(x**2 + y**2 for x, y in points)),
-        },
-    )
+        given = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
+        point = [Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in given]
+        for kind, share in robot.platform.inertia.shares_of_point(*point).items():
+            entries[platform[kind]] = entries.get(platform[kind], Integer(0)) - share
+    return Transfer(f"{name}{mass.suffix} and platform carry the platform point", entries)
