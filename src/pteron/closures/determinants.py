@@ -43,9 +43,12 @@ def adjugate(m: Expression) -> Expression:
 
 
 def solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (n, K) and d with A^T x = d w, d = det A; for A's rows, n = 2 to 4 or 6."""
+    """Return x (n, K) and d with A^T x = d w; for A's rows, n = 2 to 4 or 6.
+
+    d is det A, or 1 where x is found without it, and not finite where det A is 0.
+    """
     if rows.shape[0] == 6 and right.shape[1] == 1:
-        return _six_solved_across(rows, right)
+        return _six_solved_across(rows, right), ca.SX(1)
     if right.shape[1] > 1 or rows.shape[0] == 2:
         across = adjugate(rows)
         return ca.mtimes(across.T, right), ca.mtimes(rows[0, :], across[:, 0])
@@ -130,20 +133,25 @@ def _adjugate_of_six(m: Expression) -> Expression:
     return ca.vertcat(*rows)
 
 
-def _six_solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x and d with A^T x = d w by Cramer's rule, with each minor computed once."""
-    vectors = ca.horzcat(rows.T, right)
-    upper, lower = (_triples(ca.horzsplit(half)) for half in (vectors[:3, :], vectors[3:, :]))
+def _six_solved_across(rows: Expression, right: Expression) -> Expression:
+    """Return x with A^T x = w: six rows made orthogonal one after the other, by Gram and Schmidt.
 
-    def volume(left_out: int) -> Expression:
-        """Return the determinant of six of the vectors, in order."""
-        kept = [k for k in range(7) if k != left_out]
-        total = ca.SX(0)
-        for three in combinations(range(6), 3):
-            other = _others(three)
-            a, b = (tuple(kept[k] for k in part) for part in (three, other))
-            total += _sign((*three, *other)) * upper[a] * lower[b]
-        return total
-
-    # With w in place of row i, put last: its sign is that of the way there.
-    return ca.vertcat(*((-1) ** (5 - i) * volume(i) for i in range(6))), volume(6)
+    In Bjoerck's order x is as exact as by rotations, without their roots: backwards, each row is
+    met once more by what those after it have left.
+    """
+    found: list[Expression] = []
+    inverses: list[Expression] = []
+    shares: list[Expression] = []
+    for k in range(6):
+        row, rest = rows[:, k], right[k]
+        for q, inverse, share in zip(found, inverses, shares, strict=True):
+            product = ca.dot(row, q)
+            rest = rest - share * product
+            row = row - product * inverse * q
+        found.append(row)
+        inverses.append(1 / ca.dot(row, row))
+        shares.append(rest * inverses[-1])
+    x = shares[-1] * found[-1]
+    for k in reversed(range(5)):
+        x = x + (shares[k] - ca.dot(found[k], x) * inverses[k]) * found[k]
+    return x

@@ -232,7 +232,7 @@ class UPSEquations(LegEquations):
         """
         w = point.position - self.r
         length = ca.sqrt(ca.dot(w, w))
-        n = w / length
+        n = w * (1 / length)
         rate = ca.dot(n, point.velocity)
         dn = (point.velocity - rate * n) / length
         growth = ca.dot(n, point.acceleration) + length * ca.dot(dn, dn)
@@ -278,17 +278,21 @@ class UPSEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that cylinder and piston need: all of them at the platform point.
+        """Return the forces that cylinder and piston need: along the ram at the joint.
 
         With P_n = 1 - n n^T, beside the mass that rides: m gamma_l n'' + P_n ((I_u + I_l) n'' - m
-        gamma_u g + m gamma_l (c'' - g)) / L.
+        gamma_u g + m gamma_l (c'' - g)) / L. As P_n n'' = P_n (c'' - 2 L'/L c') / L that is P_n x -
+        m gamma_l (n'.n') n, with x of c'', c' and g alone; what of x is along n the ram bears.
         """
-        at, upper, lower = self._ram(point), inertia["u"], inertia["l"]
-        across = ca.mtimes(at.ddn, upper.i + lower.i) - ca.mtimes(gravity, upper.hx)
-        across += ca.mtimes(point.acceleration - gravity, lower.hx)
-        across = (across - ca.mtimes(at.n, ca.mtimes(at.n.T, across))) / at.length
-        force = ca.mtimes(at.ddn, lower.hx) + across
-        return Needs(ca.SX(1, force.shape[1]), on_point(force), lower.m)
+        w, inverse = point.position - self.r, 1 / ca.norm_2(point.position - self.r)
+        upper, lower, n = inertia["u"], inertia["l"], w * inverse
+        rate = ca.dot(n, point.velocity)
+        swing = (ca.dot(point.velocity, point.velocity) - rate * rate) * inverse * inverse
+        growth = (lower.hx + (upper.i + lower.i) * inverse) * inverse
+        x = ca.mtimes(point.acceleration, growth + lower.hx * inverse)
+        x -= ca.mtimes(point.velocity, (2 * rate * inverse) * growth)
+        x -= ca.mtimes(gravity, (upper.hx + lower.hx) * inverse)
+        return Needs(-ca.mtimes(n.T, x) - swing * lower.hx, on_point(x), lower.m)
 
 
 UPS.equations_class = UPSEquations

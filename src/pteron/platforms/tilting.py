@@ -128,12 +128,10 @@ class Tilting(PlatformEquations):
         p, dp, ddp = place
         _, _, w, dw = turned
         points, shifts = [], []
+        swing = ca.skew(dw) + ca.mtimes(w, w.T) - ca.dot(w, w) * ca.SX.eye(3)
         for arm in self.arms:
             s = ca.mtimes(turned.matrix, arm)
-            lever = ca.cross(w, s)
-            points.append(
-                PointMotion(p + s, dp + lever, ddp + ca.cross(dw, s) + ca.cross(w, lever))
-            )
+            points.append(PointMotion(p + s, dp + ca.cross(w, s), ddp + ca.mtimes(swing, s)))
             shifts.append(ca.blockcat([[ca.SX.eye(3), -ca.skew(s)], [ca.SX(3, 3), ca.SX.eye(3)]]))
         axes = ca.mtimes(turned.matrix, self.zero)
         x, y, _ = ca.horzsplit(axes)
