@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
@@ -237,6 +237,23 @@ class SpatialInertia:
         """The inertia tensor about the reference point, (3, 3), kg m^2."""
         xx, xy, xz, yy, yz, zz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    @classmethod
+    def second_moments(cls, values: Mapping[str, Any]) -> list[list[Any]]:
+        """Return [[S, h], [h^T, m]] (4, 4), S being the integral of r r^T dm, of values by kind.
+
+        It is linear in the ten parameters, and positive semidefinite for a real body.
+        """
+        x, y, z = values["Ixx"], values["Iyy"], values["Izz"]
+        xy, xz, yz = -values["Ixy"], -values["Ixz"], -values["Iyz"]
+        hx, hy, hz, m = values["mgx"], values["mgy"], values["mgz"], values["m"]
+        half = 0.5 * (x + y + z)
+        return [
+            [half - x, xy, xz, hx],
+            [xy, half - y, yz, hy],
+            [xz, yz, half - z, hz],
+            [hx, hy, hz, m],
+        ]
 
     @classmethod
     def of_body(

@@ -18,8 +18,6 @@ LEG_BODIES = ("p", "u", "l")
 PLATFORM = "e"
 """The letter of the platform."""
 
-PLATFORM_KINDS = ("m", "mgx", "mgy", "I")
-
 PREFERENCE = (
     *(("m", "p"), ("mgx", "u"), ("mgy", "u"), ("I", "u"), ("mgx", "l"), ("mgy", "l"), ("m", "e")),
     *(("m", "l"), ("mgx", "e"), ("mgy", "e"), ("I", "e"), ("I", "l"), ("m", "u")),
@@ -41,6 +39,11 @@ OWN = (("m", "p"), ("I", "u"), ("mgx", "u"), ("mgy", "u"), ("I", "l"), ("mgy", "
 """Parameters that the cheapest model keeps, if they act at all."""
 
 _UNITS = ("kg", "kg m", "kg m^2")
+
+
+def unit_of(kind: str) -> str:
+    """Return the SI unit of a kind of parameter."""
+    return _UNITS[LENGTH_POWERS[kind]]
 
 
 @dataclass(frozen=True)
@@ -121,10 +124,10 @@ def parameter_list(
     """
     groups = groups or [(i + 1,) for i in range(len(legs))]
     found = [
-        Parameter(kind, body, group, _UNITS[LENGTH_POWERS[kind]], 1 < len(legs) == len(group))
+        Parameter(kind, body, group, unit_of(kind), 1 < len(legs) == len(group))
         for body in LEG_BODIES
         for group in groups
         for kind in legs[group[0] - 1].get(body, ())
     ]
-    carried = [Parameter(k, PLATFORM, (), _UNITS[LENGTH_POWERS[k]]) for k in platform]
+    carried = [Parameter(kind, PLATFORM, (), unit_of(kind)) for kind in platform]
     return (*found, *carried)

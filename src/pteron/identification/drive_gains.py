@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from pteron.bodies.parameters import PLATFORM_KINDS
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, qr_factor, weighted
 from pteron.identification.estimators.least_squares import actuator_noise
@@ -175,12 +174,10 @@ def identify_drive_gains(
             "center_of_mass (or first_moment) and inertia about P too",
         )
     plain = identification_model(robot, replace(terms or Terms(), payload=False), base=base)
-    # All four columns of the payload: none is solved for, so that none need be independent.
+    # All columns of the payload: none is solved for, so that none need be independent.
     model = Model(plain.base, replace(plain.terms, payload=True), plain.joins)
     observations = observations_with_payload(model, log, with_payload, processing)
-    carried = observations.matrix[..., -len(PLATFORM_KINDS) :] @ np.array(
-        [known.mass, *known.first_moment, known.inertia]
-    )
+    carried = observations.matrix[..., -len(known.values) :] @ np.array(known.values)
     observations = observations.columns(range(len(plain.names)))
     start, condition, gap = _total(observations, carried, log.source)
     units = [f"{leg.joint.force_unit}/{unit}" for leg in robot.legs]

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from pteron.bodies.parameters import PLATFORM_KINDS
+from pteron.bodies.parameters import unit_of
 from pteron.equations.friction import PassiveJoint, passive_joints
 from pteron.errors import ModelError
 from pteron.identification.signals import States
@@ -139,12 +139,10 @@ class Model:
         if self.stribeck_speeds is not None:
             found += [Term("stribeck", f"Fs{i}", "F", f"s{i}", j.force_unit) for i, j in joints]
         if self.terms.payload:
-            found += [
-                Term("payload", "m_L", "m", "L", "kg"),
-                Term("payload", "mgx_L", "m\u03b3", "x,L", "kg m"),
-                Term("payload", "mgy_L", "m\u03b3", "y,L", "kg m"),
-                Term("payload", "I_L", "I", "L", "kg m^2"),
-            ]
+            for kind in self.robot.platform.inertia.kinds:
+                letter, axes = ("m\u03b3", kind[2:]) if kind[1:2] == "g" else (kind[0], kind[1:])
+                index = ",".join(part for part in (axes, "L") if part)
+                found.append(Term("payload", f"{kind}_L", letter, index, unit_of(kind)))
         return tuple(found)
 
     @property
@@ -258,7 +256,8 @@ class Model:
             rates = states.joint_rates
             parts.append(_diagonal(np.sign(rates) * np.exp(-((rates / speeds) ** 2))))
         if terms.payload:
-            carried = unchecked(robot, "regressor", *motion)[..., -len(PLATFORM_KINDS) :]
+            carried = unchecked(robot, "regressor", *motion)
+            carried = carried[..., -len(robot.platform.inertia.kinds) :]
             parts.append(carried * (states.payload != 0)[:, None, None])
         return np.concatenate(parts, axis=-1)
 

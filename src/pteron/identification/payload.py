@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.bodies.parameters import PLATFORM_KINDS
-from pteron.errors import DataError
+from pteron.bodies.inertia import PlanarInertia, SpatialInertia
+from pteron.bodies.parameters import LENGTH_POWERS
+from pteron.errors import DataError, ModelError
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.faults import FaultIsolation, isolate_faults
@@ -33,8 +34,8 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
 from pteron.renamed import former_attribute
 
-_NAMES = tuple(f"{name}_L" for name in PLATFORM_KINDS)
-"""Names of the payload's values: m_L, mgx_L, mgy_L, I_L."""
+_BOTH = frozenset(f"{name}_L" for name in LENGTH_POWERS)
+"""Names of a payload's values: m_L, mgx_L, mgy_L, I_L, and those under a platform that tilts."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,14 @@ class Payload:
     mass : float or None
         kg. None, here and below, where the forces do not show it.
     first_moment : tuple of float or None
-        Mass times the position of the centre of mass, kg m; a 3T platform does not feel it.
-    inertia : float or None
-        About the platform's axis through P, kg m^2; a 3T platform does not feel it.
+        Mass times the position of the centre of mass, kg m; a 3T platform does not feel it. Along
+        x, y and z under a platform that tilts.
+    inertia : float, tuple of float or None
+        About the platform's axis through P, kg m^2; a 3T platform does not feel it. Ixx, Ixy, Ixz,
+        Iyy, Iyz and Izz about P under a platform that tilts.
     names : tuple of str
-        The k values that the forces show: ``m_L, mgx_L, mgy_L, I_L``, or some of them.
+        The k values that the forces show: ``m_L, mgx_L, mgy_L, I_L``, or some of them; of ten under
+        a platform that tilts.
     covariance : array, shape (k, k)
         The covariance of these values, SI units.
     estimate : Estimate
@@ -64,8 +68,8 @@ class Payload:
     """
 
     mass: float | None
-    first_moment: tuple[float, float] | None
-    inertia: float | None
+    first_moment: tuple[float, ...] | None
+    inertia: float | tuple[float, ...] | None
     names: tuple[str, ...]
     covariance: Array = field(repr=False)
     estimate: Estimate = field(repr=False)
@@ -86,21 +90,26 @@ class Payload:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
-    def center_of_mass(self) -> tuple[float, float] | None:
+    def center_of_mass(self) -> tuple[float, ...] | None:
         """Position of the centre of mass in the platform's frame, m."""
         if not self.mass or self.first_moment is None:
             return None
-        return self.first_moment[0] / self.mass, self.first_moment[1] / self.mass
+        return tuple(moment / self.mass for moment in self.first_moment)
 
     @property
     def real(self) -> bool:
-        """Whether a real body has these values: m > 0 and I m >= (m gamma)^2."""
+        """Whether a real body has these values: in a plane m > 0 and I m >= (m gamma)^2."""
         if self.mass is None or not self.mass > 0.0:
             return False
         if self.first_moment is None or self.inertia is None:
             return True
-        hx, hy = self.first_moment
-        return self.inertia * self.mass >= hx * hx + hy * hy
+        if not isinstance(self.inertia, tuple):
+            return self.inertia * self.mass >= sum(h * h for h in self.first_moment)
+        try:
+            SpatialInertia.of_values([self.mass, *self.first_moment, *self.inertia])
+        except ModelError:
+            return False
+        return True
 
     @property
     def felt(self) -> bool:
@@ -122,9 +131,11 @@ class Payload:
             unit = self.estimate.units[self.estimate.names.index(name)]
             lines.append(f"  {name:<6} {value:+.5g} +- {deviation:.2g} {unit}")
         if self.center_of_mass is not None:
-            x, y = self.center_of_mass
-            lines.append(f"Centre of mass: ({x:+.5g}, {y:+.5g}) m.")
-        hidden = [name for name in _NAMES if name not in self.names]
+            center = ", ".join(f"{x:+.5g}" for x in self.center_of_mass)
+            lines.append(f"Centre of mass: ({center}) m.")
+        spatial = any(name[:2] in ("Ix", "Iy", "Iz") for name in self.names)
+        kinds = (SpatialInertia if spatial else PlanarInertia).kinds
+        hidden = [f"{kind}_L" for kind in kinds if f"{kind}_L" not in self.names]
         if hidden:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
         lines.append(self._opinion())
@@ -176,7 +187,7 @@ def identify_payload(
 ) -> Payload:
     """Return a payload's inertia from motions with and without it.
 
-    F = W beta without payload and F = W beta + W_L theta_L with it, W_L being the platform's four
+    F = W beta without payload and F = W beta + W_L theta_L with it, W_L being the platform's
     columns of the regressor, are solved as one: friction and base parameters are the same in both,
     so that the machine's own parameters need not be known.
 
@@ -226,13 +237,19 @@ def identify_payload(
     hidden, too_many = unseen(model, estimate.deviations)
     if too_many:
         raise with_findings(too_little_motion(model, hidden, estimate, plans, fit[0]), fit)
-    names = tuple(name for name in estimate.names if name in _NAMES)
+    names = tuple(name for name in estimate.names if name in _BOTH)
     chosen = [estimate.names.index(name) for name in names]
-    mass, hx, hy, inertia = (estimate.value(n) if n in names else None for n in _NAMES)
+
+    def known(*kinds: str) -> tuple[float, ...] | None:
+        wanted = [f"{kind}_L" for kind in kinds]
+        return tuple(map(estimate.value, wanted)) if set(wanted) <= set(names) else None
+
+    kinds = model.robot.platform.inertia.kinds
+    mass, tensor = known("m"), known(*(kind for kind in kinds if kind[0] == "I"))
     return Payload(
-        mass=mass,
-        first_moment=None if hx is None or hy is None else (hx, hy),
-        inertia=inertia,
+        mass=None if mass is None else mass[0],
+        first_moment=known(*(kind for kind in kinds if kind[:2] == "mg")),
+        inertia=tensor[0] if tensor and len(tensor) == 1 else tensor,
         names=names,
         covariance=estimate.covariance[np.ix_(chosen, chosen)],
         estimate=estimate,

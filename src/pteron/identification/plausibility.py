@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm  # type: ignore[import-untyped]
 
-from pteron.bodies.parameters import PLATFORM_KINDS
 from pteron.identification.consistency import Consistency
 from pteron.identification.consistency.bodies import bodies_of
 from pteron.identification.estimators import Estimate
@@ -176,8 +175,8 @@ def known_values(
     found = dict(rotors)
     for one in recordings:
         if (payload := one.head().description.payload) is not None:
-            inertia = (payload.mass, *payload.first_moment, payload.inertia)
-            found |= zip((f"{kind}_L" for kind in PLATFORM_KINDS), inertia, strict=True)
+            kinds = model.robot.platform.inertia.kinds
+            found |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
     return {name: value for name, value in found.items() if name in model.names and value}
 
 

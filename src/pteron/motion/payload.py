@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from pteron.bodies.inertia import PlanarInertia
 from pteron.errors import DataError, ModelError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
@@ -29,7 +28,8 @@ def with_payload(robot: RobotLike, mass: float) -> Manipulator:
     """Return the machine with a point mass at the tool's centre point.
 
     It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + m_L |s|^2,
-    s being `platform.tool` across the platform's axis.
+    s being `platform.tool` across the platform's axis; as a whole, where the platform tilts, and
+    with its part of the inertia tensor.
 
     Parameters
     ----------
@@ -68,18 +68,13 @@ def with_payload(robot: RobotLike, mass: float) -> Manipulator:
     if carried == 0.0:
         return robot
     platform = robot.platform
-    x, y, _ = platform.tool
+    x, y, z = platform.tool
     if platform.slides and (x, y) != (0.0, 0.0):
         raise ModelError(
             f"platform.tool is {math.hypot(x, y):g} m off the axis of a platform that slides, "
             "where a payload cannot be modelled; give the tool [0, 0, z]",
             subject=robot.name,
         )
-    own = platform.inertia
-    hx, hy = own.first_moment
-    heavier = PlanarInertia(
-        own.mass + carried,
-        (hx + carried * x, hy + carried * y),
-        own.inertia + carried * (x * x + y * y),
-    )
-    return replace(robot, platform=replace(platform, inertia=heavier))
+    own, shares = platform.inertia, platform.inertia.shares_of_point(x, y, z).values()
+    values = [value + carried * share for value, share in zip(own.values, shares, strict=True)]
+    return replace(robot, platform=replace(platform, inertia=type(own).of_values(values)))

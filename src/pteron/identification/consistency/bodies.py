@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.bodies.inertia import SpatialInertia
 from pteron.bodies.parameters import LENGTH_POWERS, PLATFORM, Parameter, body_places
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -66,6 +67,18 @@ class Bodies:
                 rows[kind][row, column] = 1.0
         return turning, rows["m"], rows["mgx"], rows["mgy"], rows["I"]
 
+    @cached_property
+    def solids(self) -> tuple[list[int], Array]:
+        """The bodies that turn about any axis, and what takes their second moments (b, 4, 4, k)."""
+        unit, found = np.eye(len(self.columns)), []
+        solid = [b for b, place in enumerate(self.places.values()) if "Izz" in place]
+        for b in solid:
+            place = list(self.places.values())[b]
+            found.append(
+                SpatialInertia.second_moments({kind: unit[k] for kind, k in place.items()})
+            )
+        return solid, np.array(found).reshape(len(solid), 4, 4, len(self.columns))
+
     def scale(self, masses: Array) -> Array:
         """Return the unit of each free parameter, from the bodies' masses, kg."""
         lengths = self.extents[:, 1] - self.extents[:, 0]
@@ -82,13 +95,16 @@ class Bodies:
     def least(self, scaled: Array) -> Array:
         """Return the least eigenvalue of each [[m, |h|], [|h|, I]], or the mass that does not turn.
 
-        No real body has a negative one.
+        Of a body that turns about any axis it is that of its second moments. No real body has a
+        negative one.
         """
         turning, *rows = self.cones
         m, hx, hy, inertia = (row @ scaled for row in rows)
         inside = scaled[self.masses]
         root = np.sqrt(4 * hx * hx + 4 * hy * hy + (m - inertia) ** 2)
         inside[turning] = 0.5 * (m + inertia - root)
+        solid, moments = self.solids
+        inside[solid] = np.linalg.eigvalsh(moments @ scaled).min(axis=-1, initial=np.inf)
         return np.asarray(inside)
 
 
@@ -99,7 +115,8 @@ def bodies_of(base: BaseParameters) -> Bodies:
     _, sharing = share(robot, groups)
     # A telescope has no length: its parts count as long as a link.
     sizes = [leg.size / max(len(leg.extents), 1) for leg in robot.legs if leg.size > 0.0]
-    radius = max(float(np.hypot(*leg.platform_point[:2])) for leg in robot.legs)
+    counted = 3 if robot.platform.tilts else 2
+    radius = max(float(np.linalg.norm(leg.platform_point[:counted])) for leg in robot.legs)
     mean = float(np.mean(sizes))
     half = 0.5 * (radius if radius > 1e-3 * mean else _SMALL_PLATFORM * mean)
     extents = {}
@@ -127,7 +144,8 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
     """Return what keeps parameters from belonging to real bodies; nothing where they do.
 
     A real body has m > 0, and in planar motion I > 0 and I m >= (m gamma)^2, since the moment of
-    inertia about its centre of mass, I - (m gamma)^2 / m, is not negative.
+    inertia about its centre of mass, I - (m gamma)^2 / m, is not negative. Of one that turns about
+    any axis no moment about the centre of mass is greater than the sum of the other two.
 
     Parameters
     ----------
@@ -162,6 +180,11 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
     for name, place in body_places(parameter_data(robot)).items():
         body = {kind: float(vector[column]) for kind, column in place.items()}
         m, inertia = body["m"], body.get("I")
+        if m > 0.0 and "Izz" in body:
+            try:
+                SpatialInertia.of_values(list(body.values()))
+            except ModelError as error:
+                lines.append(f"{name}: {error}")
         if m <= 0.0:
             lines.append(f"{name}: mass {m:.4g} kg is not positive")
         elif inertia is not None:
@@ -221,5 +244,8 @@ def plain_target(bodies: Bodies, base: BaseParameters, values: Array) -> Target:
         if "mgx" in place:
             # A rod from one end of its extent to the other, or a disc about its reference point.
             rows[place["mgx"], head] = -0.5 * (low + high) / (high - low)
-            rows[place["I"], head] = -0.5 if name == PLATFORM else -1.0 / 3.0
+            if "I" in place:
+                rows[place["I"], head] = -0.5 if name == PLATFORM else -1.0 / 3.0
+            for kind in {"Ixx", "Iyy", "Izz"} & place.keys():  # a disc of some thickness
+                rows[place[kind], head] = -0.5 if kind == "Izz" else -0.3
     return Target("nothing", scale, np.full(count, _MARGIN), rows, np.zeros(len(scale)))

@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pteron.bodies.inertia import RodInertia
+from pteron.bodies.inertia import RodInertia, SpatialInertia
 from pteron.bodies.parameters import body_places
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameter_data
 
-Box = tuple[tuple[float, float], tuple[float, float]]
-"""((xmin, xmax), (ymin, ymax)) in the body's frame, m."""
+Box = tuple[tuple[float, float], ...]
+"""((xmin, xmax), (ymin, ymax)) in the body's frame, m; and (zmin, zmax) of one that turns about any
+axis."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +78,11 @@ class Bounds:
             pairs["total_mass"] = self.total_mass
         for body, box in self.boxes.items():
             try:
-                pairs[f"box of {body}, x"], pairs[f"box of {body}, y"] = (
-                    (float(low), float(high)) for low, high in box
-                )
+                sides = [(float(low), float(high)) for low, high in box]
+                _, _, *_ = sides
+                pairs |= {
+                    f"box of {body}, {axis}": side for axis, side in zip("xyz", sides, strict=False)
+                }
             except (TypeError, ValueError):
                 raise ModelError(
                     f"bounds: box of {body}: {box!r} is not ((xmin, xmax), (ymin, ymax))"
@@ -111,7 +114,7 @@ class Bounds:
                     row = sign * unit[list(known).index(name)]
                     rows.append((row, sign * limit, f"{name} {sense} {limit:g}"))
         for key, box in self.boxes.items():
-            turning = {p.owner: p.body for p in columns if p.kind == "I"}
+            turning = {p.owner: p.body for p in columns if p.kind in ("I", "Izz")}
             for body in _matching(key, turning, "body"):
                 place = {kind: unit[column] for kind, column in places[body].items()}
                 rows += [(row, 0.0, f"box of {body}: {what}") for row, what in _box(place, box)]
@@ -151,6 +154,9 @@ def _matching(key: str, known: Mapping[str, str], what: str) -> list[str]:
 
 def _box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:
     """Yield rows that are at most 0 for a body inside a box, and what each one says."""
+    if "Izz" in place:
+        yield from _solid_box(place, box)
+        return
     inertia, least = place["I"], 0.0
     for axis, (low, high) in zip("xy", box, strict=True):
         if (moment := place.get(f"mg{axis}")) is not None:
@@ -159,3 +165,14 @@ def _box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:
             inertia = inertia - (low + high) * moment
             least += low * high
     yield inertia + least * place["m"], "inertia that mass inside can have"
+
+
+def _solid_box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:
+    """Yield the same for a body that turns about any axis."""
+    moments = SpatialInertia.second_moments(place)
+    for k, (axis, (low, high)) in enumerate(zip("xyz", box, strict=False)):
+        moment = moments[k][3]
+        yield low * place["m"] - moment, f"centre of mass {axis} >= {low:g}"
+        yield moment - high * place["m"], f"centre of mass {axis} <= {high:g}"
+        spread = moments[k][k] - (low + high) * moment + low * high * place["m"]
+        yield spread, f"second moment along {axis} that mass inside can have"

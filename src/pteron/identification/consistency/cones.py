@@ -1,7 +1,8 @@
 """Cone programs over real bodies, solved by Clarabel: each body is a second-order cone.
 
 I m >= hx^2 + hy^2 with m, I >= 0 is |(2 hx, 2 hy, m - I)| <= m + I, in parameters scaled by a mass
-and a length of the body, so that the three numbers are of one size.
+and a length of the body, so that the three numbers are of one size. The second moments of a body
+that turns about any axis, a matrix (4, 4), are a cone of positive semidefinite ones.
 """
 
 from __future__ import annotations
@@ -28,6 +29,12 @@ are no problem, and where the solver gives up one of the others is in its range.
 _CONE = 4
 """Rows of a body that turns: m + I, 2 hx, 2 hy, m - I."""
 
+_TRIANGLE = tuple((i, j) for j in range(4) for i in range(j + 1))
+"""Entries of the second moments of a body that turns about any axis, in the solver's order."""
+
+_SOLID = len(_TRIANGLE)
+"""Their rows."""
+
 
 @dataclass(frozen=True)
 class RealBodies:
@@ -45,17 +52,31 @@ class RealBodies:
     def rows(self) -> tuple[Array, Array, Array]:
         """Factors of z and of the depth, and constants, of the rows that hold z in the set.
 
-        Masses and limits come first and are not negative; a cone of each turning body follows.
+        Masses and limits come first and are not negative; a cone of each turning body follows, and
+        one of each that turns about any axis.
         """
         turning, m, hx, hy, inertia = self.bodies.cones
         cones = np.stack([m + inertia, 2 * hx, 2 * hy, m - inertia], axis=1)
         inside = np.zeros(cones.shape[:2])
         inside[:, 0] = -2 * self.margins[turning]
         masses = np.eye(cones.shape[2])[self.bodies.masses]
+        solid, moments = self.bodies.solids
+        parts = [moments[:, i, j] * (1.0 if i == j else np.sqrt(2.0)) for i, j in _TRIANGLE]
+        solids = np.stack(parts, axis=1)
+        below = -np.outer(self.margins[solid], [float(i == j) for i, j in _TRIANGLE])
+        none = np.zeros(inside.size + below.size)
         return (
-            np.vstack([masses, -self.matrix, np.concatenate(cones)]),
-            np.concatenate([-self.margins, np.zeros(len(self.right)), inside.ravel()]),
-            np.concatenate([np.zeros(len(masses)), self.right, np.zeros(inside.size)]),
+            np.vstack(
+                [
+                    masses,
+                    -self.matrix,
+                    *(part.reshape(-1, cones.shape[2]) for part in (cones, solids)),
+                ]
+            ),
+            np.concatenate(
+                [-self.margins, np.zeros(len(self.right)), inside.ravel(), below.ravel()]
+            ),
+            np.concatenate([np.zeros(len(masses)), self.right, none]),
         )
 
 
@@ -107,7 +128,11 @@ def closest(
     answer, multipliers = found
     turning, count = real.bodies.cones[0], len(real.margins) + len(real.right)
     forces = np.abs(multipliers[len(size) :])
-    forces[: len(real.margins)][turning] += forces[count::_CONE]
+    end = count + _CONE * len(turning)
+    forces[: len(real.margins)][turning] += forces[count:end:_CONE]
+    solid = real.bodies.solids[0]
+    across = [k for k, (i, j) in enumerate(_TRIANGLE) if i == j]
+    forces[solid] += forces[end:].reshape(len(solid), _SOLID)[:, across].sum(axis=1)
     return answer[: matrix.shape[1]], forces[:count]
 
 
@@ -140,7 +165,9 @@ def _solved(
             f"consistency needs Clarabel, which is not installed; {install_command('consistency')}"
         ) from None
     cones = [clarabel.SecondOrderConeT(_CONE)] * len(real.bodies.cones[0])
-    positive = clarabel.NonnegativeConeT(len(rows) - equal - _CONE * len(cones))
+    solids = [clarabel.PSDTriangleConeT(4)] * len(real.bodies.solids[0])
+    others = _CONE * len(cones) + _SOLID * len(solids)
+    positive = clarabel.NonnegativeConeT(len(rows) - equal - others)
     status = clarabel.SolverStatus
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -151,7 +178,7 @@ def _solved(
             linear,
             sparse.csc_matrix(-rows),
             right,
-            [clarabel.ZeroConeT(equal), positive, *cones],
+            [clarabel.ZeroConeT(equal), positive, *cones, *solids],
             settings,
         ).solve()
         if found.status not in (status.NumericalError, status.InsufficientProgress):

@@ -18,6 +18,7 @@ from pydantic import (
 )
 from pydantic.dataclasses import dataclass
 
+from pteron.bodies.inertia import SpatialInertia
 from pteron.errors import DataError, shown
 from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
@@ -83,6 +84,10 @@ def _pairs(given: Any) -> Any:
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Factor = Annotated[Number, AfterValidator(_not_zero)]
 Two = tuple[Number, Number]
+
+Three = tuple[Number, Number, Number]
+
+Six = tuple[Number, Number, Number, Number, Number, Number]
 Pair = Annotated[Two, AfterValidator(_rising)]
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
 
@@ -127,10 +132,10 @@ class KnownPayload:
         kg.
     first_moment : tuple of float
         Mass times the position of the centre of mass in the platform frame, kg m. A 3T platform
-        does not feel it.
-    inertia : float
+        does not feel it; under one that tilts it has three components.
+    inertia : float or tuple of float
         Moment of inertia about the platform's axis through P, kg m^2. A 3T platform does not feel
-        it.
+        it. Under one that tilts Ixx, Ixy, Ixz, Iyy, Iyz and Izz about P.
     center_of_mass : tuple of float, optional
         Its position in the platform frame, m, in place of the first moment.
 
@@ -141,24 +146,37 @@ class KnownPayload:
     """
 
     mass: Annotated[Number, Field(gt=0.0)]
-    first_moment: Two = (0.0, 0.0)
-    inertia: Number = 0.0
-    center_of_mass: Annotated[Two | None, Field(exclude=True)] = None
+    first_moment: Two | Three = (0.0, 0.0)
+    inertia: Number | Six = 0.0
+    center_of_mass: Annotated[Two | Three | None, Field(exclude=True)] = None
 
     @model_validator(mode="after")
     def _real(self) -> KnownPayload:
         if self.center_of_mass is not None:
-            x, y = self.center_of_mass
-            object.__setattr__(self, "first_moment", (self.mass * x, self.mass * y))
+            moment = tuple(self.mass * x for x in self.center_of_mass)
+            object.__setattr__(self, "first_moment", moment)
             object.__setattr__(self, "center_of_mass", None)
-        hx, hy = self.first_moment
-        least = (hx * hx + hy * hy) / self.mass
+        if (len(self.first_moment) == 3) != isinstance(self.inertia, tuple):
+            raise ValueError(
+                "inertia: one number goes with two components of the centre of mass, six numbers "
+                "about P with three"
+            )
+        if isinstance(self.inertia, tuple):
+            SpatialInertia.of_values([self.mass, *self.first_moment, *self.inertia])
+            return self
+        least = sum(h * h for h in self.first_moment) / self.mass
         if not self.inertia >= least * (1.0 - _ROUNDING):
             raise ValueError(
                 f"inertia: {self.inertia:g} kg m^2 belongs to no real body; with this mass and "
                 f"centre of mass, and about P, it must be at least {least:g} kg m^2"
             )
         return self
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Its inertial parameters about P, in the order of the platform's kinds."""
+        inertia = self.inertia if isinstance(self.inertia, tuple) else (self.inertia,)
+        return (self.mass, *self.first_moment, *inertia)
 
 
 @_raises_data_errors
@@ -329,4 +347,10 @@ class Description:
             raise DataError(
                 "payload: only its mass is given, but the machine turns its platform; give "
                 "center_of_mass (or first_moment) and inertia about P"
+            )
+        kinds = robot.platform.inertia.kinds
+        if self.payload is not None and len(self.payload.values) != len(kinds):
+            raise DataError(
+                f"payload: {len(self.payload.values)} inertial parameters given, but this platform "
+                f"feels {len(kinds)}: {', '.join(kinds)}"
             )
