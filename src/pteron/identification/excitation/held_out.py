@@ -28,6 +28,9 @@ _LEAST_DURATION = 10.0
 _DIRECTIONS = 12
 """Horizontal directions of a cycle that are tried, all round."""
 
+_TILT = 0.5
+"""Turn of a platform that tilts, on its way across, rad."""
+
 _SAMPLES = 4000
 """Samples of a cycle at which limits are checked."""
 
@@ -100,7 +103,7 @@ def held_out_cycle(
     """Return pick-and-place cycles about the home pose that keep the limits of an excitation.
 
     The standard cycle (`pteron.motion.pick_and_place`), across in the direction that moves every
-    joint most, is made smaller until its places keep their limits and the machine can stop
+    joint most, or one that turns about all its axes where the platform tilts, is made smaller until its places keep their limits and the machine can stop
     anywhere, then slower until it keeps those of speed, acceleration and force.
 
     Parameters
@@ -151,6 +154,9 @@ def _standard(robot: Manipulator, least: float) -> RepeatedCycle:
     """
     middle = np.array(home(robot))
     found: list[tuple[float, RepeatedCycle]] = []
+    if robot.platform.tilts:
+        across, up = moves(robot, None, 1)[0]
+        return RepeatedCycle(robot, Cycle(robot.platform, middle, across, up, _TILT, 1.0), 1.0)
     for across, up in moves(robot, None, _DIRECTIONS):
         try:
             fits = pick_and_place(robot, middle, direction=across, least=least)

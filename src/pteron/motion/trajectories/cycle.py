@@ -108,9 +108,22 @@ class Cycle:
         return place, velocity, acceleration
 
     def at(self, tau: Array) -> tuple[Array, Array, Array]:
-        """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau."""
+        """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau.
+
+        Of a platform that tilts it is P that goes the path, and the angles turn with both moves.
+        """
         place, velocity, acceleration = self.path(tau)
         angular = self.platform.angular
+        if self.platform.tilts:
+            turn = self.scale * self.turn * np.array([1.0, -1.0, 0.5])[: angular.sum()]
+            lift = np.roll(turn, 1)
+            states = []
+            for moved, a, b in zip((place, velocity, acceleration), *_shares(tau), strict=True):
+                state = np.empty((len(moved), len(angular)))
+                state[:, ~angular] = moved
+                state[:, angular] = np.multiply.outer(a, turn) + np.multiply.outer(b, lift)
+                states.append(state)
+            return self.around + states[0], states[1], states[2]
         place = self.around[~angular] + place
         if not self.platform.angles:
             return place, velocity, acceleration
@@ -177,6 +190,8 @@ def moves(
     else:
         x, y, _ = (level @ axis for axis in platform.frame)
         first = x if np.linalg.norm(x) > 0.5 else y
+        if not np.linalg.norm(first) > _NONE:  # a platform that moves up at most
+            return ((np.zeros(3), axis if upright is None else upright),)
         if platform.planar and upright is not None:
             count = min(count, 2)
     first = first / np.linalg.norm(first)
