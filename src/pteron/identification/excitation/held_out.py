@@ -103,8 +103,9 @@ def held_out_cycle(
     """Return pick-and-place cycles about the home pose that keep the limits of an excitation.
 
     The standard cycle (`pteron.motion.pick_and_place`), across in the direction that moves every
-    joint most, or one that turns about all its axes where the platform tilts, is made smaller until its places keep their limits and the machine can stop
-    anywhere, then slower until it keeps those of speed, acceleration and force.
+    joint most, or one that turns about all its axes where the platform tilts, is made smaller until
+    its places keep their limits and the machine can stop anywhere, then slower until it keeps those
+    of speed, acceleration and force.
 
     Parameters
     ----------
