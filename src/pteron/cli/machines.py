@@ -46,7 +46,7 @@ def _list(json: bool) -> None:
     keys = ("name", "motion", "coordinates", "types", "working_mode")
     cells = ((one[key] for key in keys) for one in found)
     rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
-    show(table("name", "motion", "pose", "legs", "elbows", rows=rows))
+    show(table("name", "motion", "pose", "legs", "elbows", rows=rows, names=("name",)))
 
 
 def new(

@@ -85,14 +85,16 @@ def table(
     *columns: str,
     rows: Iterable[Iterable[str]] = (),
     numbers: tuple[str, ...] = (),
+    names: tuple[str, ...] = (),
     caption: str | None = None,
 ) -> Table:
-    """Return a table; the columns in `numbers` are set to the right, unbroken."""
+    """Return a table; columns in `numbers` and `names` are unbroken, numbers set to the right."""
     made = Table(box=SIMPLE_HEAD, caption=caption, pad_edge=False, collapse_padding=True)
     for name in columns:
         number = name in numbers
         justify: Any = "right" if number else "left"
-        made.add_column(plain(name), justify=justify, no_wrap=number, overflow="fold")
+        whole = number or name in names
+        made.add_column(plain(name), justify=justify, no_wrap=whole, overflow="fold")
     for row in rows:
         made.add_row(*row)
     return made

@@ -115,7 +115,7 @@ def _others(three: _Three) -> _Three:
 
 def _sign(order: Sequence[int]) -> int:
     """Return the sign of a permutation."""
-    return (-1) ** sum(a > b for a, b in combinations(order, 2))
+    return -1 if sum(a > b for a, b in combinations(order, 2)) % 2 else 1
 
 
 def _adjugate_of_six(m: Expression) -> Expression:

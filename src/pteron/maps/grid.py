@@ -268,7 +268,7 @@ def pose_grid(
     free = [name for name in varying_names if name not in spans]
     angles = [name for name in free if name in robot.platform.angles]
     lengths = [name for name in free if name not in angles]
-    spans |= dict.fromkeys(angles, robot.platform.limits or (-pi, pi))
+    spans |= {name: robot.platform.angle_limits.get(name, (-pi, pi)) for name in angles}
     if lengths:
         box = _box(robot, pose, spans)
         box += rim * np.array([-1.0, 1.0])[:, None] * np.ptp(box, axis=0)
