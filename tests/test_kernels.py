@@ -79,6 +79,7 @@ def values_for(robot, kernel, lead=()):
         "joints": pteron.inverse_kinematics(robot, pose),
         "joint_rates": velocity,
         "joint_accelerations": acceleration,
+        "twist": pteron.twist(robot, pose, velocity),
     }
     if kernel.name in CONTROLLERS:
         law = CONTROLLERS[kernel.name].law(robot)
@@ -123,7 +124,7 @@ def test_every_function_compiles_and_gives_what_the_public_one_gives(name, what)
         inputs = {port.name for port in kernel.inputs}
         fixed = {"parameters": len(pteron.parameters(robot)), "drives": len(drive_numbers(robot))}
         assert {port.name for port in kernel.ports} - fixed.keys() == inputs
-        sizes = dict(fixed)
+        sizes = {**fixed, "twist": 6}
         if what in CONTROLLERS:
             law = CONTROLLERS[what].law(robot)
             sizes |= {"gains": law.gains.size, "memory": law.memory(*[values[0][0, 0]] * 2).size}

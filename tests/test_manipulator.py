@@ -164,7 +164,7 @@ def test_a_platform_has_a_motion_and_axes():
     def platform(motion="3T1R", **axes):
         return lambda: Platform(motion, BODY, **axes)
 
-    refused(platform("2R"), 'motion: \'2R\' is not "3T" or "3T1R" or "2T" or "2T1R"')
+    refused(platform("4T"), 'motion: \'4T\' is not "3T" or "3T1R" or "2T" or "2T1R" or "3T3R"')
     refused(platform(axis=(0.0, 2.0, 0.0)), "axis: [0.0, 2.0, 0.0] has length 2, not 1; write")
     words = "x_axis: missing; axis [0.0, 1.0, 0.0] is not the base frame's z", "must say"
     refused(platform(axis=(0.0, 1.0, 0.0)), *words)
@@ -414,8 +414,8 @@ BAD_FILES = {
     ),
     "unknown motion": (
         '"3T1R"',
-        '"2R"',
-        "platform.motion: '2R' given, '3T', '3T1R', '2T' or '2T1R' expected",
+        '"4T"',
+        "platform.motion: '4T' given, '3T', '3T1R', '2T', '2T1R', '3T3R', '3R', '2R' or '1T2R'",
     ),
     "unknown kind": (
         "elbow = 1\n",
@@ -586,7 +586,7 @@ def test_a_byte_order_mark_is_passed_over(tmp_path):
 
 def test_files_that_cannot_be_read_are_refused(tmp_path):
     missing = tmp_path / "nowhere.toml"
-    words = "neither a file nor a machine of the catalog (3-prr, 3-rpr, 3-rrr, delta, "
+    words = "neither a file nor a machine of the catalog (3-prr, 3-rpr, 3-rrr, ankle, "
     refused(lambda: pteron.load(missing), f"{missing}: {words}")
     refused(lambda: pteron.load("quadrupteorn"), 'did you mean "quadrupteron"?')
     refused(lambda: pteron.load(tmp_path), f"{tmp_path}: cannot be read")

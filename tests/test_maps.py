@@ -141,7 +141,7 @@ def test_a_grid_that_cannot_be_is_refused(delta, held, ranges, words):
         (lambda _: Axis("x", 0.0, np.nan, 3), "x: greatest: nan given, a finite number expected"),
         (lambda _: Axis("x", 0.0, 10**400, 3), "x: greatest: 1000.* given, a finite number"),
         (lambda _: Axis("x", -1e308, 1e308, 3), "x: from -1e.308 to 1e.308 given, an ascending"),
-        (lambda _: Axis("w", 0.0, 1.0, 3), "name: 'w' given, one of x, y, z, phi expected"),
+        (lambda _: Axis("w", 0.0, 1.0, 3), "name: 'w' given, one of x, y, z, phi, roll"),
         (lambda _: Grid(("x", "x"), (0.0, 0.0), ()), "coordinates: .'x', 'x'. given, some of x, y"),
         (lambda _: Grid(("x", "y"), (0.0,), ()), "pose: 1 numbers given, x y expected"),
         (lambda _: Grid(("x",), (True,), ()), "pose: .True,. given, a sequence .each a"),

@@ -287,14 +287,14 @@ def test_the_3prr_s_home():
 
 # Reachy Mini: pollen-robotics/reachy_mini, kinematics_data.json; the head level at z = 0.177 m.
 
-LEVEL = [0.6265471361608503, -0.6265425506844712, 0.6265402507582244]
-LEVEL += [-0.6265361796605952, 0.6265371961549016, -0.62653923545576]
+REACHY_LEVEL = [0.6265471361608503, -0.6265425506844712, 0.6265402507582244]
+REACHY_LEVEL += [-0.6265361796605952, 0.6265371961549016, -0.62653923545576]
 """rad; twelve digits of its geometry stand in the catalog's file."""
 
 
 def test_reachy_minis_joint_angles_count_as_its_own():
     found = pteron.inverse_kinematics("reachy-mini", [0.0, 0.0, 0.177, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(found, LEVEL, atol=1e-9)
+    np.testing.assert_allclose(found, REACHY_LEVEL, atol=1e-9)
 
 
 # The hexapods of the Rubin Observatory: lsst-ts/ts_mthexapod, constants.py, micrometres.

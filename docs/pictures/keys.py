@@ -18,6 +18,7 @@ from pteron.manipulator.tables import (
     PlatformTable,
     RadiiTable,
     StribeckTable,
+    TiltingTable,
     leg_table,
 )
 
@@ -25,6 +26,7 @@ TABLES: dict[str, type[Table]] = {
     "the machine": MachineTable,
     "radii": RadiiTable,
     "platform": PlatformTable,
+    "a platform that tilts": TiltingTable,
     "bars": Bar,
     "geared": Geared,
     "a body": PlanarBody,

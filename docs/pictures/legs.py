@@ -5,8 +5,9 @@ The points and axes are those of the leg's equations in one pose; only the names
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from matplotlib.patches import FancyArrowPatch
 from pteron import PRR, PRRR, PSS, RPR, RRR, RSS, RUPU, PlanarInertia, RodInertia
 from pteron.bodies.motion import PointMotion, RotationMotion, Turn
 from pteron.kernels import Array
-from pteron.legs import LegKind
+from pteron.legs import PRS, RPS, RRS, UPS, LegKind
 
 INK, MUTED, PAPER = "#1c2630", "#8a949e", "#ffffff"
 UPPER, LOWER, PLATE, GIVEN = "#0072b2", "#d55e00", "#3d6b8f", "#00795a"
@@ -312,9 +313,9 @@ def rss() -> Sheet:
     return sheet
 
 
-def rrr() -> Sheet:
-    """Draw a planar R-R-R leg, seen along d."""
-    leg = RRR((0.1, 0.09, 0), (0, 0, 1), (1, 0, 0), (-0.08, -0.04, 0), 0.15, 0.17, _BODY, _BODY, 1)
+def rrr(kind: type[RRR] = RRR) -> Sheet:
+    """Draw a planar R-R-R leg, or one that ends in a ball joint, seen along d."""
+    leg = kind((0.1, 0.09, 0), (0, 0, 1), (1, 0, 0), (-0.08, -0.04, 0), 0.15, 0.17, _BODY, _BODY, 1)
     p = np.array([0.42, 0.1, 0.0])
     posed = Posed(leg, p + leg.platform_point)
     sheet = Sheet(-90.0, 90.0, (6.4, 4.2))
@@ -327,7 +328,7 @@ def rrr() -> Sheet:
     _lengths(sheet, posed, (0.7, -0.7), (0.8, 0.7))
     _scene(sheet, posed, p, [(-0.08, -0.04, 0), (0.08, -0.04, 0), (0, 0.1, 0)], up=False)
     _out_of_page(sheet, r)
-    ankle = posed.c, "R3", (0.0, -1.2)
+    ankle = posed.c, "R3" if kind is RRR else "ball joint", (0.0, -1.2)
     _ends(sheet, posed, (r, "R1, $d$", (-1.9, 0.2)), (elbow, "R2", (0, 1.2)), ankle)
     return sheet
 
@@ -339,10 +340,10 @@ def _out_of_page(sheet: Sheet, point: Array) -> None:
     sheet.axes.plot([x], [y], "o", ms=3.0, color=GIVEN, zorder=7)
 
 
-def prr() -> Sheet:
-    """Draw a planar P-R-R leg, seen along d."""
-    leg = PRR((0.1, 0.05, 0), (0.8, 0.6, 0), (-0.05, -0.05, 0), 0.2, 1.0, _BODY, 1)
-    leg = leg.under((0.0, 0.0, 1.0))
+def prr(kind: type[PRR] = PRR) -> Sheet:
+    """Draw a planar P-R-R leg, or one that ends in a ball joint, seen along d."""
+    ends = (0.1, 0.05, 0), (0.8, 0.6, 0), (-0.05, -0.05, 0)
+    leg = kind(*ends, 0.2, 1.0, _BODY, 1, direction=(0.0, 0.0, 1.0))
     p = np.array([0.46, 0.14, 0.0])
     posed = Posed(leg, p + leg.platform_point)
     sheet = Sheet(-90.0, 90.0, (6.4, 4.2))
@@ -355,14 +356,16 @@ def prr() -> Sheet:
     sheet.line([tip, posed.c], LOWER, 3.2)
     _lengths(sheet, posed, (0, 0), (0.5, 0.9))
     _scene(sheet, posed, p, [(-0.05, -0.05, 0), (0.1, -0.05, 0), (0.03, 0.08, 0)], up=False)
-    _out_of_page(sheet, posed.c)
-    _ends(sheet, posed, (tip, "tip", (0.2, -1.3)), (posed.c, "$d$", (-0.9, -0.7)))
+    _out_of_page(sheet, posed.c if kind is PRR else tip)
+    tip_name, end_name = ("tip", "$d$") if kind is PRR else ("tip, $d$", "ball joint")
+    _ends(sheet, posed, (tip, tip_name, (0.2, -1.3)), (posed.c, end_name, (-0.9, -0.7)))
     return sheet
 
 
-def rpr() -> Sheet:
-    """Draw a planar R-P-R leg, seen along d."""
-    leg = RPR((0.12, 0.06, 0), (-0.05, -0.05, 0), _BODY, _BODY, (0.3, 0.5)).under((0.0, 0.0, 1.0))
+def rpr(kind: type[RPR] = RPR) -> Sheet:
+    """Draw a planar R-P-R leg, or one that ends in a ball joint, seen along d."""
+    ends = (0.12, 0.06, 0), (-0.05, -0.05, 0)
+    leg = kind(*ends, _BODY, _BODY, (0.3, 0.5), direction=(0.0, 0.0, 1.0))
     p = np.array([0.5, 0.3, 0.0])
     posed = Posed(leg, p + leg.platform_point)
     sheet = Sheet(-90.0, 90.0, (6.4, 4.2))
@@ -373,14 +376,35 @@ def rpr() -> Sheet:
     both: dict[str, Any] = {"arrowstyle": "<|-|>", "linewidth": 0.9}
     sheet.arrow(r + beside, posed.c + beside, "$q$", INK, (-0.6, 0.8), **both)
     _scene(sheet, posed, p, [(-0.05, -0.05, 0), (0.1, -0.05, 0), (0.03, 0.08, 0)], up=False)
-    _out_of_page(sheet, posed.c)
-    _ends(sheet, posed, (r, "base joint", (0.3, -1.3)), (posed.c, "$d$", (-0.9, -0.7)))
+    _out_of_page(sheet, posed.c if kind is RPR else r)
+    base_name, end_name = ("base joint", "$d$") if kind is RPR else ("$d$", "ball joint")
+    _ends(sheet, posed, (r, base_name, (0.3, -1.3)), (posed.c, end_name, (-0.9, -0.7)))
+    return sheet
+
+
+def ups() -> Sheet:
+    """Draw a U-P-S leg."""
+    leg = UPS((0.14, 0.05, 0.0), (-0.1, 0.03, 0.0), _ROD, _ROD, (0.2, 0.5), direction=(1, 0, 0))
+    p = np.array([0.36, 0.02, 0.26])
+    posed = Posed(leg, p + leg.platform_point)
+    sheet = Sheet(-60.0, 20.0, (5.6, 4.6))
+    r, n = np.array(leg.guide_point), posed.bodies["u"][1]
+    length, d = float(np.linalg.norm(posed.c - r)), np.array([1.0, 0.0, 0.0])
+    sheet.axle(r, d, 0.05)
+    sheet.axle(r, np.cross(d, n), 0.05)
+    sheet.line([r, r + 0.6 * length * n], UPPER, 6.5)
+    sheet.line([posed.c, posed.c - 0.6 * length * n], LOWER, 2.8)
+    beside = np.array([0.045, 0.0, -0.02])
+    both: dict[str, Any] = {"arrowstyle": "<|-|>", "linewidth": 0.9}
+    sheet.arrow(r + beside, posed.c + beside, "$q$", INK, (0.8, -0.2), **both)
+    _scene(sheet, posed, p, _plate(0.1, 0.06))
+    _ends(sheet, posed, (r, "base joint", (-0.6, -1.2)), (posed.c, "ball joint", (-2.4, 0.6)))
     return sheet
 
 
 def rupu() -> Sheet:
     """Draw a telescopic shaft."""
-    leg = RUPU((0.16, 0, 0.34), (0.0, 0.0, 0.0), _ROD, _ROD).under((0.0, 0.0, 1.0))
+    leg = RUPU((0.16, 0, 0.34), (0.0, 0.0, 0.0), _ROD, _ROD).under(np.eye(3).tolist())
     p, k = np.array([0.36, 0.02, 0.02]), np.array([0.0, 0.0, 1.0])
     posed = Posed(leg, p, 0.9)
     sheet = Sheet(-60.0, 24.0, (5.6, 5.0))
@@ -400,7 +424,19 @@ def rupu() -> Sheet:
     return sheet
 
 
-DRAWINGS = {"PRRR": prrr, "PSS": pss, "RSS": rss, "RRR": rrr, "PRR": prr, "RPR": rpr, "RUPU": rupu}
+DRAWINGS: dict[str, Callable[[], Sheet]] = {
+    "PRRR": prrr,
+    "PSS": pss,
+    "RSS": rss,
+    "RRR": rrr,
+    "PRR": prr,
+    "RPR": rpr,
+    "RUPU": rupu,
+    "UPS": ups,
+    "RPS": partial(rpr, RPS),
+    "PRS": partial(prr, PRS),
+    "RRS": partial(rrr, RRS),
+}
 
 
 def draw(docs: Path) -> None:

@@ -80,7 +80,8 @@ def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matri
     Examples
     --------
     >>> import numpy as np, pteron
-    >>> pteron.rotation_of("stewart", [0, 0, 2.0, 0, 0, np.pi / 2], form="quaternion").round(4)
+    >>> pose = [0, 0, 2.0, 0, 0, np.pi / 2]
+    >>> pteron.rotation_of("stewart", pose, form="quaternion").round(4) + 0.0
     array([0.    , 0.    , 0.7071, 0.7071])
     """
     robot = as_manipulator(robot)
@@ -130,7 +131,8 @@ def pose_of(
     Examples
     --------
     >>> import numpy as np, pteron
-    >>> pteron.pose_of("stewart", [0.0, 0.1, 2.0], [0, 0, 1, 1], form="quaternion").round(4)
+    >>> turn = [0, 0, 1, 1]
+    >>> pteron.pose_of("stewart", [0.0, 0.1, 2.0], turn, form="quaternion").round(4) + 0.0
     array([0.    , 0.1   , 2.    , 0.    , 0.    , 1.5708])
     """
     robot = as_manipulator(robot)
@@ -191,7 +193,7 @@ def twist(
     Examples
     --------
     >>> import pteron
-    >>> pteron.twist("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5])
+    >>> pteron.twist("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5]) + 0.0
     array([0.1, 0. , 0. , 0. , 0. , 0.5])
     """
     return evaluated(robot, "twist", on_failure, pose, velocity)
@@ -229,7 +231,7 @@ def velocity_of(
     Examples
     --------
     >>> import pteron
-    >>> pteron.velocity_of("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5])
+    >>> pteron.velocity_of("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5]) + 0.0
     array([0.1, 0. , 0. , 0. , 0. , 0.5])
     """
     robot = as_manipulator(robot)

@@ -236,9 +236,9 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
 
 def _tilt_misfits(platform: Platform, leg: LegKind) -> Iterator[str]:
     """Yield why a leg cannot carry a platform that tilts."""
-    takes = "U-P-S, P-S-S and R-S-S legs with one rod"
-    if platform.motion == "1T2R":
-        takes = "R-P-S, P-R-S and R-R-S legs"
+    takes = "legs that end in ball joints and hold nothing else"
+    if platform.on_planes:
+        takes = "legs that keep their points in planes and end in ball joints"
     normal, free = leg.plane_normal, len(complement(leg.free_axes(None))) == 0
     if any(leg.fixed_offset):
         yield f"fixed_offset: a {platform.motion} platform tilts as one, and has none"
@@ -252,7 +252,7 @@ def _tilt_misfits(platform: Platform, leg: LegKind) -> Iterator[str]:
             f"a {leg.type} leg keeps a platform from tilting, but a {platform.motion} platform "
             f"tilts; it takes {takes}"
         )
-    elif (normal is None) == (platform.motion == "1T2R"):
+    elif (normal is None) == platform.on_planes:
         how = "does not keep its point" if normal is None else "keeps its point"
         yield f"a {leg.type} leg {how} in a plane; a {platform.motion} platform takes {takes}"
     elif normal is not None and abs(dot(normal, platform.axis)) > PARALLEL_TOLERANCE:
@@ -277,7 +277,7 @@ def _slack(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
 
 def _held(platform: Platform, legs: Sequence[LegKind]) -> Platform:
     """Return a platform with the planes in which its legs keep its points, if it is a tripod's."""
-    if platform.motion != "1T2R":
+    if not platform.on_planes:
         return platform
     planes = [
         HeldPoint(leg.plane_normal, leg.guide_point, leg.platform_point)

@@ -278,6 +278,11 @@ class Platform:
         return self.motion in ("3T1R", "2T1R")
 
     @property
+    def on_planes(self) -> bool:
+        """Whether planes, in which its legs keep its points, fix what its pose does not tell."""
+        return self.motion == "1T2R"
+
+    @property
     def tilts(self) -> bool:
         """Whether it turns about more axes than one."""
         return self.motion in TILTING
