@@ -36,6 +36,9 @@ _ANGLE = np.pi / 4.0
 _DRAWS = 16
 """Random poses drawn at a time for each start or target."""
 
+_SHARES = (1.0, 0.5, 0.25, 0.125)
+"""Shares of the way from home to random poses that are tried in turn."""
+
 
 @dataclass(frozen=True)
 class World:
@@ -133,14 +136,24 @@ class World:
         )
 
     def _drawn(self, generators: Sequence[np.random.Generator]) -> Array:
-        """Return a random pose of each generator with margin enough, or home where it has none."""
+        """Return a random pose of each generator with margin enough, or home where it has none.
+
+        Where all are too far from home they are brought nearer.
+        """
         half = np.where(self.robot.platform.angular, _ANGLE, self.spread)
         shape = (_DRAWS, self.robot.freedom)
-        drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
-        poses = self.home + half * drawn
-        good: Any = self.reserve_of(poses) >= self.least
-        first = poses[np.arange(len(poses)), good.argmax(axis=-1)]
-        return np.where(good.any(axis=-1)[:, None], first, self.home)
+        drawn = half * np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
+        found = np.tile(self.home, (len(drawn), 1))
+        left = np.arange(len(drawn))
+        for share in _SHARES:
+            poses = self.home + share * drawn[left]
+            good: Any = self.reserve_of(poses) >= self.least
+            has = good.any(axis=-1)
+            found[left[has]] = poses[has, good[has].argmax(axis=-1)]
+            left = left[~has]
+            if not len(left):
+                break
+        return found
 
     def reserve_of(self, poses: Array) -> Array:
         """Return the margin of poses, negative beyond a singularity of type II."""
