@@ -32,9 +32,9 @@ rad/s, both in its own axes: x ahead, y to the left, z up."""
 _GRAVITY = 9.81
 _DAMPING = 1.0
 
-_SAMPLES, _ROOM, _TRIES = 4096, 3.0, 30
-"""Random poses of a box by which its size is found; how many times the demand it is at most; and
-sizes, each nine tenths of the last, that are tried until one is proved."""
+_SAMPLES, _HALVINGS, _ROOM, _TRIES = 2048, 8, 3.0, 30
+"""Random poses of a box, and bisections, by which its size is found; how many times the demand it
+is at most; and sizes, each nine tenths of the last, that are tried until one is proved."""
 
 
 @dataclass(frozen=True)
@@ -203,11 +203,11 @@ def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tu
     ways = np.random.default_rng(0).uniform(-1.0, 1.0, (_SAMPLES, len(middle)))
     ways[: _SAMPLES // 2] = np.sign(ways[: _SAMPLES // 2])
     half, low, high = np.maximum(demand, least), 0.0, _ROOM
-    for _ in range(_TRIES):
+    for _ in range(_HALVINGS):
         size = 0.5 * (low + high)
         good = keeps(robot, asked, middle + size * half * ways).all()
         low, high = (size, high) if good else (low, size)
-    for k in range(_TRIES):
+    for k in range(1, _TRIES):
         size = low * 0.9**k
         region = Box(tuple(middle - size * half), tuple(middle + size * half))
         proof = prove(robot, region, given=asked)
