@@ -219,6 +219,19 @@ class LegKind(ABC):
         return None
 
     @property
+    def base_axis(self) -> Vector | None:
+        """The axis of its joint with the base, as pictures show it; `joint_axis` where it has one.
+
+        None where nothing says it.
+        """
+        return self.joint_axis or self.plane_normal
+
+    @property
+    def cylinder(self) -> float | None:
+        """The length of a ram's cylinder, from the base joint, as pictures show it, m."""
+        return None
+
+    @property
     def bar(self) -> Vector | None:
         """The direction along which its parallel rods stand side by side, where the file says so.
 

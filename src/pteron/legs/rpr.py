@@ -34,6 +34,9 @@ from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link
 RAM = ActuatedJoint("ram", "rho", "m", "force", "N")
 
 
+CYLINDER = 0.9
+"""Length of a cylinder in pictures, as a share of the shortest ram's."""
+
 RAM_LIMITS = Key("limits", "least and greatest length, m, above 0")
 
 
@@ -132,6 +135,10 @@ class RPR(LegKind):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.plane_normal,)
+
+    @property
+    def cylinder(self) -> float:
+        return CYLINDER * self.limits[0]
 
     @property
     def size(self) -> float:

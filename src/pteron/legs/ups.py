@@ -31,7 +31,7 @@ from pteron.legs.keys import Condition, Key
 from pteron.legs.kind import LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Sphere, on_point
 from pteron.legs.rods import rod_body, universal_joints
-from pteron.legs.rpr import RAM, RAM_LIMITS, check_ram
+from pteron.legs.rpr import CYLINDER, RAM, RAM_LIMITS, check_ram
 
 
 @dataclass(frozen=True)
@@ -147,6 +147,14 @@ class UPS(LegKind):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+    @property
+    def base_axis(self) -> Vector | None:
+        return self.direction
+
+    @property
+    def cylinder(self) -> float:
+        return CYLINDER * self.limits[0]
 
     @property
     def size(self) -> float:

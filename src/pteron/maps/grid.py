@@ -22,7 +22,7 @@ from pteron.platforms.coordinates import COORDINATES, coordinate
 from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose
 
-_POINTS = {1: 400, 2: 200, 3: 100, 4: 40}
+_POINTS = {1: 400, 2: 200, 3: 100, 4: 40, 5: 16, 6: 10}
 """Points along each axis, by the number of axes, where none is given: about as much as a picture
 shows."""
 
@@ -214,12 +214,12 @@ def pose_grid(
         The machine.
     held : mapping, optional
         Coordinates that do not vary, with their values, m or rad. All others vary. Where it is left
-        out those in `ranges` vary, or else the first two lengths, and the others are held at
-        `center`.
+        out those in `ranges` vary, or else the first two lengths (two angles where there are not
+        two lengths), and the others are held at `center`.
     ranges : mapping, optional
         Least and greatest value of coordinates that vary, m or rad, and how many values if it is
         not `points`. Other lengths that vary do so over the bounding box of the reach, an angle
-        over its limits or else a whole turn.
+        over its limits or else a whole turn, of a platform that tilts half a turn.
     points : int, optional
         Number of values along each axis; by default 200 in a plane, 100 in three dimensions.
     center : array, shape (m,), optional
@@ -257,7 +257,8 @@ def pose_grid(
     if held is None:
         # What varies needs no more than where to begin to look for the reach.
         pose = home_pose(robot) if center is None else checked_one(robot, center, "center").copy()
-        varying = set(spans or [name for name in names if name in "xyz"][:2])
+        lengths, turns = robot.platform.lengths, robot.platform.angles
+        varying = set(spans or (lengths if len(lengths) > 1 else turns)[:2])
         fixed = {n: float(v) for n, v in zip(names, pose, strict=True) if n not in varying}
     for name, value in fixed.items():
         pose[names.index(name)] = value
@@ -268,7 +269,8 @@ def pose_grid(
     free = [name for name in varying_names if name not in spans]
     angles = [name for name in free if name in robot.platform.angles]
     lengths = [name for name in free if name not in angles]
-    spans |= {name: robot.platform.angle_limits.get(name, (-pi, pi)) for name in angles}
+    most = pi / 2.0 if robot.platform.tilts else pi
+    spans |= {name: robot.platform.angle_limits.get(name, (-most, most)) for name in angles}
     if lengths:
         box = _box(robot, pose, spans)
         box += rim * np.array([-1.0, 1.0])[:, None] * np.ptp(box, axis=0)
@@ -286,7 +288,9 @@ def pose_grid(
 
 
 def _box(robot: Manipulator, pose: Array, spans: Mapping[str, tuple[float, ...]]) -> Array:
-    """Return the box (2, k) of the reach at a pose's orientation, or over the spans of angles."""
+    """Return the box (2, k) of the reach at a pose's orientation, or over the spans of an angle."""
+    if robot.platform.tilts:
+        return bounding_box(robot, pose)
     varying = [k for k in np.flatnonzero(robot.platform.angular) if robot.coordinates[k] in spans]
     ends = [spans[robot.coordinates[k]][:2] for k in varying]
     boxes, at = [], pose.copy()

@@ -46,8 +46,8 @@ class JointPoints:
         A point on each joint of each leg, from the base to the platform point; NaN for a joint that
         a leg has not. Of a P-R-R-R leg: r on the guide, R1 on the slider, the elbow R2, then R3.
     links : tuple of array, shape (..., k, 3)
-        Each leg as a line: the points where its bodies meet, from the slider, or the crank's
-        centre, to the platform point.
+        Each leg as a line: the points where its bodies meet, from the slider, the crank's centre or
+        the ram's base, to the platform point. A ram's cylinder ends within its line.
     platform_points : array, shape (..., n, 3)
         Where the legs carry the platform.
     parts : tuple of Part
@@ -63,6 +63,8 @@ class JointPoints:
         The unit vector along which a leg's parallel rods, its last link, stand side by side.
     plane : array, shape (2, 3), or None
         The unit vectors along which x and y of a planar machine's poses count.
+    rams : tuple of bool
+        Whether a leg is a ram, whose cylinder ends at the second point of its line.
     """
 
     chain: Array
@@ -75,6 +77,7 @@ class JointPoints:
     coordinates: PerJoint
     bars: tuple[Array | None, ...]
     plane: Array | None
+    rams: tuple[bool, ...]
 
     def at(self, index: int) -> JointPoints:
         """Return the points of one of several poses, by its place among them."""
@@ -100,10 +103,10 @@ class Guide:
     slides : bool
         Whether it is a slider's guide, and not a crank's circle.
     axis : array, shape (3,)
-        Unit vector along which the slider moves, or about which the crank turns.
+        Unit vector along which the slider moves, or about which the crank, or a ram, turns.
     path : array, shape (K, 3)
         The path of the slider, or of the crank's end, from one limit to the other, m; of a joint
-        that only turns the platform, where it is, K = 1.
+        that only turns the platform, and of a ram, where it is fixed, K = 1.
     """
 
     slides: bool
@@ -161,6 +164,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
         coordinates,
         tuple(None if leg.bar is None else np.array(leg.bar) for leg in robot.legs),
         robot.platform.directions if robot.platform.planar else None,
+        tuple(leg.cylinder is not None for leg in robot.legs),
     )
 
 
@@ -171,6 +175,10 @@ def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
         start = start + np.multiply.outer(coordinate, leg.joint_axis)
     same = _SAME * float(np.abs(end - start).max(initial=0.0))
     line = [start]
+    if leg.cylinder is not None:
+        way = end - start
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        return np.stack([start, start + np.minimum(leg.cylinder / length, 1.0) * way, end], axis=-2)
     for k in range(1, chain.shape[-2]):
         point = chain[..., k, :]
         if np.abs(point - line[-1]).max(initial=0.0) > same:
@@ -241,7 +249,7 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     found = []
     for i, leg in enumerate(robot.legs):
         used, slides = points.coordinates[:, i], "p" in leg.bodies
-        axis = np.array(leg.joint_axis or leg.plane_normal)
+        axis = np.array(leg.base_axis)
         if not slides and not leg.goes_round:
             path = points.links[i][0, :1]
         elif slides:

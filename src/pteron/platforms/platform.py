@@ -27,6 +27,7 @@ from pteron.bodies.vectors import (
 from pteron.errors import ModelError
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
 from pteron.platforms.kinds import equations_class
+from pteron.platforms.motion import PlatformMotion
 from pteron.toml import told
 
 Motion = Literal["3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"]
@@ -53,6 +54,18 @@ _XYZ: dict[Motion, tuple[str, ...]] = {
 }
 TILTING: tuple[Motion, ...] = ("3T3R", "3R", "2R", "1T2R")
 _CENTRED = ("3R", "2R")
+
+_TURN_STEPS = 30
+"""Most steps in the search for the angles of a frame."""
+
+_TURN_APART = 1e-6
+"""Angle of the differences there, rad."""
+
+_TURN_MOST = 0.5
+"""Longest step of an angle, rad."""
+
+_TURN_ROUNDING = 1e-9
+"""Step that ends the search, rad."""
 
 Limits = tuple[float, float]
 
@@ -381,6 +394,41 @@ class Platform:
         # The columns of each (3, 3) stand one behind the other.
         return place.T.reshape(*shape, 3), axes.T.reshape(*shape, 3, 3)
 
+    def nearest_pose(
+        self, pose: NDArray[np.float64], axes: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return a pose (m,) with the angles, next to its own, that bring its axes nearest others.
+
+        `axes` (3, 3) are those of a frame, one a row, which it may not be able to have: the sum of
+        squared differences becomes least, by Gauss and Newton's steps.
+        """
+        found, turns = np.array(pose, dtype=float), np.flatnonzero(self.angular)
+        for _ in range(_TURN_STEPS):
+            beside = np.eye(len(found))[turns] * _TURN_APART
+            ahead, behind = (
+                self.at(found + side * beside)[1].reshape(-1, 9) for side in (1.0, -1.0)
+            )
+            slopes = (ahead - behind).T / (2.0 * _TURN_APART)
+            step = np.linalg.lstsq(slopes, (axes - self.at(found)[1]).ravel(), rcond=None)[0]
+            found[turns] += np.clip(step, -_TURN_MOST, _TURN_MOST)
+            if np.abs(step).max(initial=0.0) < _TURN_ROUNDING:
+                break
+        return found
+
+    def tool_motion(
+        self,
+        poses: NDArray[np.float64],
+        velocities: NDArray[np.float64],
+        accelerations: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return place, velocity and acceleration (..., 3) of the tool's centre point."""
+        parts = poses, velocities, accelerations
+        rows = [np.asarray(part, dtype=float).reshape(-1, part.shape[-1]).T for part in parts]
+        place, first, second = (
+            np.asarray(found).T.reshape(*poses.shape[:-1], 3) for found in _tool_moving(self)(*rows)
+        )
+        return place, first, second
+
     @property
     def quantities(self) -> dict[str, tuple[float, ...]]:
         """What its equations need of it beside its frame and its points, by name.
@@ -464,14 +512,30 @@ class Platform:
 @lru_cache(maxsize=64)
 def _placing(platform: Platform) -> ca.Function:
     """Return P (3,) and the axes, as columns (3, 3), by pose, of a platform that tilts."""
+    pose = ca.SX.sym("pose", len(platform.coordinates))
+    motion = _at_rest(platform, pose)
+    return ca.Function("placing", [pose], [motion.body.position, ca.vec(ca.densify(motion.axes))])
+
+
+@lru_cache(maxsize=64)
+def _tool_moving(platform: Platform) -> ca.Function:
+    """Return the tool's place, velocity and acceleration (3,) by those of the pose."""
+    pose, rate, growth = (ca.SX.sym(name, len(platform.coordinates)) for name in "xva")
+    motion = _at_rest(platform, pose)
+    place = motion.body.position + ca.mtimes(motion.axes, _column(platform.tool))
+    velocity = ca.jtimes(place, pose, rate)
+    acceleration = ca.jtimes(velocity, pose, rate) + ca.jtimes(place, pose, growth)
+    found = [ca.densify(part) for part in (place, velocity, acceleration)]
+    return ca.Function("tool", [pose, rate, growth], found)
+
+
+def _at_rest(platform: Platform, pose: ca.SX) -> PlatformMotion:
+    """Return the state of a platform that rests; its points are those that planes hold."""
     points = [_column(held.platform_point) for held in platform.planes]
     frame = [_column(axis) for axis in platform.frame]
-    still = [ca.SX(3, 1)] * len(points)
+    still, rest = [ca.SX(3, 1)] * len(points), ca.SX.zeros(len(platform.coordinates))
     kind = equations_class(platform)
-    pose = ca.SX.sym("pose", len(kind.coordinates))
-    rest = ca.SX.zeros(len(kind.coordinates))
-    motion = kind(frame, points, still, platform.expressions()).motion(pose, rest, rest)
-    return ca.Function("placing", [pose], [motion.body.position, ca.vec(ca.densify(motion.axes))])
+    return kind(frame, points, still, platform.expressions()).motion(pose, rest, rest)
 
 
 def _column(values: Sequence[float]) -> ca.SX:

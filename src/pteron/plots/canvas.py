@@ -29,11 +29,18 @@ from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
 
 Kind = TypeVar("Kind", bound=Hashable)
 
-LEG_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
-"""Colours of legs 1 to 4."""
+LEG_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6500", "#6a3fa0")
+"""Colours of legs 1 to 6."""
 
-_LEG_STYLES = ("-", (0, (6, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1.5, 1.5)))
-"""Line styles of legs 1 to 4, in every picture: colour alone does not survive every printer."""
+_LEG_STYLES = (
+    "-",
+    (0, (6, 1.5)),
+    (0, (2, 1.2)),
+    (0, (6, 1.5, 1.5, 1.5)),
+    (0, (3, 1.2, 1, 1.2)),
+    (0, (1, 1)),
+)
+"""Line styles of legs 1 to 6, in every picture: colour alone does not survive every printer."""
 
 INK = "#1c2630"
 """Text and main lines."""

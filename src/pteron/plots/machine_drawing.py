@@ -54,7 +54,7 @@ class Scene:
     step : float
         Side of the squares behind it, m.
     base : array, shape (k, 3)
-        The centres of the cranks' circles, in the order round them.
+        The centres of the cranks' circles and the rams' base joints, in the order round them.
     """
 
     guides: tuple[Guide, ...]
@@ -170,9 +170,11 @@ def grid_step(points: JointPoints, guides: Sequence[Guide]) -> float:
 
 
 def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
-    """Return the centres (k, 3) of the cranks' circles, in the order round them."""
-    pairs = zip(points.links, guides, strict=True)
-    turning = [line for line, guide in pairs if not guide.slides and len(guide.path) > 1]
+    """Return the centres (k, 3) of cranks' circles and rams' base joints, in order round them."""
+    legs = zip(points.links, guides, points.rams, strict=True)
+    turning = [
+        line for line, guide, ram in legs if ram or (not guide.slides and len(guide.path) > 1)
+    ]
     base = np.array([line[..., 0, :].reshape(-1, 3)[0] for line in turning])
     if len(base) < 3:
         return base.reshape(-1, 3)
@@ -206,10 +208,10 @@ def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, siz
         axle = _AXLE * size * guide.axis
         sheet.line(np.array([line[0] - axle, line[0] + axle]), MUTED, 6.0, raised=-0.01)
     for pair in pairwise(line[:-1]):
-        sheet.line(np.array(pair), color, 4.6)
+        sheet.line(np.array(pair), color, 6.4 if points.rams[i] else 4.6)
     for ends in rods(line, points.bars[i], size):
         sheet.line(ends, color, 3.0 if points.bars[i] is None else 2.0)
-    for joint in line:
+    for joint in line[::2] if points.rams[i] else line:
         sheet.mark(joint, PAPER, color, 5.0)
     along = guide.axis if guide.slides else line[1] - line[0]
     away = sheet.beside(line[0] - points.reference, along)

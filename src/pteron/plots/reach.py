@@ -12,6 +12,7 @@ from matplotlib.ticker import MultipleLocator
 from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
+from pteron.platforms.coordinates import coordinate
 from pteron.plots.canvas import (
     FONT_SIZE,
     INK,
@@ -38,21 +39,17 @@ _TIE = 1e-9
 _SPECK = 2.0
 """Size, in cells of the grid, below which an outline is not drawn."""
 
-_DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
-"""Styles of lines of legs 1 to 4: lines which coincide, as those of mirrored legs do, both show."""
+_DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)), (0, (1, 1)), (0, (1, 1)))
+"""Styles of lines of legs 1 to 6: lines which coincide, as those of mirrored legs do, both show."""
 
 
 def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
-    """Return the map of a slice, with the poses' lengths (T, k) in a motion, m, in projection.
+    """Return the map of a slice, with the poses (T, m), or their lengths, of a motion on it.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is the end of its reach (type I).
     """
-    shape = float(np.ptp(cut.second) / np.ptp(cut.first))
-    figure = blank(3.9, min(max(0.6 + 3.3 * shape, 1.8), 5.6))
-    axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
-    axes.grid(visible=False)
-    first, second = 1e3 * cut.first, 1e3 * cut.second
+    figure, axes, first, second = _sheet(cut)
 
     def fill(field: Array, color: str, alpha: float, level: float = 0.0) -> None:
         if field.max() > level:
@@ -81,10 +78,7 @@ def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None
 
     The shade deepens with the measure, by tenths; every second line is named.
     """
-    figure = blank(3.9, 0.6 + 3.3 * float(np.ptp(cut.second) / np.ptp(cut.first)))
-    axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
-    axes.grid(visible=False)
-    first, second = 1e3 * cut.first, 1e3 * cut.second
+    figure, axes, first, second = _sheet(cut, lowest=0.0)
     # Drawn beyond the edge of the reach and cut off there, so that the edge is smooth.
     nearest = distance_transform_edt(np.isnan(measure), return_indices=True)[1]
     whole = measure[tuple(nearest)]
@@ -100,7 +94,7 @@ def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None
         axes.clabel(lines, fmt="%.1f", fontsize=FONT_SIZE - 1.0, colors=[INK])
     edge = axes.contour(first, second, cut.margin, levels=[0.0], colors=[MUTED], linewidths=1.0)
     # Where the reach ends in a thread thinner than the grid, single cells of it are no picture.
-    cell = 1e3 * np.array([np.ptp(cut.first), np.ptp(cut.second)]) / np.subtract(inside.shape, 1)
+    cell = np.array([np.ptp(first), np.ptp(second)]) / np.subtract(inside.shape, 1)
     rims = [
         rim
         for rim in edge.get_paths()[0].to_polygons(closed_only=False)
@@ -114,20 +108,39 @@ def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None
     return figure
 
 
+def _sheet(cut: ReachSlice, lowest: float = 1.8) -> tuple[Figure, Axes, Array, Array]:
+    """Return a figure, its axes, and both coordinates in the units that people read."""
+    names = [coordinate(name) for name in cut.plane]
+    first, second = (
+        name.shown_factor * values
+        for name, values in zip(names, (cut.first, cut.second), strict=True)
+    )
+    shape = float(np.ptp(second) / np.ptp(first)) if names[0].unit == names[1].unit else 1.0
+    figure = blank(3.9, min(max(0.6 + 3.3 * shape, lowest), 5.6) if lowest else 0.6 + 3.3 * shape)
+    axes = plain_axes(figure, *(f"{name.symbol} ({name.shown_unit})" for name in names))
+    axes.grid(visible=False)
+    return figure, axes, first, second
+
+
 def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
     """Draw a motion's path and the slice's centre, and set the scales."""
-    i, j = ("xyz".index(letter) for letter in cut.plane)
+    i, j = cut.places
+    names = [coordinate(name) for name in cut.plane]
+    a, b = (name.shown_factor for name in names)
     if path is not None:
         for color, width in ((PAPER, 3.2), (INK, 1.4)):
-            (line,) = axes.plot(1e3 * path[:, i], 1e3 * path[:, j], color=color, linewidth=width)
+            (line,) = axes.plot(a * path[:, i], b * path[:, j], color=color, linewidth=width)
             line.set_solid_capstyle("round")
-    spot(axes, 1e3 * cut.center[i], 1e3 * cut.center[j], INK, PAPER, 6.0, zorder=5)
-    first, second = 1e3 * cut.first, 1e3 * cut.second
-    axes.set_aspect("equal")
+    spot(axes, a * cut.center[i], b * cut.center[j], INK, PAPER, 6.0, zorder=5)
+    first, second = a * cut.first, b * cut.second
+    same = names[0].unit == names[1].unit
+    axes.set_aspect("equal" if same else "auto")
     axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
-    step = nice_step(max(first[-1] - first[0], second[-1] - second[0]) / 6.0)
-    axes.xaxis.set_major_locator(MultipleLocator(step))
-    axes.yaxis.set_major_locator(MultipleLocator(step))
+    spans = np.array([first[-1] - first[0], second[-1] - second[0]])
+    for scale, span in zip(
+        (axes.xaxis, axes.yaxis), [spans.max()] * 2 if same else spans, strict=True
+    ):
+        scale.set_major_locator(MultipleLocator(nice_step(float(span) / 6.0)))
 
 
 def _territories(legs: Array) -> Iterator[tuple[Array, str]]:

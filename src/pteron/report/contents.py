@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from pteron.equations.machine import closure_of
+from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
@@ -32,7 +34,6 @@ from pteron.report.costs import Cost, costs
 from pteron.report.motion_frames import Frames, frames
 from pteron.workspace import (
     BEYOND_LIMITS,
-    REACHABLE,
     JointRanges,
     LimitedJoint,
     PoseMargins,
@@ -47,7 +48,8 @@ from pteron.workspace import (
 )
 from pteron.workspace.drive_warnings import load_warnings
 from pteron.workspace.machine_warnings import machine_warnings
-from pteron.workspace.reach import Plane, slice_planes
+from pteron.workspace.reach import Plane, reached, slice_planes
+from pteron.workspace.tilts import largest_tilt
 
 _ANGLES = 361
 
@@ -102,7 +104,9 @@ class Report:
     `source`; `shown` are the moments of it that the moving picture has. `sizing` is what it asks of
     the drives: forces, in N or N m, include friction and the motors' inertia where the file tells
     of them (`driven`).
-    The slices go through the home pose and are all of one width. Of `orientations` and `measures`
+    The slices go through the home pose; those of lengths are all of one width. `volume` is None
+    where the pose has fewer lengths than two, `tilt` (rad, to every side at the home pose's place,
+    proved) where the platform does not tilt from the level. Of `orientations` and `measures`
     there is what the type-II measure depends on; neither where J is constant. The squares of the
     machine's pictures have sides of `grid`, m. `passive` has the passive joints that have limits,
     at home.
@@ -123,7 +127,8 @@ class Report:
     joints: JointRanges
     passive: tuple[LimitedJoint, ...]
     slices: tuple[ReachSlice, ...]
-    volume: ReachVolume
+    volume: ReachVolume | None
+    tilt: float | None
     jacobian: JacobianAtPose
     orientations: Orientations | None
     measures: Measures | None
@@ -171,12 +176,10 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     at_home = pose_margins(robot, home)
     cycle = pick_and_place(robot, home) if motion is None else motion.motion
     sizing = size(robot, cycle)
-    volume = reach_volume(robot, home)
+    volume = reach_volume(robot, home) if len(robot.platform.lengths) > 1 else None
     base = base_parameters(robot)
     shown = frames(robot, cycle, sizing.forces[::2])
     home_points, guides = joint_points(robot, home), joint_guides(robot, shown.pose)
-    # Squares of one width, so that the pictures share a scale.
-    half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
     return Report(
         robot=robot,
         doubts=(*machine_warnings(robot), *load_warnings(robot, home)),
@@ -192,51 +195,61 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         sizing=sizing,
         joints=joint_ranges(robot, cycle.pose),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),
-        slices=tuple(
-            reach_slice(robot, home, plane, extent=_extent(volume.box, plane, [half] * 3))
-            for plane in slice_planes(robot)
-        ),
+        slices=_slices(robot, home, volume),
         volume=volume,
+        tilt=_tilt(robot, home),
         jacobian=jacobian_at(robot, home),
         orientations=_orientations(robot, home),
-        measures=_measures(robot, home, volume.box),
+        measures=_measures(robot, home, volume),
         base=base,
         costs=costs(base),
     )
 
 
-def _extent(box: Array, plane: str, half: Sequence[float]) -> tuple[float, float, float, float]:
+def _slices(robot: Manipulator, home: Array, volume: ReachVolume | None) -> tuple[ReachSlice, ...]:
+    """Return the slices through home; those of lengths are of one width, so that they compare."""
+    found = []
+    for plane in slice_planes(robot):
+        extent = None
+        if volume is not None and set(plane) <= set(robot.platform.lengths):
+            half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
+            extent = _extent(volume.box, plane, [half] * 3)
+        found.append(reach_slice(robot, home, plane, extent=extent))
+    return tuple(found)
+
+
+def _tilt(robot: Manipulator, home: Array) -> float | None:
+    with suppress(ModelError):  # it does not tilt, or not from the level
+        return largest_tilt(robot, home).tilt
+    return None
+
+
+def _extent(box: Array, plane: Plane, half: Sequence[float]) -> tuple[float, float, float, float]:
     """Return the sides of a rectangle about the middle of a box."""
     i, j = ("xyz".index(letter) for letter in plane)
     x, y = (float(box[:, k].mean()) for k in (i, j))
     return x - half[i], x + half[i], y - half[j], y + half[j]
 
 
-def _reached(cut: ReachSlice) -> tuple[float, float, float, float]:
-    """Return the sides of a rectangle about the reach in a slice, with a rim."""
-    inside = cut.status == REACHABLE
-    sides: list[float] = []
-    for values, axis in ((cut.first, 0), (cut.second, 1)):
-        found = values[inside.any(axis=axis)]
-        rim = max(_RIM * float(np.ptp(found)), float(values[1] - values[0]))
-        sides += [float(found[0]) - rim, float(found[-1]) + rim]
-    return sides[0], sides[1], sides[2], sides[3]
-
-
-def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
+def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Measures | None:
     """Return the measures on a plane of home, upright if it may be, where type II varies in it."""
     closure = closure_of(robot)
     if closure.orientation is not None or closure.vanishes() is False:
         return None
-    # The plane of the base frame that holds the vertical best, x before y.
-    vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
-    plane: Plane = "xy" if robot.platform.planar or vertical[1] > vertical[2] else "xz"
-    half = (0.5 + _RIM) * (box[1] - box[0])
-    whole = reach_slice(robot, home, plane, extent=_extent(box, plane, half.tolist()), points=_FINE)
-    # The box is that of all planes: this one may be reached in a small part of it.
-    cut = reach_slice(robot, home, plane, extent=_reached(whole), points=_FINE)
+    if volume is None:
+        cut = reach_slice(robot, home, slice_planes(robot)[0], points=_FINE)
+    else:
+        # The plane of the base frame that holds the vertical best, x before y.
+        vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
+        upright = not robot.platform.planar and vertical[1] <= vertical[2]
+        plane, box = "xz" if upright else "xy", volume.box
+        half = (0.5 + _RIM) * (box[1] - box[0])
+        extent = _extent(box, plane, half.tolist())
+        whole = reach_slice(robot, home, plane, extent=extent, points=_FINE)
+        # The box is that of all planes: this one may be reached in a small part of it.
+        cut = reach_slice(robot, home, plane, extent=reached(whole), points=_FINE)
     poses = np.tile(home, (*cut.status.shape, 1))
-    i, j = (robot.coordinates.index(letter) for letter in plane)
+    i, j = cut.places
     poses[..., i], poses[..., j] = np.meshgrid(cut.first, cut.second)
     type_i = numeric(robot, "reach")(poses)[1].min(axis=-1)
     type_ii = _type_ii(robot, poses)

@@ -131,7 +131,7 @@ def scene(
     and y and the plane's normal, in the plane. A leg's `chains` in a frame are the points of its
     line, a `guide` the way of its slider or of its crank's end, its `bars` what leads from the line
     to each of parallel rods, over the machine's size. `home` are the joints of one pose, from which
-    the cranks' base is known, and `grid` is the side of the squares.
+    the base of cranks and rams is known, and `grid` is the side of the squares.
     """
     planar, points = robot.platform.planar, shown.points
     turn = np.array(robot.platform.frame) if planar else np.eye(3)
@@ -141,7 +141,7 @@ def scene(
 
     gravity = np.array(robot.gravity)
     strength = float(np.linalg.norm(gravity)) or 1.0
-    up = -gravity / strength if gravity.any() else np.array(robot.platform.axis)
+    up = -gravity / strength if gravity.any() else np.array(robot.platform.frame[2])
     lines = [seen(line) for line in points.links]
     quantity = coordinate([leg.joint for leg in robot.legs])
     return {
@@ -155,6 +155,7 @@ def scene(
         "slides": [guide.slides for guide in guides],
         "directions": _plain(np.array([guide.axis for guide in guides]) @ turn.T),
         "bars": [None if bar is None else seen(APART * bar) for bar in points.bars],
+        "rams": points.rams,
         "base": seen(base_outline(home, guides)),
         "parts": [{"hub": seen(part.hub), "corners": seen(part.corners)} for part in points.parts],
         "position": seen(points.reference),

@@ -13,7 +13,7 @@ from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points, overloads
-from pteron.motion.trajectories.tool import tool_motion
+from pteron.motion.trajectories.tool import tool_path
 from pteron.playback import Playback
 from pteron.plots import forces_figure, grid_step, power_figure, robot_figure, svg
 from pteron.report.motion_frames import Frames, few, frames
@@ -62,7 +62,7 @@ def shown(robot: Manipulator, recorded: Playback) -> ShownMotion:
         state = motion.pose, motion.velocity, motion.acceleration
         forces = drive_forces(robot, *state, smooth=True)
     rates = joint_rates(robot, motion.pose, motion.velocity).actuated
-    tool = tool_motion(robot.platform, motion.pose, motion.velocity, motion.acceleration)[1]
+    tool = tool_path(robot.platform, motion.pose, motion.velocity, motion.acceleration)[1]
     moments = frames(robot, motion, forces)
     start, guides = joint_points(robot, motion.pose[0]), joint_guides(robot, moments.pose)
     return ShownMotion(
@@ -74,7 +74,7 @@ def shown(robot: Manipulator, recorded: Playback) -> ShownMotion:
         grid=grid_step(start, guides),
         forces=forces,
         rates=rates,
-        tool_speed=np.linalg.norm(tool[:, : len(robot.platform.lengths)], axis=-1),
+        tool_speed=np.linalg.norm(tool, axis=-1),
         joints=joint_ranges(robot, motion.pose),
         overloads=overloads(robot, forces, rates),
     )

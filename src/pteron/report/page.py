@@ -139,7 +139,9 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
             elif role == "count":
                 texts.append(str(value))
             else:
-                texts.append(triple(value, 1e3) if "point" in role else triple(value, digits=3))
+                # Micrometres, and directions to a ten-thousandth: no rounding is shown beyond.
+                exact = np.round(value, 6 if "point" in role else 4) + 0.0
+                texts.append(triple(exact, 1e3) if "point" in role else triple(exact, digits=3))
         if any(text != "\u2013" for text in texts):
             rows.append((name.replace("_", " "), texts))
     return rows
@@ -194,10 +196,12 @@ def _weighed(report: Report) -> list[str]:
     if any(leg.goes_round for leg in legs):
         found.append("a crank's angle measured as the way of its end")
     if radius is not None:
-        way = f"a point {fixed(1e3 * radius)} mm from its axis (the root mean square distance"
+        whose = "P" if report.robot.platform.tilts else "its axis"
+        way = f"a point {fixed(1e3 * radius)} mm from {whose} (the root mean square distance"
         if report.robot.platform.slides:
             way = f"what slides, {fixed(1e3 * radius)} mm/rad (the root mean square"
-        found.append(f"the platform's angle \u03c6 as the way of {way} of the platform points)")
+        angle = "angles" if report.robot.platform.tilts else "angle \u03c6"
+        found.append(f"the platform's {angle} as the way of {way} of the platform points)")
     found += [f"the {noun}'s angle as \u03c6, whatever its ratio" for noun in followers]
     return found
 
@@ -213,7 +217,7 @@ def _figures(report: Report) -> dict[str, Any]:
     gravity, shown, standard = np.array(robot.gravity), report.shown, report.standard
     # The cycle returns on its own path.
     out = slice(len(shown.time) // 2 + 1 if standard else None)
-    path = shown.pose[out, : len(robot.platform.lengths)]
+    path = shown.pose[out]
     machine = robot_figure(
         report.home_points,
         report.guides,
@@ -236,8 +240,8 @@ def _figures(report: Report) -> dict[str, Any]:
         "reach": [
             svg(
                 reach_figure(cut, path=path),
-                name=f"reach{cut.plane}",
-                title=f"Positions in reach in the {'-'.join(cut.plane)} plane",
+                name=f"reach{''.join(cut.plane)}",
+                title=f"Poses in reach in the {'-'.join(cut.plane)} plane",
             )
             for cut in report.slices
         ],

@@ -57,7 +57,7 @@
     const get = (name) => style.getPropertyValue(name).trim();
     colors = {
       ink: get("--ink"), muted: get("--muted"), grid: get("--grid"), paper: get("--panel"), rail: get("--rail"),
-      reach: get("--reach"), shade: get("--shade"), legs: [1, 2, 3, 4].map((i) => get("--leg" + i)),
+      reach: get("--reach"), shade: get("--shade"), legs: [1, 2, 3, 4, 5, 6].map((i) => get("--leg" + i)),
     };
   }
 
@@ -226,7 +226,7 @@
       const ends = chain.slice(-2), sides = bars[i] ? [-size, size].map((t) => ends.map((p) => add(p, bars[i], t))) : [ends];
       for (const [from, to] of sides) put([from, to], () => rod(from, to, color, (bars[i] ? 0.009 : 0.015) * size));
       if (bars[i]) for (const j of [0, 1]) put([ends[j]], () => rod(sides[0][j], sides[1][j], color, 0.009 * size));
-      for (const p of chain) put([p], () => ball(p, color, 0.011 * size), 0.012);
+      for (const p of data.rams[i] ? [a, chain[2]] : chain) put([p], () => ball(p, color, 0.011 * size), 0.012);
     }
     if (base.length > 2) put(base, () => face(base, colors.rail, 0.25), -0.03);
     else if (base.length > 1) put(base, () => line(...base, colors.rail, Math.max(2.5, 0.011 * size * pixel(base[0])[3])), -0.03);

@@ -182,13 +182,16 @@ def numbers(report: Report) -> dict[str, Any]:
             "condition_radius": report.jacobian.radius,
         },
         "singular_orientations": None if orientations is None else orientations.singular.tolist(),
-        "reach": {
+        "reach": None
+        if report.volume is None
+        else {
             "volume": report.volume.volume,
             "standard_error": report.volume.standard_error,
             "unit": report.volume.unit,
             "samples": report.volume.count,
             "box": report.volume.box.tolist(),
         },
+        "largest_tilt": report.tilt,
         "cycle": {
             "standard": standard is not None,
             "source": report.source or None,

@@ -1,4 +1,4 @@
-"""The handle on the platform in the viewer: arrows that move it, and a ring that turns it."""
+"""The handle on the platform in the viewer: arrows that move it, and rings that turn it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ import numpy as np
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.viewer.solids import quaternion
+from pteron.viewer.solids import axes_of, quaternion
 from pteron.viewer.state import ViewerState
 
 if TYPE_CHECKING:
     import viser
+
+_ALONG = 0.5
+"""Cosine to one of the pose's directions above which an axis has an arrow."""
 
 _SIZE = 0.16
 """Length of the arrows, as a share of the machine's size."""
@@ -35,23 +38,27 @@ class Handle:
         self._pose = np.zeros(robot.freedom)
         self._frame = np.array(platform.frame)
         scene = server.scene
-        # Lengths count along the base frame's axes, of a planar machine along its plane's.
-        self._ways = self._frame if platform.planar else np.eye(3)
-        self._mover = scene.add_transform_controls(
-            "/machine/handle",
-            scale=_SIZE * size,
-            active_axes=(True, True, not platform.planar),
-            disable_rotations=True,
-            depth_test=False,
-            wxyz=quaternion(self._ways.T),
-        )
-        self._watch(self._mover, self._moved)
+        self._mover: Any = None
+        if platform.lengths:
+            # Lengths count along the base frame's axes, or along some of the platform's at rest.
+            whole = len(platform.lengths) == 3
+            ways = np.eye(3) if whole else self._frame
+            along = np.abs(ways @ platform.directions.T).max(axis=-1) > _ALONG
+            self._mover = scene.add_transform_controls(
+                "/machine/handle",
+                scale=_SIZE * size,
+                active_axes=(bool(along[0]), bool(along[1]), bool(along[2])),
+                disable_rotations=True,
+                depth_test=False,
+                wxyz=quaternion(ways.T),
+            )
+            self._watch(self._mover, self._moved)
         self._turner: Any = None
-        if len(platform.rotation_axes) == 1:
+        if platform.rotation_axes:
             self._turner = scene.add_transform_controls(
                 "/machine/ring",
                 scale=_SIZE * size,
-                active_axes=(True, True, False),
+                active_axes=(True, True, platform.tilts),
                 disable_axes=True,
                 disable_sliders=True,
                 depth_test=False,
@@ -74,8 +81,13 @@ class Handle:
         return pose
 
     def _turned(self) -> Array:
-        """Return the pose that the ring is turned to, its angle next to the one before."""
+        """Return the pose that the rings are turned to, its angles next to those before.
+
+        A platform that cannot turn as they are follows as nearly as it can.
+        """
         w, x, y, z = self._turner.wxyz
+        if self._robot.platform.tilts:
+            return self._robot.platform.nearest_pose(self._pose, axes_of(self._turner.wxyz))
         first = np.array(
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
         )
@@ -90,7 +102,8 @@ class Handle:
         if self._held:
             return
         position, axes = state.robot.platform.at(state.pose)
-        self._mover.position = position
+        if self._mover is not None:
+            self._mover.position = position
         if self._turner is not None:
             self._turner.position = position
             self._turner.wxyz = quaternion(axes.T)

@@ -16,7 +16,7 @@ from pteron.viewer.readings import Readings
 from pteron.viewer.readout import readout, status
 from pteron.viewer.session import SPEEDS, STANDARD, Session
 from pteron.viewer.slices import choices
-from pteron.viewer.state import pose_factors
+from pteron.viewer.state import pose_factors, pose_units
 
 if TYPE_CHECKING:
     import viser
@@ -75,7 +75,7 @@ class Panel:
             self._coordinates.append(slider)
         shown = " ".join(fixed(x, 0).replace("\u2212", "-") for x in self._factors * session.home)
         self._typed = gui.add_text(
-            "type a pose", "", hint=f"{' '.join(robot.coordinates)} in mm and degrees: {shown}"
+            "type a pose", "", hint=f"{' '.join(robot.coordinates)} in {pose_units(robot)}: {shown}"
         )
         self._button(gui, "Go there", lambda: session.type_pose(self._typed.value))
         self._button(gui, "Home", session.go_home)
@@ -143,9 +143,11 @@ class Panel:
             hint="At the actuators. A crank's torque is along its axis, as a screw turns",
         )
         self.handle = gui.add_checkbox("handle on the platform", initial_value=True)
+        planes = choices(self._session.state.robot)
         self.plane = gui.add_dropdown(
             "workspace slice",
-            choices(self._session.state.robot),
+            planes,
+            disabled=len(planes) == 1,
             hint="Blue: in reach. Amber: a joint's limit forbids it",
         )
         for one in (self.screws, self.forces, self.handle, self.plane):

@@ -129,7 +129,7 @@ class Scene:
         if robot.platform.planar:
             return np.array(robot.platform.frame[1])
         gravity = np.array(robot.gravity)
-        up = -gravity if gravity.any() else np.array(robot.platform.axis)
+        up = -gravity if gravity.any() else np.array(robot.platform.frame[2])
         return np.asarray(up / np.linalg.norm(up))
 
     def _aim(self, points: JointPoints) -> None:
@@ -268,10 +268,16 @@ class Scene:
     def _force_arrows(
         self, points: JointPoints, forces: Array, scale: Array
     ) -> tuple[Copies, Copies]:
-        """Return the drives' forces as arrows; a torque's is along its axis, as a screw turns."""
+        """Return the drives' forces as arrows; a torque's is along its axis, as a screw turns.
+
+        A ram's begins at its base joint, along it.
+        """
         shares = np.clip(np.nan_to_num(forces) / scale, -_MOST, _MOST)
         starts = np.array([line[0] for line in points.links])
-        axes = np.array([guide.axis for guide in self._guides])
+        rams = np.array(points.rams)[:, None]
+        along = np.array([line[-1] - line[0] for line in points.links])
+        along = along / np.linalg.norm(along, axis=-1, keepdims=True)
+        axes = np.where(rams, along, np.array([guide.axis for guide in self._guides]))
         ways = _FORCE * self.size * shares[:, None] * axes
         radii = [_FORCE_RADIUS * self.size] * len(starts)
         return arrows(starts, ways, radii, LEG_COLORS[: len(starts)])

@@ -85,14 +85,24 @@ class Session:
         self.examples = home[None]
         with suppress(ModelError):
             drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
-            self.examples = np.vstack([home, drawn])
+            # Some may be so near to a singular pose that they have no joint coordinates.
+            known = np.isfinite(inverse_kinematics(robot, drawn, on_failure="nan")).all(axis=-1)
+            self.examples = np.vstack([home, drawn[known]])
         lengths, platform = ~robot.platform.angular, robot.platform
         low, high = self.examples.min(axis=0), self.examples.max(axis=0)
-        with suppress(ModelError):  # guides without limits: a reach without end
-            low[lengths], high[lengths] = bounding_box(robot, home)
+        if lengths.any():
+            with suppress(ModelError):  # guides without limits: a reach without end
+                low[lengths], high[lengths] = bounding_box(robot, home)
         margin = _MARGIN * (high - low)
         low, high = low - margin, high + margin
-        if platform.rotation_axes:
+        if platform.tilts:
+            # Beyond 90 degrees the same orientations come again.
+            turns = ~lengths
+            low[turns] = np.maximum(low[turns], -np.pi / 2.0)
+            high[turns] = np.minimum(high[turns], np.pi / 2.0)
+            if platform.limits:
+                low[turns], high[turns] = np.transpose(platform.limits)
+        elif platform.rotation_axes:
             low[~lengths], high[~lengths] = platform.limits or (-np.pi, np.pi)
         self.pose_range = np.array([low, high])
         joints = inverse_kinematics(robot, self.examples)
@@ -117,7 +127,7 @@ class Session:
         self.state = moved(self.state, target)
 
     def type_pose(self, text: str) -> None:
-        """Move the platform to a pose that is typed in mm and degrees."""
+        """Move the platform to a pose that is typed in mm or degrees, as its coordinates are."""
         self.set_pose(typed_pose(self.state.robot, text))
 
     def set_joint(self, i: int, value: float) -> None:

@@ -22,8 +22,10 @@ NONE = "none"
 
 
 def choices(robot: Manipulator) -> tuple[str, ...]:
-    """Return the choices of a slice: none, or a plane."""
-    return (NONE, *slice_planes(robot))
+    """Return the choices of a slice: none, or a plane of the pose's lengths."""
+    if len(robot.platform.lengths) < 2:
+        return (NONE,)
+    return (NONE, *(plane for plane in slice_planes(robot) if isinstance(plane, str)))
 
 
 def slice_meshes(

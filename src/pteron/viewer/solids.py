@@ -22,6 +22,7 @@ from pteron.plots.machine_drawing import base_outline, rods
 from pteron.plots.space_axes import upright
 
 _LINK, _ROD, _ARM, _GUIDE, _AXIS, _JOINT = 0.011, 0.006, 0.007, 0.008, 0.003, 0.016
+_CYLINDER = 0.014
 """Radii as shares of the machine's size."""
 
 _AXLE = 0.03
@@ -92,11 +93,12 @@ def moving_solids(points: JointPoints, guides: Sequence[Guide], size: float) -> 
     for i, (line, guide) in enumerate(zip(points.links, guides, strict=True)):
         color = LEG_COLORS[i]
         for start, end in pairwise(line[:-1]):
-            bars.append((start, end, _LINK * size, color))
+            bars.append((start, end, (_CYLINDER if points.rams[i] else _LINK) * size, color))
         single = points.bars[i] is None
         for start, end in rods(line, points.bars[i], size):
-            bars.append((start, end, (_LINK if single else _ROD) * size, color))
-        for joint in line:
+            thick = _LINK if single and not points.rams[i] else _ROD
+            bars.append((start, end, thick * size, color))
+        for joint in line[::2] if points.rams[i] else line:
             balls.append((joint, _JOINT * size, color))
         if guide.slides:
             blocks.append((line[0], guide.axis, color))
@@ -218,6 +220,14 @@ def quaternion(rotation: Array) -> Array:
 
     x, y, z, w = Rotation.from_matrix(rotation).as_quat()
     return np.array([w, x, y, z])
+
+
+def axes_of(wxyz: Array) -> Array:
+    """Return the axes (3, 3), one a row, of a frame that is turned by a unit quaternion (4,)."""
+    from scipy.spatial.transform import Rotation
+
+    w, x, y, z = wxyz
+    return np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix().T)
 
 
 @lru_cache(maxsize=256)

@@ -156,7 +156,7 @@ def carrying(state: ViewerState, text: str) -> ViewerState:
 
 
 def typed_pose(robot: Manipulator, text: str) -> Array:
-    """Return a pose that is typed in mm and degrees.
+    """Return a pose that is typed in the units of its coordinates, mm or degrees.
 
     Raises
     ------
@@ -173,8 +173,8 @@ def typed_pose(robot: Manipulator, text: str) -> Array:
     names = " ".join(robot.coordinates)
     if len(words) != robot.freedom:
         raise DataError(
-            f"pose: {len(words)} numbers given, {robot.freedom} expected: {names}, in mm"
-            f"{' and degrees' if robot.platform.angles else ''}, with blanks between them"
+            f"pose: {len(words)} numbers given, {robot.freedom} expected: {names}, in "
+            f"{pose_units(robot)}, with blanks between them"
         )
     factors = pose_factors(robot)
     pairs = zip(words, robot.coordinates, strict=True)
@@ -184,6 +184,12 @@ def typed_pose(robot: Manipulator, text: str) -> Array:
 def pose_factors(robot: Manipulator) -> Array:
     """Return the factors (m,) from a pose in SI units to mm and degrees."""
     return np.array([SHOWN[unit][1] for unit in robot.units])
+
+
+def pose_units(robot: Manipulator) -> str:
+    """Return the units in which a pose is typed: "mm", "degrees" or "mm and degrees"."""
+    words = {"m": "mm", "rad": "degrees"}
+    return " and ".join(dict.fromkeys(words[unit] for unit in robot.units))
 
 
 def _number(text: str, name: str, wanted: str) -> float:

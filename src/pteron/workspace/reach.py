@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,22 +25,25 @@ BEYOND_LIMITS = -1
 _RIM = 0.08
 """Share of the reach's width that a slice shows around it."""
 
-Plane = Literal["xy", "xz", "yz"]
-"""The two coordinates of the pose that vary."""
+_UPSIDE = np.pi / 2.0
+"""Angle of a platform that tilts to which slices look for its reach, either way, rad."""
+
+Plane = str | tuple[str, str]
+"""The two coordinates of the pose that vary: "xy", "xz", "yz", or a pair of names."""
 
 
 @dataclass(frozen=True)
 class ReachSlice:
-    """A grid of poses that differ in two of their lengths x, y and z.
+    """A grid of poses that differ in two of their coordinates.
 
     Attributes
     ----------
-    plane : str
-        The two coordinates that vary: ``"xy"``, ``"xz"`` or ``"yz"``.
+    plane : str or (str, str)
+        The two coordinates that vary: ``"xy"``, ``"xz"`` or ``"yz"``, or their names.
     center : array, shape (m,)
         The pose the slice goes through; its other coordinates hold for the whole grid.
     first, second : array, shape (A,) and (B,)
-        Values of the two coordinates, m.
+        Values of the two coordinates, m or rad.
     status : array of int, shape (B, A)
         `REACHABLE`; `BEYOND_LIMITS`; or the leg, from 1, that misses the pose by most.
     margin : array, shape (B, A)
@@ -48,6 +51,8 @@ class ReachSlice:
         outside.
     leg_margins : array, shape (B, A, n)
         Metres within what each leg reaches: zero on the leg's type-I singularity.
+    places : (int, int)
+        Where the two coordinates stand in a pose.
     """
 
     plane: Plane
@@ -57,19 +62,32 @@ class ReachSlice:
     status: NDArray[np.int_]
     margin: Array
     leg_margins: Array
+    places: tuple[int, int]
 
     @property
     def poses(self) -> Array:
         """The poses of the grid, shape (B, A, m), m and rad."""
         found = np.broadcast_to(self.center, (*self.status.shape, len(self.center))).copy()
-        i, j = ("xyz".index(letter) for letter in self.plane)
+        i, j = self.places
         found[..., i], found[..., j] = self.first, self.second[:, None]
         return found
 
 
 def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
-    """Return the planes in which slices are possible: in space three, of a planar machine one."""
-    return ("xy",) if robot.platform.planar else ("xy", "xz", "yz")
+    """Return the planes of pictures: in space three, of a planar machine one.
+
+    Of a platform that tilts they are those of its lengths with two of its angles, or all pairs of
+    coordinates where these are few.
+    """
+    if robot.platform.planar:
+        return ("xy",)
+    if not robot.platform.tilts:
+        return "xy", "xz", "yz"
+    angles, lengths = robot.platform.angles, robot.platform.lengths
+    if len(lengths) == 3:
+        return "xy", "xz", "yz", (angles[0], angles[1])
+    mixed = ((angle, length) for length in lengths for angle in angles)
+    return *combinations(angles, 2), *mixed
 
 
 def reach_slice(
@@ -88,11 +106,12 @@ def reach_slice(
         The machine.
     center : array, shape (m,)
         The pose the slice goes through, m and rad.
-    plane : {"xy", "xz", "yz"}
-        The two coordinates that vary; a planar machine has but x and y.
+    plane : {"xy", "xz", "yz"} or (str, str)
+        The two coordinates that vary; a planar machine has but x and y. Of a platform that tilts,
+        any two names of coordinates.
     extent : (float, float, float, float), optional
-        Least and greatest value of the first coordinate, then of the second, m; by default what
-        shows the whole reach at this orientation.
+        Least and greatest value of the first coordinate, then of the second, m or rad; by default
+        what shows the whole reach at this orientation, and of angles up to 90 degrees.
     points : int
         Number of grid points along each side.
 
@@ -117,14 +136,23 @@ def reach_slice(
     """
     robot = as_manipulator(robot)
     planes = slice_planes(robot)
-    if plane not in planes:
+    names = tuple(plane)
+    if robot.platform.tilts:
+        if len(set(names)) != 2 or not set(names) <= set(robot.coordinates):
+            raise DataError(
+                f"plane: {plane!r} given, two of {', '.join(robot.coordinates)} expected"
+            )
+    elif plane not in planes:
         valid = ", ".join(f'"{one}"' for one in planes)
         raise DataError(f"plane: {plane!r} is not one of {valid}")
     if points < 2:
         raise DataError(f"points: {points} given, at least 2 expected")
     expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + robot.joint_count))
     pose = checked_one(robot, center, "center")
-    i, j = (robot.coordinates.index(letter) for letter in plane)
+    i, j = (robot.coordinates.index(name) for name in names)
+    if extent is None and robot.platform.angular[[i, j]].any():
+        wide = reach_slice(robot, pose, plane, extent=_wide(robot, pose, i, j), points=points)
+        extent = reached(wide)
     if extent is None:
         box = bounding_box(robot, pose)
         rim = _RIM * (box[1] - box[0])
@@ -138,4 +166,31 @@ def reach_slice(
 
     leg_margins = numeric(robot, "reach")(poses)[0]
     status, margin, _ = numeric(robot, "standing")(poses)
-    return ReachSlice(plane, pose, first, second, status.astype(int), margin, leg_margins)
+    return ReachSlice(plane, pose, first, second, status.astype(int), margin, leg_margins, (i, j))
+
+
+def reached(cut: ReachSlice) -> tuple[float, float, float, float]:
+    """Return the sides of a rectangle about the reach in a slice, with a rim."""
+    inside = cut.status == REACHABLE
+    sides: list[float] = []
+    for values, axis in ((cut.first, 0), (cut.second, 1)):
+        found = values[inside.any(axis=axis)]
+        if not len(found):
+            found = values
+        rim = max(_RIM * float(np.ptp(found)), float(values[1] - values[0]))
+        sides += [float(found[0]) - rim, float(found[-1]) + rim]
+    return sides[0], sides[1], sides[2], sides[3]
+
+
+def _wide(robot: Manipulator, pose: Array, i: int, j: int) -> tuple[float, float, float, float]:
+    """Return sides about all that a slice through a pose may hold."""
+    sides: list[float] = []
+    limits = robot.platform.limits or ((-_UPSIDE, _UPSIDE),) * len(robot.platform.angles)
+    for k in (i, j):
+        if robot.platform.angular[k]:
+            low, high = limits[robot.platform.angles.index(robot.coordinates[k])]
+            sides += [max(low, -_UPSIDE), min(high, _UPSIDE)]
+        else:
+            at = robot.platform.lengths.index(robot.coordinates[k])
+            sides += bounding_box(robot, pose)[:, at].tolist()
+    return sides[0], sides[1], sides[2], sides[3]

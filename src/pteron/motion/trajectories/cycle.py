@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator
-from pteron.motion.trajectories.tool import pose_motion, turning_arm
+from pteron.motion.trajectories.tool import arm_motion, carries, pose_motion, tool_path
 from pteron.platforms import Platform
 
 LIFT = 0.025
@@ -22,6 +22,9 @@ LIFT = 0.025
 
 ACROSS = 0.305
 """Width of the standard cycle, m."""
+
+STILL_RADIUS = 0.1
+"""Distance from P of the point whose acceleration counts where P stays and is the tool, m."""
 
 _LIFT_ENDS = 0.4
 """Share of the path out in which the platform rises, and again in which it sinks."""
@@ -80,7 +83,9 @@ class Cycle:
     across, up : array, shape (3,)
         Unit vectors of the two moves, in the base frame.
     turn : float
-        By how much the platform turns on its way across, rad; without effect where it does not.
+        By how much the platform turns on its way across, rad; without effect where it does not. Of
+        several angles it is the last; where the pose's lengths do not go across, as those of a
+        tripod, the other angles turn by as much on the way up, and back on the way down.
     scale : float
         Factor on lift, width and turn alike, so that a cycle of scale 0 stays at `around`.
     """
@@ -127,16 +132,43 @@ class Cycle:
         place = self.around[~angular] + place
         if not self.platform.angles:
             return place, velocity, acceleration
-        turned, rate, growth = (self.scale * self.turn * s[:, None] for s in _shares(tau)[0])
+        turned, rate, growth = (
+            self.scale * self.turn * (s[:, None] * self._across + h[:, None] * self._lifted)
+            for s, h in zip(*_shares(tau), strict=True)
+        )
         angle = self.around[angular] + turned
-        # The middle is given as a pose of P, the path as that of the tool.
-        middle, _ = turning_arm(self.platform, self.around[angular])
+        if carries(self.platform):
+            # The middle is given as a pose of P, the path as that of the tool.
+            still = np.zeros_like(self.around[angular])
+            place = place + arm_motion(self.platform, self.around[angular], still, still)[0]
         return pose_motion(
             self.platform,
-            np.hstack([place + middle, angle]),
+            np.hstack([place, angle]),
             np.hstack([velocity, rate]),
             np.hstack([acceleration, growth]),
         )
+
+    @property
+    def _across(self) -> Array:
+        """Whether each angle turns on the way across: the last one."""
+        return np.arange(len(self.platform.angles)) == len(self.platform.angles) - 1
+
+    @property
+    def _lifted(self) -> Array:
+        """Whether each angle rises and sinks: the others, where no lengths go across."""
+        return ~self._across & (len(self.platform.lengths) < 2)
+
+    def acceleration(self, tau: Array) -> Array:
+        """Return the tool's acceleration (T, k) by tau, whatever moves it.
+
+        Where nothing does, that of a point `STILL_RADIUS` from P, along the angles.
+        """
+        if carries(self.platform) or not self.platform.angles:
+            return self.path(tau)[2]
+        state = self.at(tau)
+        if any(self.platform.tool) or self.platform.lengths:
+            return tool_path(self.platform, *state)[2]
+        return STILL_RADIUS * state[2]
 
 
 _Shares = tuple[Array, Array, Array]
@@ -169,7 +201,7 @@ def moves(
     """
     platform, gravity = robot.platform, np.array(robot.gravity)
     axis = np.array(platform.axis)
-    level = platform.directions.T @ platform.directions
+    level = platform.directions.T @ platform.directions if platform.planar else np.eye(3)
     weight = level @ gravity
     strength = float(np.linalg.norm(weight))
     upright: Array | None = None

@@ -19,7 +19,7 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import told_pose
 from pteron.motion.trajectories.limits import MotionLimits
-from pteron.motion.trajectories.tool import Curve, tool_motion
+from pteron.motion.trajectories.tool import Curve, tool_path
 
 _ROUNDING = 1e-12
 """Relative excess over a drive's limit that counts as rounding."""
@@ -80,8 +80,7 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
     drives = drives_of(robot)
     pushed = unchecked(robot, "inverse_dynamics", pose, rest, first)
     swept = unchecked(robot, "inverse_dynamics", pose, first, second)
-    lengths = ~robot.platform.angular
-    _, speed, bend = tool_motion(robot.platform, pose, first, second)
+    _, speed, bend = tool_path(robot.platform, pose, first, second)
     return Demand(
         rates,
         bends,
@@ -90,7 +89,7 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
         swept - weight + drives.inertia * bends,
         np.array([drives.coulomb, drives.coulomb + drives.stribeck]),
         np.asarray(drives.viscous),
-        (speed[:, lengths], bend[:, lengths]),
+        (speed, bend),
     )
 
 

@@ -172,7 +172,7 @@ def _peak_acceleration(cycle: Cycle) -> float:
     """Return the tool's largest acceleration over a cycle that takes one second, m/s^2."""
 
     def size(tau: Array) -> Array:
-        return np.asarray(np.linalg.norm(cycle.path(tau)[2], axis=-1))
+        return np.asarray(np.linalg.norm(cycle.acceleration(tau), axis=-1))
 
     tau = np.linspace(0.0, 0.5, 1001)
     highest = int(size(tau).argmax())

@@ -14,7 +14,9 @@ Curve = tuple[Array, Array, Array]
 def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
     """Return the tool's place along the pose's lengths, with its angles, and two derivatives.
 
-    The part from P to the tool along the platform's axis, which is constant, is left out.
+    Of a platform that turns about its axis alone, the part from P to the tool along that axis,
+    which is constant, is left out. A platform whose lengths cannot carry the tool anywhere, such as
+    a tripod, keeps its pose.
     """
     return _moved(platform, (pose, first, second), 1.0)
 
@@ -24,26 +26,53 @@ def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -
     return _moved(platform, (place, first, second), -1.0)
 
 
+def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
+    """Return the tool's place (..., k), and two derivatives: k = 3 where the platform tilts.
+
+    Else they are those of `tool_motion` along the pose's lengths.
+    """
+    if platform.tilts:
+        return platform.tool_motion(pose, first, second)
+    lengths = ~platform.angular
+    place, velocity, acceleration = tool_motion(platform, pose, first, second)
+    return place[..., lengths], velocity[..., lengths], acceleration[..., lengths]
+
+
 def _moved(platform: Platform, curve: Curve, side: float) -> Curve:
-    if not platform.angles or not any(platform.tool[:2]):
+    if not carries(platform) or not any(platform.tool if platform.tilts else platform.tool[:2]):
         return curve
-    place, velocity, acceleration = (part.copy() for part in curve)
     angular = platform.angular
-    rate, growth = velocity[..., angular], acceleration[..., angular]
-    # The arm from P to the tool turns in part with the platform.
-    arm, lever = turning_arm(platform, place[..., angular])
-    place[..., ~angular] += side * arm
-    velocity[..., ~angular] += side * rate * lever
-    acceleration[..., ~angular] += side * (growth * lever - rate**2 * arm)
-    return place, velocity, acceleration
+    moved = tuple(part.copy() for part in curve)
+    angles = tuple(part[..., angular] for part in curve)
+    for part, arm in zip(moved, arm_motion(platform, *angles), strict=True):
+        part[..., ~angular] += side * arm
+    return moved[0], moved[1], moved[2]
 
 
-def turning_arm(platform: Platform, angle: Array) -> tuple[Array, Array]:
-    """Return the arm from P to the tool that turns, at angles (..., 1), and its derivative."""
+def carries(platform: Platform) -> bool:
+    """Say whether the pose's lengths make up for what its angles do to the tool's place."""
+    return bool(platform.angles) and (not platform.tilts or len(platform.lengths) == 3)
+
+
+def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) -> Curve:
+    """Return the arm from P to the tool, as far as it turns, and two derivatives (..., k).
+
+    They are along the pose's lengths, of a platform that `carries` its tool; angles (..., j).
+    """
+    if platform.tilts:
+        state = (_without_lengths(platform, part) for part in (angles, rates, growths))
+        return platform.tool_motion(*state)
     x, y = (platform.directions @ axis for axis in platform.frame[:2])
     a, b = (
         platform.tool[0] * x + platform.tool[1] * y,
         platform.tool[0] * y - platform.tool[1] * x,
     )
-    cos, sin = np.cos(angle), np.sin(angle)
-    return cos * a + sin * b, cos * b - sin * a
+    cos, sin = np.cos(angles), np.sin(angles)
+    arm, lever = cos * a + sin * b, cos * b - sin * a
+    return arm, rates * lever, growths * lever - rates**2 * arm
+
+
+def _without_lengths(platform: Platform, angles: Array) -> Array:
+    found = np.zeros((*angles.shape[:-1], len(platform.coordinates)))
+    found[..., platform.angular] = angles
+    return found
