@@ -249,7 +249,7 @@ def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str)
     held, ranges = pose_ranges(text, "--slice")
     if ending in _FILMS:
         points = points or _FILM_POINTS
-        if text is None:
+        if text is None and len(names) > 3:
             held = _home(robot, [name for name in names[:-1] if name not in ("x", "y")])
     elif ending in _SURFACES and text is None and len(names) > 3:
         held = _home(robot, robot.platform.angles)
@@ -287,7 +287,7 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
     """Return the reach at the grid's orientation; None where that varies, or nothing is in it."""
     from pteron.workspace import reach_volume
 
-    if any(axis.unit == "rad" for axis in grid.axes):
+    if any(axis.unit == "rad" for axis in grid.axes) or len(robot.platform.lengths) < 2:
         return None
     try:
         return reach_volume(robot, grid.pose)
