@@ -1,18 +1,24 @@
-"""Machines whose platforms tilt in drawings, films, pages and cycles."""
+"""Machines whose platforms tilt in drawings, films, pages, cycles and the viewer."""
 
+import json
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
+from mechanisms import NIGHTLY
 from PIL import Image
+from test_viewer import opened, slide, wait_for
 from tilting import machine
 
 import pteron
 from pteron.motion import Motion, joint_points, pick_and_place, with_payload
 from pteron.motion.trajectories.tool import pose_motion, tool_motion, tool_path
 from pteron.plots import draw, film
-from pteron.report import write_motion_page
+from pteron.report import write_motion_page, write_report
+from pteron.viewer import view
+from pteron.viewer.session import Session
+from pteron.viewer.slices import choices
 from pteron.workspace.reach import reach_slice
 
 TOOL = (0.05, -0.02, 0.1)
@@ -102,3 +108,60 @@ def test_a_slice_goes_over_any_two_coordinates():
     np.testing.assert_array_equal(cut.poses[2, 3], [cut.second[2], home[1], cut.first[3]])
     with pytest.raises(pteron.DataError, match="two of z, roll, pitch expected"):
         reach_slice(robot, home, "xy")
+
+
+@pytest.mark.parametrize("kinds", [("3T3R", "UPS"), ("1T2R", "RPS"), ("2R", "RSS")])
+def test_a_frame_that_is_turned_becomes_the_nearest_pose(kinds):
+    robot, home = tooled(*kinds)
+    platform = robot.platform
+    other = home + np.where(platform.angular, 0.3, 0.0)
+    np.testing.assert_allclose(platform.nearest_pose(home, platform.at(other)[1]), other, atol=1e-9)
+    # A frame that a tripod, or a universal joint, has in no pose.
+    c, s = np.cos(0.2), np.sin(0.2)
+    wanted = platform.at(other)[1] @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
+    found = platform.nearest_pose(home, wanted)
+    steps = 1e-3 * np.eye(len(home))[platform.angular]
+    beside = found + np.vstack([steps, -steps])
+    apart = ((platform.at(beside)[1] - wanted) ** 2).sum(axis=(-1, -2))
+    assert (apart > ((platform.at(found)[1] - wanted) ** 2).sum()).all()
+    np.testing.assert_array_equal(found[~platform.angular], home[~platform.angular])
+
+
+def test_the_viewer_moves_a_platform_by_its_angles():
+    robot = pteron.load("ankle")
+    session = Session(robot)
+    session.type_pose("10 -5")
+    np.testing.assert_allclose(session.state.pose, np.radians([10.0, -5.0]))
+    session.set_coordinate(1, 0.1)
+    np.testing.assert_allclose(session.state.pose, [np.radians(10.0), 0.1])
+    low, high = session.pose_range
+    np.testing.assert_array_equal(np.transpose([low, high]), robot.platform.limits)
+    assert choices(robot) == ("none",)
+    with pytest.raises(pteron.DataError, match="2 expected: alpha beta, in degrees, with blanks"):
+        session.type_pose("1 2 3")
+
+
+@NIGHTLY
+def test_a_tripods_page_has_its_angles(browser):
+    with view(pteron.load("ball-table"), port=0) as viewer:
+        with opened(browser, viewer.url) as page:
+            slide(page, "pitch (°)", ["ArrowRight"] * 5)
+            wait_for(page, "() => document.querySelectorAll('table.legs tr').length === 4")
+            assert viewer.wait(10.0)
+        z, roll, pitch = viewer.state.pose
+        assert (z, roll) == (pytest.approx(0.12, abs=0.05), 0.0)
+        assert pitch > 0.0
+        assert viewer.faults == ()
+
+
+@NIGHTLY
+@pytest.mark.parametrize("name", ["ball-table", "stewart"])
+def test_a_report_has_slices_of_angles_and_the_tilt(name, tmp_path):
+    robot = pteron.load(name)
+    page = write_report(robot, tmp_path)
+    found = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    assert found["coordinates"] == list(robot.coordinates)
+    assert 0.1 < found["largest_tilt"] < 1.6
+    text = page.read_text("utf-8")
+    for words in ("<figcaption>roll, pitch</figcaption>", "to every side", "<b>R</b><sub>z</sub>"):
+        assert words in text
