@@ -265,15 +265,6 @@ class SpatialInertia:
         xx, xy, xz, yy, yz, zz = numbers(inertia, "inertia", 6)
         return cls(mass, (mass * x, mass * y, mass * z), (xx, xy, xz, yy, yz, zz))
 
-    def with_point(self, mass: float, point: Sequence[float]) -> SpatialInertia:
-        """Return that of the body with a mass, kg, at a point of its frame, m."""
-        s = np.array(point)
-        tensor = self.tensor + mass * (s @ s * np.eye(3) - np.outer(s, s))
-        moment = np.array(self.first_moment) + mass * s
-        return SpatialInertia(
-            self.mass + mass, tuple(moment.tolist()), tuple(tensor[np.triu_indices(3)].tolist())
-        )
-
     @classmethod
     def shares_of_point(cls, x: Any, y: Any, z: Any) -> dict[str, Any]:
         """Return the parameters, by kind, of a unit mass at a point of its frame."""
