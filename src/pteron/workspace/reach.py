@@ -185,10 +185,10 @@ def reached(cut: ReachSlice) -> tuple[float, float, float, float]:
 def _wide(robot: Manipulator, pose: Array, i: int, j: int) -> tuple[float, float, float, float]:
     """Return sides about all that a slice through a pose may hold."""
     sides: list[float] = []
-    limits = robot.platform.limits or ((-_UPSIDE, _UPSIDE),) * len(robot.platform.angles)
+    limits = robot.platform.angle_limits
     for k in (i, j):
         if robot.platform.angular[k]:
-            low, high = limits[robot.platform.angles.index(robot.coordinates[k])]
+            low, high = limits.get(robot.coordinates[k], (-_UPSIDE, _UPSIDE))
             sides += [max(low, -_UPSIDE), min(high, _UPSIDE)]
         else:
             at = robot.platform.lengths.index(robot.coordinates[k])
