@@ -11,7 +11,7 @@ import sys
 import time
 
 import numpy as np
-from measuring import quick
+from measuring import catalog, quick
 
 import pteron
 from pteron.kernels import Array
@@ -24,7 +24,7 @@ _CHUNK = 500_000
 
 def main() -> None:
     """Print the table of the catalog, then the two fine pavings and the random poses."""
-    names = ["quadrupteron", "five-bar"] if quick() else list(pteron.catalog())
+    names = ["quadrupteron", "five-bar"] if quick() else catalog()
     print(
         "proved bounds on volumes (m^3, areas m^2) at the home orientation, and largest cubes (m)"
     )

@@ -14,7 +14,7 @@ import time
 
 import casadi
 import numpy as np
-from measuring import quick
+from measuring import catalog, quick
 
 import pteron
 from pteron.identification.excitation import Excitation, Limits, margins, optimal_excitation
@@ -29,7 +29,7 @@ def main() -> None:
         f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python "
         f"{platform.python_version()}, NumPy {np.__version__}, CasADi {casadi.__version__}"
     )
-    names = ["quadrupteron", *(n for n in pteron.catalog() if n != "quadrupteron")]
+    names = ["quadrupteron", *(n for n in catalog() if n != "quadrupteron")]
     for name in names[:1] if quick() else names:
         _print(name, *_excited(name, 5.0 if quick() else 90.0 if name == names[0] else 30.0))
 

@@ -12,7 +12,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from measuring import quick
+from measuring import catalog, quick
 
 import pteron
 from pteron.identification.excitation import LedMotion, Limits, RepeatedCycle, optimal_excitation
@@ -28,7 +28,7 @@ def main() -> None:
     """Print the worst margins of each machine."""
     heading = f"{'lead':>6}{'lasts':>7}  {'periodic':<26}{'rest to rest':<26}{'held out':<26}"
     print(f"{'':<22}{heading}")
-    for name in ["tripteron"] if quick() else pteron.catalog():
+    for name in ["tripteron"] if quick() else catalog():
         robot = driven(pteron.load(name))
         found = optimal_excitation(
             robot, starts=2, draws=20, seconds=1.0 if quick() else 8.0, workers=1

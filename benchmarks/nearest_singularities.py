@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from measuring import quick
+from measuring import catalog, quick
 from scipy.optimize import minimize  # type: ignore[import-untyped]
 from scipy.spatial import cKDTree  # type: ignore[import-untyped]
 
@@ -50,7 +50,7 @@ class Account:
 
 def main() -> None:
     """Print what is found for each machine."""
-    names = ["3-prr", "five-bar"] if quick() else list(pteron.catalog())
+    names = ["3-prr", "five-bar"] if quick() else catalog()
     given = [int(part) for part in sys.argv[1:] if part.isdigit()]
     count = given[0] if given else 3 if quick() else 50
     print(f"nearest singular poses, told and looked for otherwise, at {count} poses a machine")

@@ -14,7 +14,7 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from measuring import quick
+from measuring import catalog, quick
 
 import pteron
 from pteron.motion import (
@@ -38,7 +38,7 @@ def main() -> None:
         f"{'':<22}{'cycle':>8}{'quintic':>9}{'optimal':>9}{'TOPP-RA':>9}{'saved':>7}"
         f"{'share of limits':>17}{'search':>8}"
     )
-    for name in ["tripteron", "3-rrr"] if quick() else pteron.catalog():
+    for name in ["tripteron", "3-rrr"] if quick() else catalog():
         robot = driven(pteron.load(name))
         found = pick_and_place(robot, home_pose(robot))
         rates, forces = sizes(robot, found)

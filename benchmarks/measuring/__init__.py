@@ -23,6 +23,7 @@ __all__ = [
     "States",
     "a_call",
     "a_sweep",
+    "catalog",
     "compiled",
     "contest",
     "print_ratio",
@@ -64,6 +65,11 @@ class Contestant:
 def quick() -> bool:
     """Return whether the run is to be short, and its times but a sign that all works."""
     return "--quick" in sys.argv[1:]
+
+
+def catalog() -> list[str]:
+    """Return the machines of the catalog that long runs take: those with one angle or none."""
+    return [name for name in pteron.catalog() if not pteron.load(name).platform.tilts]
 
 
 def random_states(robot: pteron.Manipulator, count: int, seed: int = 0) -> States:

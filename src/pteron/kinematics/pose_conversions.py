@@ -249,7 +249,7 @@ def velocity_of(
     known = robot.platform.angle_measures(poses) > ANGLES
     good = known & (beyond[0] <= size) & (beyond[1] <= size)
     if good.all():
-        return velocity
+        return np.asarray(velocity)
     if on_failure == "nan":
         return np.where(good[..., None], velocity, np.nan)
     index = tuple(int(i) for i in np.argwhere(~good)[0])
@@ -374,4 +374,4 @@ def _quaternion(matrix: Array) -> Array:
     largest = np.where(np.isnan(squares), 0.0, squares).argmax(axis=-1)
     row = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
     found = row / np.linalg.norm(row, axis=-1, keepdims=True)
-    return np.where(found[..., 3:] < 0.0, -found, found) + 0.0
+    return np.asarray(np.where(found[..., 3:] < 0.0, -found, found) + 0.0)

@@ -128,7 +128,8 @@ def _led(
     if not (wanted.limits and robot.platform.tilts and all(leg.limits for leg in robot.legs)):
         return np.empty((0, robot.freedom))
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
-    joints = rng.uniform(*_joint_limits(robot), (_BATCH, robot.joint_count))
+    least, most = _joint_limits(robot)
+    joints = rng.uniform(least, most, (_BATCH, robot.joint_count))
     for _ in range(_LEADING):
         poses = numeric(robot, "newton_step")(joints, poses)[0]
     poses = poses[((low <= poses) & (poses <= high)).all(axis=-1)]

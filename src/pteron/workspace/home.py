@@ -12,6 +12,7 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
@@ -223,7 +224,7 @@ def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
     return np.where(robot.platform.angular, radians, metres)
 
 
-def _refined(robot: Manipulator, start: Array, moved: Array | None = None) -> Array:
+def _refined(robot: Manipulator, start: Array, moved: NDArray[np.bool_] | None = None) -> Array:
     """Return the pose of a locally best margin, by moving those coordinates that are marked."""
     free = np.ones(len(start), dtype=bool) if moved is None else moved
 
