@@ -178,6 +178,7 @@ class UPS(LegKind):
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         (_, way), length = motion.links, self.limits[1]
+        assert way is not None
         return [
             *within_cone("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
             *within_cone("ram at the platform", self.platform_cone, turned, -way, length),
