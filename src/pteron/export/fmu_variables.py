@@ -215,9 +215,9 @@ def _wrench(platform: Platform) -> Iterator[tuple[str, str, str]]:
     """Yield each part of a wrench: its name, its unit and along what it does work."""
     if platform.tilts:
         for name in platform.wrench_columns:
-            kind, axis = name
-            unit, what = ("N", "{}") if kind == "f" else ("N.m", "a turn about {}")
-            yield name, unit, what.format(f"the base frame's {axis}")
+            axis = f"the base frame's {name[1]}"
+            force = name[0] == "f"
+            yield name, "N" if force else "N.m", axis if force else f"a turn about {axis}"
         return
     for name, unit in zip(platform.coordinates, platform.units, strict=True):
         yield name, "N.m" if unit == "rad" else "N", name

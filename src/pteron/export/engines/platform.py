@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pteron.bodies.inertia import SpatialInertia
+from pteron.bodies.inertia import PlanarInertia, SpatialInertia
 from pteron.bodies.vectors import cross
 from pteron.export.engines.inertia import (
     about_center,
@@ -132,6 +132,7 @@ def _shared(
     counts as a point of it.
     """
     own = platform.inertia
+    assert isinstance(own, PlanarInertia)  # what tilts has no parts
     mass, moment, inertia = own.mass, np.array(own.first_moment), own.inertia
     masses = [0.0] * len(places)
     for bar in platform.bars:
