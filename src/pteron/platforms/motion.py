@@ -121,6 +121,10 @@ class PlatformMotion(NamedTuple):
         return self.rotation._replace(hinge=point.position - fixed)
 
 
+PlatformMoments = Any
+"""`Moments`; `SpatialMoments` of a platform that tilts."""
+
+
 class PlatformEquations(ABC):
     """The equations of a platform, for one state."""
 
@@ -162,7 +166,7 @@ class PlatformEquations(ABC):
         """Return where the pose's angles stand."""
         return np.flatnonzero(are_angles(cls.coordinates)).tolist()
 
-    def moments(self, rows: Sequence[Expression]) -> Moments:
+    def moments(self, rows: Sequence[Expression]) -> PlatformMoments:
         """Return the platform's inertia from the rows (1, K) of its parameters."""
         return moments_of(self.kinds, list(rows))
 
@@ -173,11 +177,13 @@ class PlatformEquations(ABC):
         """Return the motion of the platform and of its points."""
 
     @abstractmethod
-    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
+    def needs(
+        self, motion: PlatformMotion, gravity: Expression, inertia: PlatformMoments
+    ) -> Expression:
         """Return the wrench (m, K) that the platform itself needs at P, -F_e."""
 
     def needed_wrench(
-        self, motion: PlatformMotion, gravity: Expression, inertia: Moments
+        self, motion: PlatformMotion, gravity: Expression, inertia: PlatformMoments
     ) -> tuple[Expression, Expression]:
         """Return the force and the moment about P, each (3, K), that the platform needs."""
         return needed_wrench(motion.body, inertia, gravity)
@@ -187,10 +193,10 @@ class PlatformEquations(ABC):
         return -self.needs(motion, gravity, self.moments(ca.vertsplit(ca.SX.eye(len(self.kinds)))))
 
     @abstractmethod
-    def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+    def mass_matrix(self, motion: PlatformMotion, inertia: PlatformMoments) -> Expression:
         """Return its mass matrix (m, m) with respect to the pose."""
 
-    def mass_moment(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+    def mass_moment(self, motion: PlatformMotion, inertia: PlatformMoments) -> Expression:
         """Return mass times centre of mass, (3, K), in the base frame."""
         return mass_moment(motion.body, inertia)
 
@@ -206,7 +212,7 @@ class PlatformEquations(ABC):
         """Return the unit forces and moments (k, 6) of planes about P; None: no planes hold it."""
         return None
 
-    def carrying(self, inertia: Moments, masses: Sequence[Expression]) -> Moments:
+    def carrying(self, inertia: PlatformMoments, masses: Sequence[Expression]) -> PlatformMoments:
         """Return the platform's inertia with masses (1, K), one a leg, on its points."""
         m, hx, hy, i = inertia
         for s, mass in zip(self.points, masses, strict=True):

@@ -165,6 +165,7 @@ class Tilting(PlatformEquations):
     def needed_wrench(
         self, motion: PlatformMotion, gravity: Expression, inertia: SpatialMoments
     ) -> tuple[Expression, Expression]:
+        assert motion.spatial is not None
         return needed_twist_wrench(motion.spatial, inertia, gravity)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: SpatialMoments) -> Expression:
