@@ -44,6 +44,13 @@ CODE: dict[str, tuple[str, ...]] = {
     "F5": (f"{_L}.slide.SlideEquations.needs", f"{_L}.crank.CrankEquations.needs"),
     "F6": (f"{_E}.virtual_work.needed_forces",),
     "F7": ("pteron.platforms.turning.Turning.motion", "pteron.platforms.sliding.Sliding.motion"),
+    # Platforms that tilt.
+    "O1": ("pteron.platforms.tilting.rotation",),
+    "O2": ("pteron.platforms.tilting.Tilting.motion",),
+    "O3": (f"{_L}.ups.UPSEquations.motion",),
+    "O4": (f"{_L}.ups.UPSEquations.needs",),
+    "O5": ("pteron.bodies.spatial.needed_twist_wrench",),
+    "O6": ("pteron.platforms.tripod.Tripod.motion",),
     # Direct position.
     "P1": ("pteron.closures.constant_rows.ConstantRows.poses",),
     "P2": (f"{_E}.closing.closure_rows",),
