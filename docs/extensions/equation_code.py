@@ -36,6 +36,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "B1": (f"{_R}.base_parameters", f"{_R}.base_regressor"),
     "B2": (f"{_R}.transfers.transfers", f"{_L}.prrr.PRRR.transfers"),
     "B3": (f"{_R}.transfers.transfers",),
+    "B4": ("pteron.bodies.inertia.SpatialInertia.shares_of_point",),
     # The family of legs.
     "F1": (f"{_L}.slide.SlideEquations.state",),
     "F2": (f"{_L}.crank.CrankEquations.state",),
