@@ -90,12 +90,12 @@ def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equil
     whole = machine.platform.needed_wrench(platform, machine.gravity, own)
     held = [(ca.horzcat(*sums), ca.vertcat(*whole))] if machine.platform.on_legs_alone else []
     held += [(row, -rest) for row, rest in shared]
-    presumed = [ca.vertcat(*part) for part in zip(*held, strict=True)]
     wanted = (ca.vertcat(*part) for part in zip(*driven, strict=True))
     return Equilibrium(
         ca.vertcat(ca.horzcat(*works), *(row for row, _ in released)),
         ca.vertcat(needs, *(-rest for _, rest in released)),
-        *(presumed or (ca.SX(0, 6 * count), ca.SX(0, 1))),
+        ca.vertcat(ca.SX(0, 6 * count), *(row for row, _ in held)),
+        ca.vertcat(ca.SX(0, 1), *(rest for _, rest in held)),
         tuple(legs),
         machine.platform.applied(platform, ca.SX.eye(machine.wrench_size)),
         *wanted,
