@@ -18,6 +18,8 @@ def machine(name):
     for known in (MECHANISMS, CATALOG):
         if name in known:
             return known[name]
+    if name in pteron.catalog():
+        return pteron.load(name)
     return pteron.load(Path(__file__).with_name("data") / f"{name}.toml")
 
 
@@ -61,8 +63,8 @@ def motion(robot, time, *, seed=0, period=4.0, harmonics=4, size=0.04, turn=0.3)
 
     # The same motion, whatever the instants are at which it is asked for.
     largest = np.abs(series(np.linspace(0.0, period, 1000))[0]).max(axis=0)
-    sizes = [turn if name == "phi" else size for name in robot.coordinates]
-    parts = series(time) * np.array(sizes) / largest
+    sizes = np.where(robot.platform.angular, turn, size)
+    parts = series(time) * sizes / largest
     parts[0] += home
     return parts
 

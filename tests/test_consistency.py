@@ -154,6 +154,43 @@ def test_values_of_no_real_bodies_are_told_with_their_distance(name):
         assert other @ np.linalg.solve(covariance, other) > result.distance**2
 
 
+def test_a_body_that_turns_about_any_axis_is_real_by_its_second_moments():
+    robot = pteron.load("ball-table")
+    base = base_of(robot)
+    values = base.values()
+    same = consistent_model(robot, base, values)
+    assert (same.feasible, same.distance) == (True, 0.0)
+    # A flat plate is at the border of what is real, and is kept just inside.
+    np.testing.assert_allclose(same.parameters, pteron.parameters(robot), rtol=0, atol=1e-4)
+    # The least of its three second moments is below zero: Ixx + Iyy < Izz.
+    bad = pteron.parameters(robot)
+    place = body_places(parameter_data(robot))["e"]
+    bad[place["Izz"]] = 1.1 * (bad[place["Ixx"]] + bad[place["Iyy"]])
+    assert "belongs to no real body" in real_bodies(robot, bad)[0]
+    wanted = base.grouping @ bad
+    spread = np.diag((1e-3 * usual_sizes(base, bad)) ** 2)
+    found = consistent_model(robot, base, wanted, spread, cad=None)
+    assert not found.feasible
+    assert found.distance > 5.0
+    assert "e" in found.at_border
+    assert real_bodies(robot, found.parameters) == ()
+    box = Bounds(boxes={"e": ((-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.1))})
+    held = consistent_model(robot, base, values, cad=None, bounds=box)
+    assert held.feasible
+    moments = np.array(
+        held.robot.platform.inertia.second_moments(
+            dict(
+                zip(
+                    held.robot.platform.inertia.kinds,
+                    held.robot.platform.inertia.values,
+                    strict=True,
+                )
+            )
+        )
+    )
+    assert moments[2, 2] <= 0.05 * moments[2, 3] + 0.005 * moments[3, 3] + 1e-9
+
+
 def test_without_a_covariance_the_distance_is_relative():
     base = base_of(QUADRUPTERON)
     values = base.values()

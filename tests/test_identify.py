@@ -61,14 +61,15 @@ FAMILY = ["linear-delta", "five-bar", "3-rrr", "delta-4", "par4"]
 @pytest.mark.parametrize(
     "name",
     gated(
-        ["quadrupteron", "delta", "mixed", "mixed, planar", *FAMILY],
-        ["delta", "mixed, planar", "delta-4"],
+        ["quadrupteron", "delta", "mixed", "mixed, planar", *FAMILY, "ball-table", "stewart"],
+        ["delta", "mixed, planar", "delta-4", "ball-table"],
     ),
 )
 def test_noise_free_logs_give_back_the_machine(name):
     robot = random_machine(0, "CCL") if name == "mixed, planar" else machine(name)
     size = 0.1 * np.mean([leg.size for leg in robot.legs if leg.size])
     how = {"size": size, "harmonics": 5, "duration": 6.0}
+    how |= {"turn": 0.15} if robot.platform.tilts else {}
     log, other = (log_of(as_built(robot), period=period, **how) for period in (3.0, 4.0))
     found = identify(robot, log, held_out=other)
     true = truth(identification_model(as_built(robot)))

@@ -9,6 +9,7 @@ from logs_of_motions import log_of, machine
 from mechanisms import NIGHTLY
 
 import pteron
+from pteron.bodies.inertia import SpatialInertia
 from pteron.errors import DataError
 from pteron.identification.estimators import huber
 from pteron.identification.logs import Log
@@ -18,7 +19,7 @@ from pteron.identification.payload import identify_payload
 from pteron.identification.signals import Processing
 from pteron.workspace import home_pose
 
-SOME = ("quadrupteron", "five-bar")
+SOME = ("quadrupteron", "five-bar", "ball-table")
 CENTRAL = Processing(derivatives="central")
 EACH = pytest.mark.parametrize(
     ("name", "processing"),
@@ -32,6 +33,7 @@ EACH = pytest.mark.parametrize(
 )
 
 LOAD = pteron.PlanarInertia(0.35, (0.006, -0.009), 0.0011)
+SOLID = SpatialInertia(0.15, (0.002, -0.003, 0.004), (0.0009, 0.0001, 0.00005, 0.0012, -0.0001, 0.0011))
 NOISE = (1e-6, 0.01)
 """Counts of an encoder, m, and noise of the forces relative to their size."""
 
@@ -57,17 +59,17 @@ def motion(name, seed):
         s, c = np.sin(w * time)[:, None], np.cos(w * time)[:, None]
         q += [a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c)]
     # The mixed machine and the Delta are four times as large as most others.
-    size = {"mixed": 0.2, "delta-4": 0.2, "five-bar": 0.02}.get(name, 0.05)
-    sizes = [0.3 if one == "phi" else size for one in robot.coordinates]
-    q *= np.array(sizes) / np.abs(q[0]).max(axis=0)
+    small = {"mixed": 0.2, "delta-4": 0.2, "five-bar": 0.02, "ball-table": 0.01}
+    sizes = np.where(robot.platform.angular, 0.3, small.get(name, 0.05))
+    q *= sizes / np.abs(q[0]).max(axis=0)
     q[0] += home_pose(robot)
     return time, q
 
 
 def laden(robot, load=LOAD):
     """Return the machine with a body fixed to its platform."""
-    values = np.add(robot.platform.inertia.values, load.values)
-    inertia = pteron.PlanarInertia(values[0], (values[1], values[2]), values[3])
+    load = SOLID if robot.platform.tilts else load
+    inertia = load.of_values(np.add(robot.platform.inertia.values, load.values).tolist())
     return replace(robot, platform=replace(robot.platform, inertia=inertia))
 
 
@@ -106,7 +108,7 @@ def halves(log):
 
 
 def expected(payload):
-    return np.array(LOAD.values)[: len(payload.names)]
+    return np.array((SOLID if "Izz_L" in payload.names else LOAD).values)[: len(payload.names)]
 
 
 @EACH
