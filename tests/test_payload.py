@@ -33,7 +33,9 @@ EACH = pytest.mark.parametrize(
 )
 
 LOAD = pteron.PlanarInertia(0.35, (0.006, -0.009), 0.0011)
-SOLID = SpatialInertia(0.15, (0.002, -0.003, 0.004), (0.0009, 0.0001, 0.00005, 0.0012, -0.0001, 0.0011))
+SOLID = SpatialInertia(
+    0.15, (0.002, -0.003, 0.004), (0.0009, 0.0001, 0.00005, 0.0012, -0.0001, 0.0011)
+)
 NOISE = (1e-6, 0.01)
 """Counts of an encoder, m, and noise of the forces relative to their size."""
 
