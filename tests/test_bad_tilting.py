@@ -10,7 +10,8 @@ from mechanisms import NIGHTLY, TILTED
 from test_cli import run
 
 import pteron
-from pteron.errors import ModelError, SingularPose, UnlikelyValue
+from pteron.errors import ModelError, SingularPose, UnlikelyValue, UnreachablePose
+from pteron.workspace import home_pose
 from pteron.workspace.machine_warnings import machine_warnings
 
 
@@ -106,3 +107,22 @@ def test_random_poses_are_those_that_a_hexapod_takes():
     assert ((low <= joints) & (joints <= high)).all()
     assert np.abs(poses[:, 3:]).max() < 0.5
     assert np.ptp(poses[:, 2]) > 0.01
+
+
+def test_planes_without_a_place_for_the_points_are_told():
+    table = TILTED["ball-table"]
+    legs = [
+        replace(leg, guide_point=tuple(0.15 * np.array(leg.direction) + leg.guide_point))
+        for leg in table.legs
+    ]
+    robot, pose = replace(table, legs=tuple(legs)), [0.12, 0.1, 0.1]
+    for call in (
+        lambda: pteron.inverse_kinematics(robot, pose),
+        lambda: pteron.twist(robot, pose, [1.0, 0.0, 0.0]),
+        lambda: pteron.pose_of(robot, [0.0, 0.0, 0.12], np.eye(3)),
+    ):
+        with pytest.raises(UnreachablePose, match="planes of the legs have no place"):
+            call()
+    assert np.isnan(pteron.twist(robot, pose, [1.0, 0.0, 0.0], on_failure="nan")).any()
+    with pytest.raises(ModelError, match="no place for the points of a level platform"):
+        home_pose(robot)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import tilting
-from mechanisms import CATALOG, gated
+from mechanisms import CATALOG, TILTED, gated
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -85,6 +85,15 @@ def test_what_a_motion_cannot_have_is_refused_with_by_how_much():
         pteron.pose_of("tripteron", [0.0, 0.0, 0.0], turned)
     with pytest.raises(DataError, match=r"rotation\[1\]: no rotation"):
         pteron.pose_of(wrist, at, [level, level[:, ::-1]])
+    table, ankle = TILTED["ball-table"], TILTED["ankle"]
+    with pytest.raises(
+        DataError, match=r"1T2R platform cannot have them: 0\.01 m from the nearest"
+    ):
+        pteron.pose_of(table, [0.0, 0.01, 0.12], np.eye(3))
+    with pytest.raises(DataError, match=r"1T2R platform cannot move so .*: 0\.3 m/s are"):
+        pteron.velocity_of(table, [0.12, 0.0, 0.0], [0.3, 0.0, 0.1, 0.0, 0.0, 0.0])
+    with pytest.raises(DataError, match=r"2R platform cannot have them: 0\.3 rad from"):
+        pteron.pose_of(ankle, [0.0, 0.0, 0.0], [0.0, 0.0, 0.3], form="tilt-torsion")
     found = pteron.pose_of(wrist, [at, at + 1.0], level, on_failure="nan")
     assert np.isfinite(found[0]).all()
     assert np.isnan(found[1]).all()

@@ -75,7 +75,7 @@ class UnreachablePose(PteronError):
     leg : int
         The leg that fails, counted from 1 as in the paper; 0 where no single leg does.
     shortfall : float
-        By how many metres it misses the platform point.
+        By how many metres it misses the platform point; 0 where no single leg does.
     index : tuple of int
         Which element of the batch; empty for a single pose.
     millimetres : bool

@@ -145,6 +145,17 @@ def singular_angles(
     )
 
 
+def no_place(index: tuple[int, ...], many: str = "") -> UnreachablePose:
+    """Return what is said where the planes of a tripod's legs have no place for its points."""
+    return UnreachablePose(
+        f"{place('pose', index)}: the planes of the legs have no place for the platform's points "
+        f"at this roll and pitch; move the pose towards level, or the planes nearer to P{many}",
+        leg=0,
+        shortfall=0.0,
+        index=index,
+    )
+
+
 def place(name: str, index: tuple[int, ...]) -> str:
     """Return where an element of a batch is: "pose[3]", or "pose" where there is but one."""
     return f"{name}[{', '.join(map(str, index))}]" if index else name
@@ -173,6 +184,8 @@ def _bad_pose(
     if "rows" in needs:
         rest = [leg.row_is_constant for leg in closure_of(robot).legs]
         type_i[rest] = 1.0
+    if np.isnan(margin).any():
+        return no_place(index, many)
     if np.isnan(type_i).any():
         i = int(np.isnan(type_i).argmax())
         leg, shortfall = robot.legs[i], max(-float(margin[i]), 0.0)

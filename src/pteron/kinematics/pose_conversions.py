@@ -14,7 +14,14 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.functions import ANGLES
-from pteron.kinematics.evaluate import checked, evaluated, expect_choice, place, singular_angles
+from pteron.kinematics.evaluate import (
+    checked,
+    evaluated,
+    expect_choice,
+    no_place,
+    place,
+    singular_angles,
+)
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms.nearest_pose import nearest_pose
 from pteron.shapes import Matrices, OnFailure, PerCoordinate, PoseLike, Vectors
@@ -158,6 +165,8 @@ def pose_of(
     numbers = np.isfinite(at[index]).all() and np.isfinite(matrix[index]).all()
     if not numbers:
         raise DataError(f"{place('position', index)}, rotation: finite numbers expected")
+    if np.isnan(away[index]):
+        raise no_place(index)
     if not skewed[index] <= _ROUNDING:
         raise DataError(
             f"{place('rotation', index)}: no rotation: its columns are no unit vectors at right "
@@ -190,13 +199,23 @@ def twist(
     array, shape (..., 6)
         (v, omega) in the base frame, m/s and rad/s.
 
+    Raises
+    ------
+    UnreachablePose
+        If a tripod's planes do not allow a pose.
+
     Examples
     --------
     >>> import pteron
     >>> pteron.twist("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5]) + 0.0
     array([0.1, 0. , 0. , 0. , 0. , 0.5])
     """
-    return evaluated(robot, "twist", on_failure, pose, velocity)
+    found = evaluated(robot, "twist", on_failure, pose, velocity)
+    lost = np.isnan(found).any(axis=-1)
+    if on_failure == "raise" and lost.any():
+        index = tuple(int(i) for i in np.argwhere(lost)[0])
+        raise no_place(index)
+    return found
 
 
 def velocity_of(
@@ -255,6 +274,8 @@ def velocity_of(
     index = tuple(int(i) for i in np.argwhere(~good)[0])
     if not np.isfinite(np.broadcast_to(given, (*good.shape, 6))[index]).all():
         raise DataError(f"{place('twist', index)}: finite numbers expected")
+    if np.isnan(velocity[index]).any() and np.isnan(beyond[0][index]):
+        raise no_place(index)
     if not known[index]:
         raise singular_angles(robot, poses[index], index)
     raise DataError(
