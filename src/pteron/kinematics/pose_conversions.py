@@ -210,7 +210,7 @@ def twist(
     >>> pteron.twist("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5]) + 0.0
     array([0.1, 0. , 0. , 0. , 0. , 0.5])
     """
-    found = evaluated(robot, "twist", on_failure, pose, velocity)
+    found: Array = evaluated(robot, "twist", on_failure, pose, velocity)
     lost = np.isnan(found).any(axis=-1)
     if on_failure == "raise" and lost.any():
         index = tuple(int(i) for i in np.argwhere(lost)[0])
