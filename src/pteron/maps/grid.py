@@ -257,8 +257,9 @@ def pose_grid(
     if held is None:
         # What varies needs no more than where to begin to look for the reach.
         pose = home_pose(robot) if center is None else checked_one(robot, center, "center").copy()
-        lengths, turns = robot.platform.lengths, robot.platform.angles
-        varying = set(spans or (lengths if len(lengths) > 1 else turns)[:2])
+        platform = robot.platform
+        pair = platform.lengths if len(platform.lengths) > 1 else platform.angles
+        varying = set(spans or pair[:2])
         fixed = {n: float(v) for n, v in zip(names, pose, strict=True) if n not in varying}
     for name, value in fixed.items():
         pose[names.index(name)] = value
