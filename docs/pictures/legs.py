@@ -404,7 +404,9 @@ def ups() -> Sheet:
 
 def rupu() -> Sheet:
     """Draw a telescopic shaft."""
-    leg = RUPU((0.16, 0, 0.34), (0.0, 0.0, 0.0), _ROD, _ROD).under(np.eye(3).tolist())
+    leg = RUPU((0.16, 0, 0.34), (0.0, 0.0, 0.0), _ROD, _ROD).under(
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    )
     p, k = np.array([0.36, 0.02, 0.02]), np.array([0.0, 0.0, 1.0])
     posed = Posed(leg, p, 0.9)
     sheet = Sheet(-60.0, 24.0, (5.6, 5.0))

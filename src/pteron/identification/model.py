@@ -141,8 +141,8 @@ class Model:
         if self.terms.payload:
             for kind in self.robot.platform.inertia.kinds:
                 letter, axes = ("m\u03b3", kind[2:]) if kind[1:2] == "g" else (kind[0], kind[1:])
-                index = ",".join(part for part in (axes, "L") if part)
-                found.append(Term("payload", f"{kind}_L", letter, index, unit_of(kind)))
+                place = ",".join(part for part in (axes, "L") if part)
+                found.append(Term("payload", f"{kind}_L", letter, place, unit_of(kind)))
         return tuple(found)
 
     @property

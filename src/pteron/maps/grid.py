@@ -269,13 +269,13 @@ def pose_grid(
     count = _POINTS[len(varying_names)] if points is None else points
     free = [name for name in varying_names if name not in spans]
     angles = [name for name in free if name in robot.platform.angles]
-    lengths = [name for name in free if name not in angles]
+    moved = [name for name in free if name not in angles]
     most = pi / 2.0 if robot.platform.tilts else pi
     spans |= {name: robot.platform.angle_limits.get(name, (-most, most)) for name in angles}
-    if lengths:
+    if moved:
         box = _box(robot, pose, spans)
         box += rim * np.array([-1.0, 1.0])[:, None] * np.ptp(box, axis=0)
-        spans |= {name: tuple(box[:, names.index(name)].tolist()) for name in lengths}
+        spans |= {name: tuple(box[:, names.index(name)].tolist()) for name in moved}
     axes = []
     for name in varying_names:
         least, greatest, *own = spans[name]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import signal  # type: ignore[import-untyped]
@@ -172,11 +173,11 @@ def _filtered(time: Array, given: Array, washout: Washout) -> Array:
         tilt = np.zeros(len(time))
         for k, most in enumerate(steps):
             tilt[k + 1] = tilt[k] + np.clip(wanted[k + 1] - tilt[k], -most, most)
-        turned[angle] = turned[angle] + _shown(time, tilt, [1.0], np.polymul(*[[1 / s, 1.0]] * 2))
+        turned[angle] += _shown(time, tilt, [1.0], [1 / s**2, 2 / s, 1.0])
     return np.moveaxis(np.array([*moved, *turned]), 0, -1)
 
 
-def _shown(time: Array, value: Array, above: Sequence[float], below: Array) -> Array:
+def _shown(time: Array, value: Array, above: Sequence[float], below: Any) -> Array:
     """Return a filter's output and two derivatives (3, T), of a value that was 0 before."""
     return np.array(
         [

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
@@ -149,14 +149,15 @@ class Cycle:
         )
 
     @property
-    def _across(self) -> Array:
+    def _across(self) -> NDArray[np.bool_]:
         """Whether each angle turns on the way across: the last one."""
-        return np.arange(len(self.platform.angles)) == len(self.platform.angles) - 1
+        count = len(self.platform.angles)
+        return np.asarray(np.arange(count) == count - 1)
 
     @property
-    def _lifted(self) -> Array:
+    def _lifted(self) -> NDArray[np.bool_]:
         """Whether each angle rises and sinks: the others, where no lengths go across."""
-        return ~self._across & (len(self.platform.lengths) < 2)
+        return np.asarray(~self._across & (len(self.platform.lengths) < 2))
 
     def acceleration(self, tau: Array) -> Array:
         """Return the tool's acceleration (T, k) by tau, whatever moves it.
