@@ -14,6 +14,7 @@ from pteron.reduction import model_forms
 _MACHINES = (
     *("quadrupteron", "quadrupteron-oblique", "tripteron", "tripteron-oblique"),
     *("delta", "delta-4", "linear-delta", "par4", "five-bar", "3-rrr"),
+    *("stewart", "ball-table"),
 )
 
 

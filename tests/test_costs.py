@@ -10,9 +10,9 @@ from pteron.reduction import FORMS, model_forms
 from pteron.report import table1
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "delta"])
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "wrist"])
 def test_every_form_gives_the_same_forces(name):
-    robot = CATALOG[name]
+    robot = pteron.load(name)
     base = pteron.base_parameters(robot)
     motion = states(robot, 40)
     forces = pteron.inverse_dynamics(robot, *motion)
@@ -20,6 +20,11 @@ def test_every_form_gives_the_same_forces(name):
     assert set(kernels) == {(form, which) for form in FORMS for which in ("complete", "reduced")}
     for kernel in kernels.values():
         assert relative_error(kernel(*motion), forces) < 1e-11
+
+
+def test_operations_of_a_hexapod():
+    """Eq. (15) as it is written takes 6064."""
+    assert pteron.compile("stewart", "inverse_dynamics", grade="parametric").operations <= 1600
 
 
 def test_operations_of_the_quadrupteron():

@@ -62,7 +62,7 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
     x, dx, ddx = (ca.SX.sym(port.name, *port.shape) for port in ports)
     state = machine.state(x, dx, ddx)
     bracket = generalized_regressor(machine, state)
-    unit = ca.SX.eye(machine.freedom)
+    unit = state.platform.quasi_forces(ca.SX.eye(machine.freedom))
     inverse = -machine.closure.forces(unit, state.platform, state.legs)
     for form, build in _GRAPHS.items():
         for name, (selection, numbers) in sets.items():
