@@ -42,8 +42,14 @@ _ALIKE = 1e-6
 _REAL = 1e-3
 """Greatest imaginary part of a z, |z| = 1, from which Newton's steps may lead to a real one."""
 
-_POLISHING = 5
-"""Calls that polish a real pose, two of Newton's steps each."""
+_REFINING = 2
+"""Pairs of Newton's steps at the end of a path."""
+
+_CONVERGED = 1e-7
+"""Greatest last one: next to another pose the end of a path may not be told from the other's."""
+
+_POLISHING = 8
+"""Newton's steps of a real pose."""
 
 _ROUNDING = 2e-14
 """Greatest miss, as a share of its terms, of a pose that is no farther proved: two that meet."""
@@ -100,10 +106,9 @@ def _real_poses(known: Generic, machines: Array, first: int) -> tuple[NDArray[np
     for trial in range(_TRIALS):
         turns = _unit_quaternion(rng), _unit_quaternion(rng)
         turned = _turned(machines[left], *turns)
-        ends, arrived = followed(known, turned)
+        ends, arrived, converged = followed(known, turned)
         own, real = _candidates(ends, arrived)
-        real = _polished(known, turned[own], real)
-        real = _turned_back(real, *turns)
+        real = _polished(known.closed, machines[left[own]], _turned_back(real, *turns))
         good, radius = _proved(known.closed, machines[left[own]], real)
         counts = np.bincount(which, minlength=len(machines))
         which = np.concatenate([which, left[own[good]]])
@@ -115,7 +120,7 @@ def _real_poses(known: Generic, machines: Array, first: int) -> tuple[NDArray[np
         which, poses, certain = which[order], poses[order], certain[order]
         kept = ~_found_twice(which, poses, certain)
         which, poses, certain = which[kept], poses[kept], certain[kept]
-        missing = ~(arrived.all(axis=-1) & _all_differ(ends))
+        missing = ~(converged.all(axis=-1) & _all_differ(ends))
         if trial:  # paths that are always lost lead nowhere
             missing &= (np.bincount(which, minlength=len(machines)) > counts)[left]
         left = left[missing]
@@ -129,19 +134,30 @@ def _step(known: Generic) -> Kernel:
     return path_kernel(known.closed, (tuple(machine.real.tolist()), tuple(machine.imag.tolist())))
 
 
-def followed(known: Generic, targets: Array) -> tuple[Complex, NDArray[np.bool_]]:
-    """Return the ends z (B, N, d) of the paths to machines (B, k, 7), and whether they arrived."""
+def followed(
+    known: Generic, targets: Array
+) -> tuple[Complex, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the ends z (B, N, d) of the paths to machines (B, k, 7).
+
+    With them come whether each has arrived, and whether Newton's steps then converge.
+    """
     step = _step(known)
     count, d = known.poses.shape
     target = np.repeat(targets.reshape(len(targets), 7 * known.closed.equations), count, axis=0)
     z = np.tile(_parts(known.poses), (len(targets), 1))
     at, arrived = _arrived(step, target, z, d)
-    return _whole(at, d).reshape(-1, count, d), arrived.reshape(-1, count)
+    ends, converged = _refined(step, target, at)
+    shape = -1, count
+    return (
+        _whole(ends, d).reshape(*shape, d),
+        arrived.reshape(shape),
+        (arrived & converged).reshape(shape),
+    )
 
 
 def _arrived(step: Kernel, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
     """Return the ends (K, 2 d) of paths from z to machines, real parts first."""
-    at = _standing(z, d)
+    at = _standing(z)
     at, _ = step(at, target)  # for dz/dt
     at[:, 4 * d : 8 * d] = at[:, : 4 * d]
     at[:, 4 * d : 6 * d] -= _GONE * at[:, 2 * d : 4 * d]
@@ -161,11 +177,11 @@ def _arrived(step: Kernel, target: Array, z: Array, d: int) -> tuple[Array, NDAr
     return ends, arrived
 
 
-def _standing(z: Array, d: int) -> Array:
+def _standing(z: Array) -> Array:
     """Return paths that stay at z (K, 2 d)."""
-    at = np.zeros((len(z), 8 * d + 3))
-    at[:, : 2 * d] = z
-    at[:, 4 * d : 6 * d] = z
+    width = z.shape[1]
+    at = np.zeros((len(z), 4 * width + 3))
+    at[:, :width] = at[:, 2 * width : 3 * width] = z
     at[:, -3] = 1.0
     return at
 
@@ -196,15 +212,31 @@ def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.i
     return np.nonzero(real)[0], found / np.linalg.norm(found, axis=-1, keepdims=True)
 
 
-def _polished(known: Generic, machines: Array, z: Array) -> Array:
-    """Return real poses z (K, d) after Newton's steps."""
-    d = z.shape[1]
-    step, target = _step(known), machines.reshape(len(machines), 7 * known.closed.equations)
-    for _ in range(_POLISHING):
-        at = _standing(_parts(z.astype(complex)), d)
+def _refined(step: Kernel, target: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return ends z (K, 2 d) of paths after Newton's steps, and whether these have converged."""
+    for _ in range(_REFINING):
+        at = _standing(z)
         at[:, -2] = 1.0
-        z = step(at, target)[0][:, :d]
-    return z
+        at, left = step(at, target)
+        z = at[:, : z.shape[1]]
+    return z, left <= _CONVERGED
+
+
+def _polished(closed: Closed, machines: Array, z: Array) -> Array:
+    """Return real poses z (K, d) after those of Newton's steps that lessen what they miss."""
+    numbers = machines.reshape(len(z), 7 * closed.equations)
+    best, least = z, np.full(len(z), np.inf)
+    for _ in range(_POLISHING):
+        rows, missed = rows_kernel(closed)(z, numbers)
+        size = np.linalg.norm(missed, axis=-1)
+        better = size < least
+        best, least = np.where(better[:, None], z, best), np.where(better, size, least)
+        inverse = _inverted(np.concatenate([rows, z[:, None]], axis=1))
+        with np.errstate(all="ignore"):
+            z = z - (inverse[..., :-1] @ missed[..., None])[..., 0]
+            z = z / np.linalg.norm(z, axis=-1, keepdims=True)
+        z = np.where(np.isfinite(z).all(axis=-1, keepdims=True), z, best)
+    return best
 
 
 def _proved(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
