@@ -121,3 +121,70 @@ def test_dietmaiers_machine_has_forty_poses():
     assert counts(poses) == 40
     back = pteron.inverse_kinematics(hexapod(BASE, TOP), poses)
     np.testing.assert_allclose(back, np.broadcast_to(LENGTHS, back.shape), atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["general", "plane", "6-3", "turned"])
+def test_every_regular_pose_is_found(kind):
+    """Real poses come in pairs, and no more than the machine may have."""
+    rng = np.random.default_rng(4)
+    base, top = rng.normal(size=(6, 3)), 0.6 * rng.normal(size=(6, 3))
+    if kind == "plane":
+        base[:, 2] = top[:, 2] = 0.0
+    if kind == "6-3":
+        top[1::2] = top[::2]
+    pose = np.concatenate([rng.normal(size=3), rng.uniform(-1.0, 1.0, 3)])
+    robot = hexapod(base.tolist(), top.tolist())
+    if kind == "turned":
+        turn = tilting.rotation(rng)
+        still = robot
+        robot = pteron.turned(robot, turn)
+        joints = pteron.inverse_kinematics(still, pose)
+        before = counts(pteron.direct_kinematics(still, joints))
+        assert counts(pteron.direct_kinematics(robot, joints)) == before
+        return
+    poses = pteron.direct_kinematics(robot, pteron.inverse_kinematics(robot, pose))
+    count = counts(poses)
+    assert count % 2 == 0
+    assert 2 <= count <= (16 if kind == "6-3" else 40)
+    assert np.nanmin(same(poses, pose, robot.platform.angular)) < 1e-10
+    if kind == "plane":  # each pose has its mirror image
+        np.testing.assert_allclose(
+            np.sort(poses[:count, 2]), np.sort(-poses[:count, 2]), atol=1e-10
+        )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_joints_that_no_pose_has(name):
+    robot, x = drawn(name)
+    joints = pteron.inverse_kinematics(robot, x[0])
+    none = joints.copy()
+    none[0] = 6.0 * joints[0] if robot.legs[0].joint.unit == "m" else np.nan
+    poses = pteron.direct_kinematics(robot, np.stack([none, joints]))
+    assert np.isnan(poses[0]).all()
+    assert counts(poses[1]) >= 1
+    empty = pteron.direct_kinematics(robot, np.empty((0, len(robot.legs))))
+    assert empty.shape == (0, *poses.shape[1:])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_motion_keeps_its_mode(name):
+    robot, x = drawn(name)
+    way = x[0] + np.linspace(0.0, 0.05, 12)[:, None] * np.ones(len(x[0]))
+    joints = pteron.inverse_kinematics(robot, way)
+    np.testing.assert_allclose(pteron.follow(robot, joints, way[0]), way, atol=1e-10)
+    elbows = [leg.elbow for leg in robot.legs]
+    assert (pteron.working_mode(robot, way, joints) == elbows).all()
+
+
+def test_two_poses_that_all_but_meet_are_told_apart():
+    """Along joints that lead to a singular pose both modes are found until they meet."""
+    robot, x = drawn("3R")
+    joints = pteron.inverse_kinematics(robot, x[0])
+    before = counts(pteron.direct_kinematics(robot, joints))
+    share = np.linspace(1.0, 2.0, 2001)[:, None]
+    found = counts(
+        pteron.direct_kinematics(robot, joints * np.where([True, False, False], share, 1.0))
+    )
+    assert before == found[0]
+    assert (found % 2 == 0).all()  # none is lost before it meets another
+    assert len(set(found.tolist())) > 1
