@@ -39,6 +39,7 @@ _SCRIPTS = {
     "Exported FMUs": "fmu.py",
     "Certified workspaces": "certified.py",
     "Nearest singular poses": "nearest_singularities.py",
+    "All poses of hexapods": "direct_position.py",
     "Singular machines and poses": "singular.py",
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",

@@ -57,6 +57,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "P2": (f"{_E}.closing.closure_rows",),
     "P3": (f"{_E}.closing.closure_rows", "pteron.kinematics.assembly.every_pose"),
     "P4": (f"{_E}.closing.newton_step", f"{_E}.closing.direct_step"),
+    "P5": (f"{_E}.pose_paths.stepped", "pteron.kinematics.tilting_assembly.tilting_poses"),
     # Singularities.
     "T1": ("pteron.closures.closure.Closure.measure",),
     "T2": ("pteron.closures.constant_rows.ConstantRows", "pteron.singular_orientations"),

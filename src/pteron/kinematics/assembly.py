@@ -1,5 +1,7 @@
 """Every pose of given joint coordinates, where there is no closed form: machines that turn.
 
+Those of platforms that tilt are another page's, `tilting_assembly`. About one axis:
+
 With their joints held, n legs keep points of the platform on spheres, circles or planes, in n - 1
 dimensions. Moved by what phi makes of the points' offsets these meet at P. A sphere, circle or
 plane is a row s = (w, m, h) with w v.v + m.v + h = 0, and <s, s'> = m.m' - 2 (w h' + w' h) is the
@@ -79,7 +81,7 @@ _ALIKE = 1e-9
 def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
     """Return all poses (..., most, m) of joint coordinates (..., n), NaN last.
 
-    They are ordered by phi, z, y and x.
+    They are ordered by phi, z, y and x: the coordinates from the last to the first.
     """
     flat = joints.reshape(-1, joints.shape[-1])
     parts = [

@@ -35,7 +35,9 @@ def direct_kinematics(
     With the joints held, legs keep points of the platform on planes (P-R-R-R), spheres (the ends of
     rods) or circles (planar legs); the poses are where these meet. They are found in closed form,
     but for platforms with an angle on legs with rods or planar legs: there as the zeros of a
-    polynomial whose degree is k, polished by Newton's method to 1e-14 or so.
+    polynomial whose degree is k, polished by Newton's method to 1e-14 or so. Those of platforms
+    that tilt lie at the ends of k paths from a machine whose poses are known: all of them, each
+    proved, or next to a singularity missed by rounding alone.
 
     Parameters
     ----------
@@ -58,9 +60,12 @@ def direct_kinematics(
         for one assembly mode throughout. Any others: in the order of phi, z, y and x, NaN last,
         with k = 2 where the platform has no angle, or where a leg holds it (1 with P-R-R-R legs
         alone); else k = 8 for four legs and 6 for three, but 4 where all but one are P-R-R-R; where
-        the platform slides k = 2 for each leg of another kind. A row is NaN where the closures have
-        no further real solution, or where a leg does not reach the pose that solves them. phi lies
-        in (-pi, pi] unless a leg holds it or the platform slides.
+        the platform slides k = 2 for each leg of another kind. Platforms that tilt: k = 40 for six
+        legs, 16 for a tripod, 8 about a centre, in the order of the coordinates from the last to
+        the first; of a tripod with the yaw on the side that it has when level. A row is NaN where
+        the closures have no further real solution, or where a leg does not reach the pose that
+        solves them. Angles lie in (-pi, pi] unless a leg holds phi or the platform slides; the
+        middle one of roll, pitch and yaw, or of rx, ry and rz, within +-pi/2.
 
     Raises
     ------

@@ -6,6 +6,7 @@ closures, a machine in general complex numbers and its poses; `generic_machines`
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -14,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.equations.pose_paths import Closed
-from pteron.kernels import Array, Kernel
+from pteron.kernels import Array
 from pteron.kernels.path_programs import path_kernel, rows_kernel
 
 Complex = NDArray[np.complex128]
 
-_FILE = Path(__file__).with_name("generic_machines.npz")
+FILE = Path(__file__).with_name("generic_machines.npz")
 
 _PATHS = 4096
 """Paths followed at a time."""
@@ -77,9 +78,13 @@ class Generic(NamedTuple):
 @lru_cache
 def generic(closed: Closed) -> Generic:
     """Return what is kept of a kind of closures."""
-    name = "-".join(map(str, (closed.spheres, closed.planes, int(closed.moves))))
-    with np.load(_FILE) as file:
-        return Generic(closed, file[f"machine {name}"], file[f"poses {name}"])
+    with np.load(FILE) as file:
+        return Generic(closed, *(file[f"{part} {key_of(closed)}"] for part in ("machine", "poses")))
+
+
+def key_of(closed: Closed) -> str:
+    """Return what stands for a kind of closures in the file."""
+    return "-".join(str(int(part)) for part in closed)
 
 
 def real_poses(closed: Closed, machines: Array) -> tuple[NDArray[np.int64], Array]:
@@ -129,21 +134,33 @@ def _real_poses(known: Generic, machines: Array, first: int) -> tuple[NDArray[np
     return which + first, poses
 
 
-def _step(known: Generic) -> Kernel:
+_Step = Callable[[Array, Array], tuple[Array, Array]]
+
+
+def _step(known: Generic) -> _Step:
     machine = known.machine
     return path_kernel(known.closed, (tuple(machine.real.tolist()), tuple(machine.imag.tolist())))
 
 
+def _any_step(known: Generic) -> _Step:
+    """Return the step towards machines in complex numbers."""
+    kernel, start = path_kernel(known.closed, None), _parts(known.machine)
+    return lambda at, target: kernel(at, start, target)
+
+
 def followed(
-    known: Generic, targets: Array
+    known: Generic, targets: Array | Complex
 ) -> tuple[Complex, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the ends z (B, N, d) of the paths to machines (B, k, 7).
 
     With them come whether each has arrived, and whether Newton's steps then converge.
     """
-    step = _step(known)
     count, d = known.poses.shape
-    target = np.repeat(targets.reshape(len(targets), 7 * known.closed.equations), count, axis=0)
+    ends = targets.reshape(len(targets), 7 * known.closed.equations)
+    step = _step(known)
+    if np.iscomplexobj(ends):
+        step, ends = _any_step(known), _parts(np.asarray(ends, dtype=complex))
+    target = np.repeat(ends, count, axis=0)
     z = np.tile(_parts(known.poses), (len(targets), 1))
     at, arrived = _arrived(step, target, z, d)
     ends, converged = _refined(step, target, at)
@@ -155,7 +172,7 @@ def followed(
     )
 
 
-def _arrived(step: Kernel, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
+def _arrived(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
     """Return the ends (K, 2 d) of paths from z to machines, real parts first."""
     at = _standing(z)
     at, _ = step(at, target)  # for dz/dt
@@ -198,7 +215,7 @@ def _all_differ(ends: Complex) -> NDArray[np.bool_]:
     """Return whether all of z (B, N, d) differ; where they do all poses are found."""
     alike = np.abs(ends.conj() @ np.swapaxes(ends, -1, -2)) ** 2
     pairs = np.triu(np.ones(alike.shape[1:], dtype=bool), 1)
-    return ~((alike > 1.0 - _ALIKE**2) & pairs).any(axis=(-2, -1))
+    return np.asarray(~((alike > 1.0 - _ALIKE**2) & pairs).any(axis=(-2, -1)))
 
 
 def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
@@ -212,7 +229,7 @@ def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.i
     return np.nonzero(real)[0], found / np.linalg.norm(found, axis=-1, keepdims=True)
 
 
-def _refined(step: Kernel, target: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _refined(step: _Step, target: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return ends z (K, 2 d) of paths after Newton's steps, and whether these have converged."""
     for _ in range(_REFINING):
         at = _standing(z)
@@ -300,7 +317,7 @@ def _turned(machines: Array, base: Array, platform: Array) -> Array:
     """Return machines (B, k, 7) in other frames."""
     turned = machines.copy()
     for columns, q in ((slice(0, 3), base), (slice(3, 6), platform)):
-        turned[..., columns] = machines[..., columns] @ _rotation(q).T
+        turned[..., columns] = machines[..., columns] @ rotation(q).T
     return turned
 
 
@@ -325,7 +342,7 @@ def _right(q: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _rotation(x: Array) -> Array:
+def rotation(x: Array) -> Array:
     """Return the rotation (..., 3, 3) of a quaternion, of any length."""
     conjugate = x * [1.0, -1.0, -1.0, -1.0]
     whole = _left(x) @ _right(conjugate) / (x * x).sum(axis=-1)[..., None, None]
@@ -340,4 +357,4 @@ def placed(z: Array) -> tuple[Array, Array]:
         conjugate = x * [1.0, -1.0, -1.0, -1.0]
         product = (_right(conjugate) @ z[:, 4:, None])[..., 0]
         place = 2.0 * product[:, 1:] / square
-    return place, _rotation(x)
+    return place, rotation(x)

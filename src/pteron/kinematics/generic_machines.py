@@ -1,0 +1,87 @@
+"""Make the machines in general complex numbers, with all their poses, that paths start from.
+
+`python -m pteron.kinematics.generic_machines` writes `generic_machines.npz` anew; the library only
+reads it. From a machine that has a random pose paths lead round by other random machines and back,
+each time to poses that may be others (monodromy), until as many are known as there are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.equations.pose_paths import Closed
+from pteron.kernels import Array
+from pteron.kinematics.pose_paths import FILE, Complex, Generic, followed, key_of, rotation
+
+_ALL = {Closed(3, 0, False): 8, Closed(3, 3, True): 16, Closed(6, 0, True): 40}
+"""How many poses machines of each kind have."""
+
+_COMPLEX = 0.25
+"""Size of the imaginary parts, and of what is added to the real ones, of numbers about 0.6."""
+
+_APART = 1e-5
+"""Sine of the angle between z that are two poses."""
+
+
+def random_machine(closed: Closed, rng: np.random.Generator) -> tuple[Complex, Complex]:
+    """Return a machine (7 k,) and one pose of it."""
+    x = rng.normal(size=4)
+    y = rng.normal(size=4) if closed.moves else np.zeros(4)
+    x, y = x / np.linalg.norm(x), 0.3 * (y - x * (x @ y) / (x @ x))
+    conjugate = x * [1.0, -1.0, -1.0, -1.0]
+    place = 2.0 * _product(y, conjugate)[1:]
+    a, b = (
+        0.6 * rng.normal(size=(closed.equations, 3)) + _COMPLEX * _drawn(rng, closed.equations)
+        for _ in range(2)
+    )
+    if closed.moves and not closed.planes:
+        a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    if closed.planes:  # of the same points
+        b[closed.spheres :] = b[: closed.planes]
+    c = place + b @ rotation(x).T
+    r = np.where(
+        np.arange(closed.equations) < closed.spheres, ((c - a) ** 2).sum(-1), (a * c).sum(-1)
+    )
+    pose = np.concatenate([x, y]) if closed.moves else x
+    machine = np.column_stack([a, b, r]).ravel()
+    return machine, (pose / np.linalg.norm(pose)).astype(complex)
+
+
+def known_machine(closed: Closed, count: int, rng: np.random.Generator) -> Generic:
+    """Return a machine with as many poses."""
+    machine, pose = random_machine(closed, rng)
+    found = pose[None]
+    while len(found) < count:
+        ends, here = found, machine
+        for there in (*(random_machine(closed, rng)[0] for _ in range(2)), machine):
+            ends, _, converged = followed(Generic(closed, here, ends), there[None])
+            ends, here = ends[0][converged[0]], there
+        for z in ends:
+            alike = np.abs(found.conj() @ z) ** 2
+            if (alike < 1.0 - _APART**2).all():
+                found = np.concatenate([found, z[None]])
+    return Generic(closed, machine, found)
+
+
+def _drawn(rng: np.random.Generator, count: int) -> Complex:
+    return np.asarray(rng.normal(size=(count, 3)) + 1j * rng.normal(size=(count, 3)))
+
+
+def _product(x: Array, y: Array) -> Array:
+    (a, u), (b, v) = (x[0], x[1:]), (y[0], y[1:])
+    return np.append(a * b - u @ v, a * v + b * u + np.cross(u, v))
+
+
+def main() -> None:
+    """Write the file."""
+    rng = np.random.default_rng(0)
+    parts: dict[str, Complex] = {}
+    for closed, count in _ALL.items():
+        known = known_machine(closed, count, rng)
+        parts |= {f"machine {key_of(closed)}": known.machine}
+        parts |= {f"poses {key_of(closed)}": known.poses}
+    np.savez(FILE, **parts)
+
+
+if __name__ == "__main__":
+    main()
