@@ -54,8 +54,8 @@ COORDINATES: dict[str, Coordinate] = {
     "rx": Coordinate("rad", "rx", "mx"),
     "ry": Coordinate("rad", "ry", "my"),
     "rz": Coordinate("rad", "rz", "mz"),
-    "alpha": Coordinate("rad", "alpha", "ma"),
-    "beta": Coordinate("rad", "beta", "mb"),
+    "alpha": Coordinate("rad", "\u03b1", "ma"),
+    "beta": Coordinate("rad", "\u03b2", "mb"),
 }
 """Every coordinate that some platform has, by name."""
 
