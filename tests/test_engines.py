@@ -77,6 +77,21 @@ def test_forces_through_the_closure(case, engine):
     assert relative_error(forces, pteron.inverse_dynamics(robot, *motion)) < 1e-8
 
 
+@mechanisms.NIGHTLY
+@pytest.mark.parametrize("name", EACH)
+def test_ten_random_machines_of_each_platform_that_tilts_with_each_leg(name):
+    motion, kind = name.split()
+    for seed in range(10):
+        angles = "xyz" if seed % 2 and "3R" in motion else "rpy"
+        robot, home = tilting.machine(motion, (kind,), seed, angles)
+        states = tilting.states(robot, home, 200, seed)
+        assert len(states[0]) > 100
+        forces, jacobian, gap = trees.projected(robot, trees.MuJoCo(robot, home), *states)
+        assert gap < 1e-13
+        assert relative_error(jacobian, pteron.jacobian(robot, states[0])) < 1e-10
+        assert relative_error(forces, pteron.inverse_dynamics(robot, *states)) < 1e-8
+
+
 def test_working_modes_and_turned_machines():
     bent = with_elbows(CATALOG["quadrupteron-oblique"], "+--+")
     for robot in (bent, mechanisms.MECHANISMS["delta on a wall"]):
@@ -273,13 +288,15 @@ def test_what_a_file_cannot_hold_is_said_in_it():
     assert "Left out" not in mjcf(tree(CATALOG["delta"]))
 
 
-@pytest.mark.parametrize("name", CATALOG)
+@pytest.mark.parametrize(
+    "name", mechanisms.gated([*CATALOG, *mechanisms.TILTED], [*CATALOG, "ankle", "stewart"])
+)
 def test_every_link_of_a_urdf_has_an_inertia_that_engines_take(tmp_path, name):
-    path, _ = export_urdf(CATALOG[name], tmp_path)
+    path, _ = export_urdf(name, tmp_path)
     links = ElementTree.parse(path).iter("link")
     without = [link.get("name") for link in links if link.find("inertial") is None]
     assert without == ["world"]  # which has no mass for any engine
-    (model,) = export_mjcf(CATALOG[name], tmp_path)
+    (model,) = export_mjcf(name, tmp_path)
     mass = mujoco.MjModel.from_xml_path(str(model)).body_mass.sum()
     found = mujoco.MjModel.from_xml_path(str(path)).body_mass.sum()
     assert found == pytest.approx(mass, rel=1e-9)

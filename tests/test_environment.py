@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from mechanisms import CATALOG, NIGHTLY, random_machine, with_elbows
+from mechanisms import CATALOG, NIGHTLY, TILTED, random_machine, with_elbows
 from scipy.integrate import solve_ivp
 from test_sizing import driven
 
@@ -22,7 +22,7 @@ MACHINES = {
     "another mode": with_elbows(CATALOG["tripteron"], "+-+"),
     "mixed, driven": driven(random_machine(0, "PRS"), max_force=60.0),
     "planar": random_machine(0, "CLP"),
-    **{name: pteron.load(name) for name in ("wrist", "ball-table", "stewart")},
+    **{name: TILTED[name] for name in ("wrist", "ball-table", "stewart")},
 }
 EVERY = pytest.mark.parametrize(
     "name",
