@@ -7,6 +7,8 @@ each time to poses that may be others (monodromy), until as many are known as th
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pteron.equations.pose_paths import Closed
@@ -75,7 +77,7 @@ def _product(x: Array, y: Array) -> Array:
 def main() -> None:
     """Write the file."""
     rng = np.random.default_rng(0)
-    parts: dict[str, Complex] = {}
+    parts: dict[str, Any] = {}
     for closed, count in _ALL.items():
         known = known_machine(closed, count, rng)
         parts |= {f"machine {key_of(closed)}": known.machine}

@@ -156,11 +156,11 @@ def followed(
     With them come whether each has arrived, and whether Newton's steps then converge.
     """
     count, d = known.poses.shape
-    ends = targets.reshape(len(targets), 7 * known.closed.equations)
-    step = _step(known)
-    if np.iscomplexobj(ends):
-        step, ends = _any_step(known), _parts(np.asarray(ends, dtype=complex))
-    target = np.repeat(ends, count, axis=0)
+    machines = targets.reshape(len(targets), 7 * known.closed.equations)
+    general = np.iscomplexobj(machines)
+    step = _any_step(known) if general else _step(known)
+    parts = _parts(machines.astype(complex)) if general else machines.real
+    target = np.repeat(parts, count, axis=0)
     z = np.tile(_parts(known.poses), (len(targets), 1))
     at, arrived = _arrived(step, target, z, d)
     ends, converged = _refined(step, target, at)
@@ -286,7 +286,7 @@ def _proved(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_
 def _inverted(matrices: Array) -> Array:
     """Return inverses, infinite where there are none."""
     try:
-        return np.linalg.inv(matrices)
+        return np.asarray(np.linalg.inv(matrices), dtype=float)
     except np.linalg.LinAlgError:
         singular = np.linalg.cond(matrices) > 1.0 / np.finfo(float).eps
         safe = np.where(singular[:, None, None], np.eye(matrices.shape[-1]), matrices)
