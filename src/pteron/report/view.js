@@ -267,7 +267,7 @@
       const force = data.forces[k][i], share = (50 * Math.abs(force)) / peaks[i];
       const bar = document.getElementById("bar" + i);
       bar.style.width = share + "%"; bar.style.left = (force < 0 ? 50 - share : 50) + "%";
-      put("force" + i, minus(force, Math.max(1, 2 - Math.floor(Math.log10(peaks[i]))))); put("joint" + i, minus(data.factors[i] * data.coordinates[k][i], 1));
+      put("force" + i, minus(force, Math.max(peaks[i] < 1e3 ? 1 : 0, 2 - Math.floor(Math.log10(peaks[i]))))); put("joint" + i, minus(data.factors[i] * data.coordinates[k][i], 1));
     }
     data.pose[k].forEach((value, j) => put("pose" + j, minus(value * data.scales[j], 1)));
     put("clock", data.time[k].toFixed(2) + " of " + data.duration.toFixed(2) + " s");
