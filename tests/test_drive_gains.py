@@ -10,6 +10,7 @@ from test_payload import (
     LOAD,
     NOISE,
     PERIOD,
+    SOLID,
     base_of,
     halves,
     laden,
@@ -25,7 +26,8 @@ from pteron.identification.payload import identify_payload
 GAINS = np.array([31.0, -24.0, 40.0, 0.5])
 """N/A; one drive pushes backwards, one is much weaker."""
 
-KNOWN = KnownPayload(*LOAD.values[:1], LOAD.first_moment, LOAD.inertia)
+KNOWN = KnownPayload(LOAD.mass, LOAD.first_moment, LOAD.inertia)
+SPATIAL = KnownPayload(SOLID.mass, SOLID.first_moment, SOLID.inertia)
 
 
 def gains_of(name):
@@ -38,7 +40,8 @@ def in_currents(log, gains, payload=KNOWN):
 
 
 def current_log(name, **options):
-    return in_currents(make_log(name, **options), gains_of(name))
+    payload = SPATIAL if machine(name).platform.tilts else KNOWN
+    return in_currents(make_log(name, **options), gains_of(name), payload)
 
 
 @EACH
