@@ -403,7 +403,7 @@ SHOWN = """values => {
 
 
 def wait_for(tab, condition, argument=None):
-    tab.wait_for_function(condition, arg=argument, timeout=20_000)
+    tab.wait_for_function(condition, arg=argument, timeout=60_000)
 
 
 def said(tab, text):
@@ -640,7 +640,7 @@ def test_the_page_opens_by_the_other_names_of_this_machine_and_in_a_frame(browse
         tab = browser.new_page()
         tab.goto(f"http://localhost:{port}/")
         tab.set_content(f'<iframe src="http://localhost:{local.port}" width="900"></iframe>')
-        tab.frame_locator("iframe").locator("table.legs").wait_for(timeout=20_000)
+        tab.frame_locator("iframe").locator("table.legs").wait_for(timeout=60_000)
         tab.close()
 
 
