@@ -1,4 +1,8 @@
-"""Programs of the paths that lead to all poses of joints of a machine whose platform tilts."""
+"""Kernels for direct kinematics of a machine whose platform tilts, one cached for each topology.
+
+They follow paths from the known poses of another machine, return what a pose misses of its closures
+with slopes, and tell on which spheres given joint coordinates hold the platform points.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The regressor at random states in exact arithmetic: modulo a prime, or in fractions."""
+"""The regressor in exact arithmetic: its rows at random states, and the degree of its entries.
+
+Rows are residues modulo a prime, or fractions; bounds on degrees and roots tell how seldom a
+combination of entries that is not zero vanishes at random states.
+"""
 
 from __future__ import annotations
 
