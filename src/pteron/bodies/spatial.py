@@ -46,7 +46,7 @@ class SpatialMotion(NamedTuple):
     axes: Expression
     """R (3, 3): its x, y and z."""
     acceleration: Expression
-    """Of its reference point."""
+    """That of its reference point."""
     turning: Expression
     """omega."""
     growth: Expression

@@ -103,7 +103,7 @@ class OnPath(NamedTuple):
     """t from the pose before."""
     t: Expression
     step: Expression
-    """What t may grow by."""
+    """The most that t may grow by."""
 
     @classmethod
     def of(cls, values: Expression, closed: Closed) -> OnPath:

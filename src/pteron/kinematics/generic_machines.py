@@ -16,7 +16,7 @@ from pteron.kernels import Array
 from pteron.kinematics.pose_paths import FILE, Complex, Generic, followed, key_of, rotation
 
 _ALL = {Closed(3, 0, False): 8, Closed(3, 3, True): 16, Closed(6, 0, True): 40}
-"""How many poses machines of each kind have."""
+"""The number of poses that machines of each kind have."""
 
 _COMPLEX = 0.25
 """Size of the imaginary parts, and of what is added to the real ones, of numbers about 0.6."""

@@ -27,7 +27,7 @@ from pteron.platforms.nearest_pose import nearest_pose
 from pteron.shapes import Matrices, OnFailure, PerCoordinate, PoseLike, Vectors
 
 RotationForm = Literal["matrix", "quaternion", "tilt-torsion"]
-"""How a rotation is written."""
+"""The forms in which a rotation is written."""
 
 _SHAPES: dict[str, tuple[int, ...]] = {
     "matrix": (3, 3),

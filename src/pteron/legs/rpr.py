@@ -16,7 +16,6 @@ import casadi as ca
 from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import Expression, Moments, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector, cross, vertical
-from pteron.errors import ModelError
 from pteron.legs.circles import (
     first_moment,
     perpendicular_to,
@@ -26,28 +25,15 @@ from pteron.legs.circles import (
     random_vector,
 )
 from pteron.legs.drive import Drive
-from pteron.legs.keys import Condition, Key
-from pteron.legs.kind import ActuatedJoint, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.keys import Key
+from pteron.legs.kind import Quantity, Transfer
 from pteron.legs.leg import Circle, Joint, LegEquations, LegMotion, Needs, Reach, on_point
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
-
-RAM = ActuatedJoint("ram", "rho", "m", "force", "N")
-
-
-CYLINDER = 0.9
-"""Length of a cylinder in pictures, as a share of the shortest ram's."""
-
-RAM_LIMITS = Key("limits", "least and greatest length, m, above 0")
-
-
-def check_ram(limits: tuple[float, float]) -> None:
-    """Refuse a ram without a length."""
-    if limits[0] <= 0.0:
-        raise ModelError(f"limits: least length {limits[0]:g} m given; a ram is longer than 0")
+from pteron.legs.ram import RAM_KEYS, RamLeg
 
 
 @dataclass(frozen=True)
-class RPR(LegKind):
+class RPR(RamLeg):
     """A planar R-P-R leg that carries one point of the platform.
 
     Its joint coordinate is the length of the ram, from `guide_point` to the platform point. Places
@@ -86,16 +72,13 @@ class RPR(LegKind):
     direction: Vector | None = None
 
     type = "RPR"
-    joint = RAM
-    branches = (1,)
-    names: ClassVar = {"u": "cylinder", "l": "piston"}
-    measure_text = "1 everywhere, as a ram pushes the platform point in every pose"
     account = (
         "A ram leads from a revolute joint at the guide point r to one at the platform point s0, "
         "both with axes along d, the normal of the plane. Its coordinate rho is its length."
     )
 
     keys: ClassVar = {
+        **RAM_KEYS,
         "guide_point": Key("point", "r, the revolute joint on the base, m"),
         "direction": Key(
             "direction",
@@ -103,8 +86,6 @@ class RPR(LegKind):
             default=None,
             example=[0.0, 0.0, 1.0],
         ),
-        "elbow": Key("sign", "1: a ram has but one branch", default=1),
-        "limits": RAM_LIMITS,
         "upper": Key(
             "planar", "the cylinder: origin at guide_point, x along it to the platform", "u"
         ),
@@ -112,8 +93,6 @@ class RPR(LegKind):
             "planar", "the piston: origin at the platform point, x from the base to there", "l"
         ),
     }
-
-    conditions = (Condition(("limits",), check_ram),)
 
     def under(self, frame: Sequence[Vector]) -> Self:
         return self if self.direction is not None else replace(self, direction=frame[2])
@@ -135,30 +114,6 @@ class RPR(LegKind):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.plane_normal,)
-
-    @property
-    def cylinder(self) -> float:
-        return CYLINDER * self.limits[0]
-
-    @property
-    def size(self) -> float:
-        return self.limits[1]
-
-    @property
-    def reach_bound(self) -> ReachBound:
-        return ReachBound(self.guide_point, None, self.limits[1])
-
-    @property
-    def reach_text(self) -> str:
-        return "its ram has no length"
-
-    @property
-    def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        shortest = self.limits[0]
-        return {
-            "u": ("upper", 0.0, shortest, "the joint on the base and the shortest ram's end"),
-            "l": ("lower", -shortest, 0.0, "the shortest ram's beginning and the platform point"),
-        }
 
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
         found = [

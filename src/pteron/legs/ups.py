@@ -27,15 +27,15 @@ from pteron.bodies.vectors import Vector, dot
 from pteron.legs.circles import random_fraction, random_vector
 from pteron.legs.cones import Cone, within_cone
 from pteron.legs.drive import Drive
-from pteron.legs.keys import Condition, Key
-from pteron.legs.kind import LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.keys import Key
+from pteron.legs.kind import Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Sphere, on_point
+from pteron.legs.ram import RAM_KEYS, RamLeg
 from pteron.legs.rods import rod_body, universal_joints
-from pteron.legs.rpr import CYLINDER, RAM, RAM_LIMITS, check_ram
 
 
 @dataclass(frozen=True)
-class UPS(LegKind):
+class UPS(RamLeg):
     """A U-P-S leg that carries one point of the platform.
 
     Its joint coordinate is the length of the ram, from `guide_point` to the platform point.
@@ -83,16 +83,13 @@ class UPS(LegKind):
     screw_lead: float | None = None
 
     type = "UPS"
-    joint = RAM
-    branches = (1,)
-    names: ClassVar = {"u": "cylinder", "l": "piston"}
-    measure_text = "1 everywhere, as a ram pushes the platform point in every pose"
     account = (
         "A ram leads from a universal joint at the guide point r to a ball joint at the platform "
         "point s0. Its coordinate rho is its length."
     )
 
     keys: ClassVar = {
+        **RAM_KEYS,
         "guide_point": Key("point", "r, the universal joint on the base, m"),
         "direction": Key(
             "direction",
@@ -100,8 +97,6 @@ class UPS(LegKind):
             default=None,
             example=[1.0, 0.0, 0.0],
         ),
-        "elbow": Key("sign", "1: a ram has but one branch", default=1),
-        "limits": RAM_LIMITS,
         "base_cone": Key(
             "cone",
             "how far it may lean at the base; axis in the base frame",
@@ -126,8 +121,6 @@ class UPS(LegKind):
         ),
     }
 
-    conditions = (Condition(("limits",), check_ram),)
-
     def under(self, frame: Sequence[Vector]) -> Self:
         if self.direction is not None:
             return self
@@ -151,30 +144,6 @@ class UPS(LegKind):
     @property
     def base_axis(self) -> Vector | None:
         return self.direction
-
-    @property
-    def cylinder(self) -> float:
-        return CYLINDER * self.limits[0]
-
-    @property
-    def size(self) -> float:
-        return self.limits[1]
-
-    @property
-    def reach_bound(self) -> ReachBound:
-        return ReachBound(self.guide_point, None, self.limits[1])
-
-    @property
-    def reach_text(self) -> str:
-        return "its ram has no length"
-
-    @property
-    def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        shortest = self.limits[0]
-        return {
-            "u": ("upper", 0.0, shortest, "the joint on the base and the shortest ram's end"),
-            "l": ("lower", -shortest, 0.0, "the shortest ram's beginning and the platform point"),
-        }
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         (_, way), length = motion.links, self.limits[1]

@@ -28,7 +28,7 @@ from pteron.manipulator.names import name_faults
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import Unit
-from pteron.platforms.platform import HeldPoint
+from pteron.platforms.parts import HeldPoint
 from pteron.toml import told
 
 _COINCIDENT = 1e-9

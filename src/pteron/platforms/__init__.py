@@ -2,7 +2,8 @@
 
 from pteron.platforms.kinds import equations_class
 from pteron.platforms.motion import PlatformEquations
-from pteron.platforms.platform import Bar, Geared, Platform
+from pteron.platforms.parts import Bar, Geared
+from pteron.platforms.platform import Platform
 
 __all__ = ["Bar", "Geared", "Platform", "PlatformEquations", "equations_class"]
 

@@ -17,7 +17,7 @@ class PlatformJoint(NamedTuple):
     """A joint between the base and the platform, that no machine has: it tells how P moves."""
 
     name: str
-    """Of the coordinate that it moves by."""
+    """That of the coordinate that it moves by."""
     slides: bool
     axis: Array
     """Unit vector (3,) where all coordinates are zero; joints before it move it."""

@@ -31,7 +31,7 @@ _XYZ: dict[str, type[PlatformEquations]] = {"3T3R": TurnsXYZ, "3R": CentredXYZ}
 
 
 class Described(Protocol):
-    """What tells a platform's kind of equations."""
+    """The properties of a platform that tell its kind of equations."""
 
     @property
     def motion(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import casadi as ca
 import numpy as np
@@ -17,10 +17,8 @@ from pteron.bodies.vectors import (
     Vector,
     cross,
     interval,
-    number,
     parallel,
     perpendicular,
-    positive,
     unit_vector,
     vector,
 )
@@ -28,6 +26,7 @@ from pteron.errors import ModelError
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
 from pteron.platforms.kinds import equations_class
 from pteron.platforms.motion import PlatformMotion
+from pteron.platforms.parts import Bar, Geared, HeldPoint
 from pteron.toml import told
 
 Motion = Literal["3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"]
@@ -70,57 +69,6 @@ _TURN_ROUNDING = 1e-9
 Limits = tuple[float, float]
 
 _BASE_Z: Vector = (0.0, 0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Bar:
-    """A part of an articulated platform that moves with a hinge of it and does not turn.
-
-    Parameters
-    ----------
-    mass : float
-        kg.
-    hinge : vector
-        Its hinge on the part that turns, in the platform frame, m.
-    """
-
-    mass: float
-    hinge: Vector
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", positive(self.mass, "mass", "kg"))
-        object.__setattr__(self, "hinge", vector(self.hinge, "hinge"))
-
-
-@dataclass(frozen=True)
-class Geared:
-    """A balanced part of the platform, such as a tool, that a gear turns faster than the platform.
-
-    Parameters
-    ----------
-    inertia : float
-        Its moment of inertia about its own axis, which is parallel to the platform's, kg m^2.
-    ratio : float
-        Its angle over phi.
-    """
-
-    inertia: float
-    ratio: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "inertia", positive(self.inertia, "inertia", "kg m^2"))
-        object.__setattr__(self, "ratio", number(self.ratio, "ratio"))
-
-
-class HeldPoint(NamedTuple):
-    """A platform point that its leg keeps in a plane of the base."""
-
-    normal: Vector
-    """Unit vector."""
-    point: Vector
-    """A point of the plane, m."""
-    platform_point: Vector
-    """In the platform frame, m."""
 
 
 @dataclass(frozen=True)
@@ -431,7 +379,7 @@ class Platform:
 
     @property
     def quantities(self) -> dict[str, tuple[float, ...]]:
-        """What its equations need of it beside its frame and its points, by name.
+        """The numbers that its equations need beside its frame and its points, by name.
 
         Names that end in "axis" are those of unit vectors.
         """

@@ -1,4 +1,4 @@
-"""How far a platform tilts at a place, and how far it moves while it tilts: found, then proved."""
+"""The largest tilt at a place, and the largest ball of places at a tilt: found, then proved."""
 
 from __future__ import annotations
 

@@ -1,0 +1,60 @@
+"""A ram, driven in its middle: what legs with a cylinder at the base and a piston have alike."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pteron.errors import ModelError
+from pteron.legs.keys import Condition, Key
+from pteron.legs.kind import ActuatedJoint, LegKind, ReachBound
+
+_CYLINDER = 0.9
+"""Length of a cylinder in pictures, as a share of the shortest ram's."""
+
+
+def _check_limits(limits: tuple[float, float]) -> None:
+    if limits[0] <= 0.0:
+        raise ModelError(f"limits: least length {limits[0]:g} m given; a ram is longer than 0")
+
+
+RAM_KEYS: dict[str, Key] = {
+    "elbow": Key("sign", "1: a ram has but one branch", default=1),
+    "limits": Key("limits", "least and greatest length, m, above 0"),
+}
+"""The keys that all rams have alike."""
+
+
+class RamLeg(LegKind):
+    """The data of a ram; its coordinate is its length, from `guide_point` to the platform point."""
+
+    limits: tuple[float, float]
+
+    joint = ActuatedJoint("ram", "rho", "m", "force", "N")
+    branches = (1,)
+    names: ClassVar = {"u": "cylinder", "l": "piston"}
+    measure_text = "1 everywhere, as a ram pushes the platform point in every pose"
+    conditions = (Condition(("limits",), _check_limits),)
+
+    @property
+    def cylinder(self) -> float:
+        return _CYLINDER * self.limits[0]
+
+    @property
+    def size(self) -> float:
+        return self.limits[1]
+
+    @property
+    def reach_bound(self) -> ReachBound:
+        return ReachBound(self.guide_point, None, self.limits[1])
+
+    @property
+    def reach_text(self) -> str:
+        return "its ram has no length"
+
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        shortest = self.limits[0]
+        return {
+            "u": ("upper", 0.0, shortest, "the joint on the base and the shortest ram's end"),
+            "l": ("lower", -shortest, 0.0, "the shortest ram's beginning and the platform point"),
+        }
