@@ -329,6 +329,14 @@ def test_parts_that_are_apart_are_told_and_how_modes_meet():
     pavings = mode_pavings("linear-delta", [0.0, 0.0, 0.3], tolerance=2.0)
     parts = {elbows: components(found, smallest=0.05) for elbows, found in pavings.items()}
     assert parts[1, 1, 1].connected
+    whole = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+    boxes = np.array([whole / 2.0 - 0.5, whole / 4.0 + 0.75])
+    inside = replace(
+        pavings[1, 1, 1], box=whole, inner=boxes, boundary=boxes[:0], inner_volume=1.125
+    )
+    for smallest, count in ((0.0, 2), (0.5, 1)):
+        found = components(inside, smallest=smallest)
+        assert (len(found.parts), found.groups, found.connected) == (count, count, False)
     two = parts[1, 1, -1]
     assert (two.groups, two.connected) == (2, False)
     assert keeps(pavings[1, 1, -1].robot, pavings[1, 1, -1].conditions, two.parts[1].pose)

@@ -29,6 +29,7 @@ from pteron.plots import (
     draw,
     force_speed_figure,
     forces_figure,
+    front_figure,
     joints_figure,
     measure_figure,
     operations_figure,
@@ -441,6 +442,13 @@ def test_several_poses_are_seen_from_one_place():
     ):
         with pytest.raises(pteron.DataError, match="given"):
             poses_figure(*arguments, **options)
+
+
+def test_every_chosen_design_of_a_front_has_a_mark():
+    chosen = {f"design {k}": k for k in range(7)}
+    figure = front_figure(np.eye(7)[:, :2], ["a", "b"], ["m", ""], chosen=chosen)
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert told == ["designs of the front", *chosen]
 
 
 def test_courses_stand_over_their_derivatives_and_units_beside_each_other():

@@ -379,6 +379,9 @@ def test_motors_are_read_from_csv_and_toml_alike(tmp_path):
     assert found == read_motors(write(tmp_path, "motors.toml", lines))
     assert found[0] == Motor("100 W", 4e-6, 0.32, 0.95, 600.0)
     assert found[0].warnings == ()
+    nameless = HEADER.removeprefix("name,") + "4e-6,0.32,0.95,6000\n"
+    with pytest.warns(pteron.UnlikelyValue, match="^motor 1: max_speed .* revolutions per minute"):
+        assert read_motors(write(tmp_path, "nameless.csv", nameless))[0].name == "1"
 
 
 @pytest.mark.parametrize(

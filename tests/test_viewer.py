@@ -4,7 +4,7 @@ import re
 import socket
 import subprocess
 import sys
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -305,6 +305,12 @@ def test_hosts_and_ports_are_checked():
         taken.listen()
         port = taken.getsockname()[1]
         assert free_port("127.0.0.1", port) > port
+    with socket.socket() as last:
+        with suppress(OSError):  # then another program has it
+            last.bind(("127.0.0.1", 65535))
+            last.listen()
+        with pytest.raises(pteron.DataError, match="port: 65535 is taken; give"):
+            free_port("127.0.0.1", 65535)
     for host, port, told in (
         ("no such host", 8080, "is no address"),
         ("203.0.113.7", 8080, "no address of this machine"),

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from pteron.errors import OutputError
 
@@ -86,16 +84,6 @@ def make_folder(path: str | Path) -> Path:
     except OSError as error:
         reason = "it is a file" if folder.is_file() else error.strerror or str(error)
         raise OutputError(f"{folder}: cannot be written to as a folder ({reason})") from None
-
-
-def plain(data: Any) -> Any:
-    """Return data as JSON has them: NumPy's numbers as Python's, null for what is not finite."""
-    if isinstance(data, dict):
-        return {key: plain(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [plain(value) for value in data]
-    data = data.item() if hasattr(data, "item") else data
-    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def _encoded(path: str | Path, text: str) -> bytes:

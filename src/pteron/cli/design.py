@@ -95,13 +95,13 @@ def _found(
 
 def _write(summary: Summary, folder: Path) -> list[Path]:
     """Write the results to a folder, and return their paths."""
-    from pteron.atomic import plain as plain_data
     from pteron.atomic import write_texts
+    from pteron.json_values import json_ready
     from pteron.plots import save_figure
     from pteron.tables import write_table
 
     rows = summary.table()
-    figures = json_module.dumps(plain_data(summary.data()), indent=1, allow_nan=False) + "\n"
+    figures = json_module.dumps(json_ready(summary.data()), indent=1, allow_nan=False) + "\n"
     texts = {"report.md": summary.page(), "design.json": figures, **summary.robots()}
     return [
         *write_texts(folder, texts),

@@ -68,10 +68,10 @@ class Destination:
 
             files = [write_table(table, str(self.out))]
         elif self.out is not None:
-            from pteron.atomic import plain as plain_data
             from pteron.atomic import write_texts
+            from pteron.json_values import json_ready
 
-            figures = json.dumps(plain_data(data), indent=1, allow_nan=False) + "\n"
+            figures = json.dumps(json_ready(data), indent=1, allow_nan=False) + "\n"
             texts = {f"{self.name}.csv": table.write_csv(), f"{self.name}.json": figures}
             files = write_texts(self.out, texts | more())
         if as_json:

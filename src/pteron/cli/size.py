@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Annotated, Any
 
 import rich.table
@@ -22,6 +23,7 @@ from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, table
+from pteron.errors import UnlikelyValue
 
 if TYPE_CHECKING:
     import polars as pl
@@ -72,7 +74,9 @@ def size(
     from pteron.motion import choose, read_motors
     from pteron.motion import size as sized
 
-    chosen = () if motors is None else read_motors(motors)
+    with warnings.catch_warnings():  # each motor's are notes below
+        warnings.simplefilter("ignore", UnlikelyValue)
+        chosen = () if motors is None else read_motors(motors)
     destination = Destination(out, "sizing")
     destination.check()
     for motor in chosen:

@@ -1,4 +1,9 @@
-"""Output of subcommands: text, tables or JSON to standard output, notes to standard error."""
+"""Output of subcommands: results to standard output, notes and errors to standard error.
+
+Results are text, tables or JSON. `show` prints Rich's markup, in text and in a table: what comes
+from a file goes through `plain` first. `write` prints text as it is; `note` and `complain` escape
+theirs themselves.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +20,10 @@ from rich.measure import Measurement
 from rich.table import Table
 from typer import echo
 
-from pteron.atomic import plain as plain_data
+from pteron.json_values import json_ready
 
 _PIECE = 1 << 16
-"""Characters written at a time."""
+"""Characters written at a time: a reader of a pipe that leaves is noticed at the next piece."""
 
 _ANY_WIDTH = 10_000
 """Columns of a table for a file or a pipe: wider than any screen."""
@@ -71,14 +76,13 @@ def write(text: str) -> None:
     """Write text on standard output as it is: data is UTF-8 whatever the locale."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(encoding="utf-8")
-    # In pieces: a reader that leaves is noticed at the next one, even without a buffer.
     for start in range(0, len(text), _PIECE):
         sys.stdout.write(text[start : start + _PIECE])
 
 
 def show_json(data: Any) -> None:
     """Print data on standard output as JSON, null for the numbers that it does not have."""
-    write(json.dumps(plain_data(data), indent=2, allow_nan=False) + "\n")
+    write(json.dumps(json_ready(data), indent=2, allow_nan=False) + "\n")
 
 
 def table(
@@ -88,7 +92,10 @@ def table(
     names: tuple[str, ...] = (),
     caption: str | None = None,
 ) -> Table:
-    """Return a table; columns in `numbers` and `names` are unbroken, numbers set to the right."""
+    """Return a table; columns in `numbers` and `names` are unbroken, numbers set to the right.
+
+    Rows may hold Rich's markup; the headings are plain text.
+    """
     made = Table(box=SIMPLE_HEAD, caption=caption, pad_edge=False, collapse_padding=True)
     for name in columns:
         number = name in numbers

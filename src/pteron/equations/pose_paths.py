@@ -25,7 +25,7 @@ from pteron.bodies.motion import Expression
 
 
 class Closed(NamedTuple):
-    """A kind of closures."""
+    """A kind of closures: how many spheres and planes, and whether P moves."""
 
     spheres: int
     planes: int
@@ -38,9 +38,19 @@ class Closed(NamedTuple):
         return self.spheres + self.planes
 
     @property
+    def numbers(self) -> int:
+        """The number of numbers of a machine: a or n, b, and r^2 or h, for each equation."""
+        return 7 * self.equations
+
+    @property
     def size(self) -> int:
         """The number of coordinates of z."""
         return 8 if self.moves else 4
+
+    @property
+    def on_path(self) -> int:
+        """The length of the vector of an `OnPath`: four complex z and three numbers."""
+        return 8 * self.size + 3
 
 
 class Number(NamedTuple):

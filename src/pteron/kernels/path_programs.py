@@ -1,7 +1,9 @@
-"""Kernels for direct kinematics of a machine whose platform tilts, one cached for each topology.
+"""Three kernels for the direct kinematics of machines whose platforms tilt.
 
-They follow paths from the known poses of another machine, return what a pose misses of its closures
-with slopes, and tell on which spheres given joint coordinates hold the platform points.
+`path_kernel` makes a step along a path from a known pose of another machine, `rows_kernel` returns
+the residuals of a pose's closures and their slopes, both for a kind of closures (see
+`equations.pose_paths`); `spheres_kernel` returns the spheres on which given joint coordinates hold
+the platform points of one machine.
 """
 
 from __future__ import annotations
@@ -22,20 +24,21 @@ from pteron.kernels.programs import bare
 from pteron.manipulator import Manipulator
 
 Parts = tuple[tuple[float, ...], tuple[float, ...]]
-"""Real and imaginary parts."""
+"""Real and imaginary parts of the numbers of the machine that a path starts from."""
 
 
 @lru_cache(maxsize=8)
 def path_kernel(closed: Closed, start: Parts | None) -> Adaptive:
-    """Return the kernel of a step along a path from a machine in numbers to a real one.
+    """Return the kernel of a step along a path from one machine to another.
 
-    It takes and returns where the path is, see `OnPath`; its other input is the machine that the
-    path leads to. With no start that is an input too, and both are complex: real parts first.
+    It takes and returns where the path is, see `OnPath`. A start machine is fixed in the kernel, as
+    complex constants; the machine that the path leads to is then an input and real. With start None
+    both are inputs and complex: real parts first.
     """
-    count = 7 * closed.equations
+    count = closed.numbers
 
     def build() -> Program:
-        at = ca.SX.sym("at", 8 * closed.size + 3)
+        at = ca.SX.sym("at", closed.on_path)
         ends, given = [], {"at": at}
         for name, known in (("start", start), ("target", None)):
             if known is not None:
@@ -52,10 +55,10 @@ def path_kernel(closed: Closed, start: Parts | None) -> Adaptive:
 
 @lru_cache(maxsize=8)
 def rows_kernel(closed: Closed) -> Adaptive:
-    """Return the kernel of what a real z misses the closures of a machine by, and of its slopes."""
+    """Return the kernel of the residuals of a machine's closures at a real z, and their slopes."""
 
     def build() -> Program:
-        z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", 7 * closed.equations)
+        z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", closed.numbers)
         slopes, missed = rows(closed, numbers(machine), numbers(z))
         return _program(
             "path_rows", {"z": z, "machine": machine}, {"rows": slopes, "missed": missed}

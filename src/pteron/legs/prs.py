@@ -1,4 +1,7 @@
-"""P-R-S legs, of tripods and spindle heads: a slider and a link in an upright plane."""
+"""P-R-S legs (prismatic, revolute, spherical), of tripods and spindle heads.
+
+A slider and a link move in one upright plane; a ball joint ends the link at the platform.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,10 @@ from pteron.legs.prr import PRR, PRREquations
 
 @dataclass(frozen=True)
 class PRS(PRR):
-    """A P-R-S leg, which keeps its platform point in the plane through r across `direction`.
+    """A P-R-S leg: it keeps its platform point in the plane through r, normal to `direction`.
 
-    It is a P-R-R leg (`PRR`, whose parameters it has) that ends in a ball joint.
+    It is a P-R-R leg (`PRR`, whose parameters it has) that ends in a ball joint; r is the guide
+    point, and the slider's direction e lies in the leg's plane.
 
     Parameters
     ----------

@@ -1,8 +1,10 @@
-"""The protocol of platforms: read this page before writing another kind.
+"""The protocol of platforms' equations: read this page before writing another kind of platform.
 
-A platform maps its pose x and its derivatives to the motion of the points that the legs carry, and
-says what it needs itself. A kind is one file of this folder: a class under `PlatformEquations`,
-which `platforms.equations_class` finds by the file's keys.
+From the pose x and its derivatives the equations give the motion of the platform's points, one a
+leg, and the wrench that the platform's own weight and inertia need. A kind is a subclass of
+`PlatformEquations` in this folder, entered in `kinds.py`, where `equations_class` picks it by what
+a robot file says of its platform. P is the platform's reference point, phi the one angle of a
+platform that does not tilt, k the axis that it turns about.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ from pteron.platforms.coordinates import are_angles
 class Offset(NamedTuple):
     """s = a cos(phi) + b sin(phi) + still, from P to a platform point; each (3, 1).
 
-    `still` is along k, and what of the platform does not turn.
+    `still` is the part that phi does not turn: along k, and the point's fixed offset.
     """
 
     a: Expression
@@ -41,7 +43,7 @@ class Offset(NamedTuple):
 
 
 class PlatformMotion(NamedTuple):
-    """The platform's state: its legs' points, their matrices, its rotation and its own body."""
+    """The platform's state: the legs' points, their velocity matrices, its rotation and body."""
 
     points: tuple[PointMotion, ...]
     matrices: tuple[Expression, ...]

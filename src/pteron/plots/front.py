@@ -1,8 +1,12 @@
-"""Picture of the front of a design search: its first objective over each of the others."""
+"""Picture of the Pareto front of a design search: designs that no other betters in every objective.
+
+The first objective is upright, against each of the others in a panel each.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -19,7 +23,7 @@ _PANEL = 2.4
 """Height of each further panel, inches."""
 
 _MARKS = ("D", "s", "^", "v", "P")
-"""Marks of the designs that are pointed out."""
+"""Marks of the designs that are pointed out: a sixth has the first's again."""
 
 
 def front_figure(
@@ -30,18 +34,18 @@ def front_figure(
     start: ArrayLike | None = None,
     chosen: Mapping[str, int] | None = None,
 ) -> Figure:
-    """Return the front: the first objective over each of the others.
+    """Return the picture of a front: the first objective over each of the others.
 
     Parameters
     ----------
     objectives : array, shape (K, M)
-        Of each design; with one objective alone it is drawn over the designs' numbers.
+        M objectives of each of K designs; one alone is drawn over the designs' numbers, from 1.
     names, units : sequence of str
-        Of the objectives; lengths are shown in mm.
+        Of the objectives; those with the unit m are shown in mm.
     start : array, shape (M,), optional
-        The machine to begin with.
+        Objectives of the machine that the search began with.
     chosen : mapping of str to int, optional
-        Designs to point out, by what they are called.
+        Rows of `objectives` to point out, by what these designs are called.
 
     Returns
     -------
@@ -92,7 +96,7 @@ def front_figure(
             linestyle="-" if others == 1 else "none",
             label="designs of the front" if k == 1 else None,
         )
-        for mark, (name, at) in zip(_MARKS, (chosen or {}).items(), strict=False):
+        for mark, (name, at) in zip(cycle(_MARKS), (chosen or {}).items(), strict=False):
             told = name.replace("-", " ") if k == 1 else None
             spot(
                 *(axes, values[at, k], values[at, 0], LEG_COLORS[1], PAPER, 8.0),

@@ -1,4 +1,8 @@
-"""Certificates of a number of base parameters: the grounds it rests on, for a reader to check."""
+"""Certificates of the number of base parameters: the method and the evidence that it rests on.
+
+Base parameters are the combinations of inertial parameters that motion tells apart: as many as the
+rank of the regressor.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 ROUNDING = 1e-13
-"""Singular values below it, relative to the largest, may be rounding, which is 1e-16 to 1e-14."""
+"""Largest singular value, relative to the greatest, that is taken for rounding, which is 1e-16 to
+1e-14: a rank that drops a larger one is told as unclear."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +36,7 @@ class NumericalRank:
 
 @dataclass(frozen=True)
 class Certificate(ABC):
-    """The root of the certificates: method, number of base parameters, number of columns.
+    """Base class of the certificates: method, number of base parameters, number of columns.
 
     Attributes
     ----------

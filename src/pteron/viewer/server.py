@@ -1,4 +1,7 @@
-"""The viewer's server: viser, on a free port of the address asked for."""
+"""The viewer's server: viser, on the first free port from the one asked for.
+
+It is closed to foreign pages, and opens no public tunnel.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +21,11 @@ from pteron.viewer.guard import guarded
 if TYPE_CHECKING:
     import viser
 
-_TRIED = 100
-"""Ports that are tried in turn."""
+_PORTS_TRIED = 100
+"""Most ports that are tried in turn before the server is refused."""
 
-_MOST = 65535
-"""The largest port."""
+_LAST_PORT = 65535
+"""The largest port there is."""
 
 _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 """Error numbers for an address that is none of this machine's."""
@@ -31,12 +34,21 @@ _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 def serve(host: str, port: int, label: str) -> viser.ViserServer:
     """Return a running server.
 
+    Parameters
+    ----------
+    host : str
+        The address, or name, that it listens at.
+    port : int
+        The first port tried; 0 takes any that is free.
+    label : str
+        The title of its page.
+
     Raises
     ------
     DataError
         If the host is no address of this machine, or no port from the given one on is free.
     ModelError
-        If viser is not installed, or cannot be guarded.
+        If viser is not installed, or is a version that cannot be closed to foreign pages.
     """
     try:
         import viser
@@ -72,10 +84,12 @@ def free_port(host: str, port: int) -> int:
     Raises
     ------
     DataError
-        If the host is no address of this machine, or there is no such port.
+        If the host is no address of this machine, there is no such port, or none is free.
     """
-    if not 0 <= port <= _MOST:
-        raise DataError(f"port: {shown(port)} given, a whole number from 0 to {_MOST} expected")
+    if not 0 <= port <= _LAST_PORT:
+        raise DataError(
+            f"port: {shown(port)} given, a whole number from 0 to {_LAST_PORT} expected"
+        )
     try:
         addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
@@ -85,10 +99,12 @@ def free_port(host: str, port: int) -> int:
         ) from None
     if port == 0:
         return 0
-    for candidate in range(port, min(port + _TRIED, _MOST + 1)):
+    tried = range(port, min(port + _PORTS_TRIED, _LAST_PORT + 1))
+    for candidate in tried:
         if all(_is_free(family, address[0], candidate) for family, *_, address in addresses):
             return candidate
-    raise DataError(f"port: none of {port} to {port + _TRIED - 1} is free; give another --port")
+    told = f"none of {port} to {tried[-1]} is free" if len(tried) > 1 else f"{port} is taken"
+    raise DataError(f"port: {told}; give another --port")
 
 
 def _is_free(family: int, address: Any, port: int) -> bool:

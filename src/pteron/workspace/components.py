@@ -13,11 +13,11 @@ from pteron.kernels import Array
 from pteron.workspace.paving import Paving
 
 _CELLS = 1 << 22
-"""Most cells of the lattice in which parts are sought."""
-
+"""Most cells of the lattice in which parts are sought: a paving that needs more gets a coarser
+lattice, in which a cell is inside only where boxes fill it."""
 
 _ROUNDING = 1e-9
-"""Share of a cell that counts as rounding."""
+"""Share of a cell by which its corners and what fills it may be off, from rounding."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class Component:
     volume : float
         Its volume that is proved inside, in the paving's unit.
     pose : array, shape (m,)
-        The middle of a box of it, far from its edge.
+        A pose of it far from its edge: all m coordinates of the machine.
     box : array, shape (2, k)
-        The bounding box of its proved part.
+        The bounding box of its proved part, of the k coordinates that vary in the paving.
     group : int
         Parts of different groups are proved to be apart; of two of one group it is not decided.
     """
@@ -49,14 +49,15 @@ class Components:
     Attributes
     ----------
     parts : tuple of Component
-        The largest first.
+        The largest first, without those left out as too small.
     groups : int
         At least so many of them are apart, which is proved.
     connected : bool or None
-        True: there is one part. False: at least two are proved to be apart. None: not decided.
+        Of all parts, those left out too: True: there is one. False: at least two are proved to be
+        apart. None: not decided.
     share : float
-        Share of the volume proved inside that the parts hold: where the paving's smallest boxes are
-        finer than the lattice in which parts are sought, some of it is in none.
+        Share of the volume proved inside that `parts` hold. The rest is in parts left out, or in
+        none where the paving's smallest boxes are finer than the lattice in which parts are sought.
     """
 
     parts: tuple[Component, ...] = field(repr=False)
@@ -115,7 +116,8 @@ def components(paving: Paving, *, smallest: float = 0.0) -> Components:
         found.append(Component(float(volumes[label]), pose, box, group))
     found.sort(key=lambda part: -part.volume)
     apart = len({part.group for part in found})
-    connected = True if len(found) == 1 else False if apart > 1 else None
+    every = len(np.unique(groups[inside]))
+    connected = True if count == 1 else False if every > 1 else None
     share = sum(part.volume for part in found) / whole
     return Components(tuple(found), apart, connected, share)
 

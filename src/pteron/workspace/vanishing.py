@@ -1,8 +1,8 @@
-"""The functions of the pose that vanish at singular poses: their values, slopes and bounds.
+"""The functions of the pose that vanish at singular poses: values, slopes, and bounds in boxes.
 
-At the edge of a leg's reach such a function has an infinite slope, as a square root has at 0. So
-roots are variables of their own, r^2 = g(x), r >= 0: of pose and roots the function is smooth on
-the edge too, and beyond it.
+The search for the nearest singular pose uses them. These functions hold square roots, whose slope
+is infinite at the edge of a leg's reach. Each root is therefore a variable of its own, r^2 = g(x),
+r >= 0: as a function of pose and roots it is smooth on the edge too, and beyond it.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Kind = Literal["I", "II", "constraint"]
 """Type I: a leg is stretched or folded. Type II: the actuators do not hold the platform.
 Constraint: the legs do not hold its orientation."""
 
-_WHAT = {"I": "squared_type_i", "II": "type_ii", "constraint": "constraint"}
-"""The function that vanishes, by kind."""
+_PROGRAM = {"I": "squared_type_i", "II": "type_ii", "constraint": "constraint"}
+"""Name of the program that gives the function, by kind."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,8 @@ class Vanishing:
     robot : Manipulator
         The machine.
     kind : {"I", "II", "constraint"}
-        The kind: for type I the square of a leg's measure vanishes, else the measure.
+        The kind: for type I the function is the square of the leg's type-I measure; else it is the
+        machine's type-II or constraint measure.
     leg : int
         The leg of type I, from 1; else 0.
     """
@@ -66,7 +67,7 @@ class Vanishing:
 
     def _plain_bounds(self, boxes: Array) -> tuple[Array, Array]:
         """Return bounds (B,) of the function of the pose alone: narrower where it has slopes."""
-        (value,) = bounds(self.robot, _WHAT[self.kind], boxes).values()
+        (value,) = bounds(self.robot, _PROGRAM[self.kind], boxes).values()
         return value.low, value.high
 
 
@@ -103,7 +104,7 @@ class Smooth(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _smooth(robot: Manipulator, kind: Kind, leg: int) -> Smooth:
-    graph = graph_of(bounded(robot, _WHAT[kind]).function)
+    graph = graph_of(bounded(robot, _PROGRAM[kind]).function)
     pose = ca.SX.sym("pose", robot.freedom)
     radicands, roots = [], []
     values: list[ca.SX] = []

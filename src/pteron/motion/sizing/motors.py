@@ -1,8 +1,9 @@
-"""Motors as their data sheets have them, read from a file that lists them."""
+"""Rotary motors as their data sheets have them, read from a CSV, Parquet or TOML file of them."""
 
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,17 +11,18 @@ from typing import Any
 import polars as pl
 from pydantic import BaseModel, ConfigDict
 
-from pteron.errors import DataError
+from pteron.errors import DataError, UnlikelyValue
 from pteron.renamed import former_attribute
 from pteron.tables import read_table
 from pteron.toml import read_toml, told, validated
 
 _FASTEST = 3000.0
-"""Speed above which a motor is unlikely, rad/s: 29 000 revolutions per minute."""
+"""Speed, rad/s, above which `Motor.warnings` asks whether it is in revolutions per minute: 29 000
+of them."""
 
 _SLUGGISH = 30.0
-"""Rated torque over rotor inertia, rad/s^2, below which they are unlikely: servo motors have
-hundreds to tens of thousands."""
+"""Rated torque over rotor inertia, rad/s^2, below which `Motor.warnings` asks whether the inertia
+is in kg cm^2: servo motors have hundreds to tens of thousands."""
 
 _NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
 """Names of the numbers of a motor, in the columns of a file too."""
@@ -28,7 +30,7 @@ _NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
 
 @dataclass(frozen=True)
 class Motor:
-    """A motor that turns; everything is at its own shaft.
+    """A rotary motor; everything is at its own shaft.
 
     Parameters
     ----------
@@ -112,8 +114,8 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     ----------
     path : str or path
         A CSV or Parquet file with the columns name, rotor_inertia, rated_torque, peak_torque and
-        max_speed, a row a motor; or a TOML file with a table `[[motors]]` of these keys for each.
-        kg m^2, N m and rad/s.
+        max_speed, a row a motor, which without a name is called by its number; or a TOML file with
+        a table `[[motors]]` of these keys, name too, for each. kg m^2, N m and rad/s.
 
     Returns
     -------
@@ -122,8 +124,13 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     Raises
     ------
     DataError
-        If there is no such file, a column or key is missing, a number is not what it must be, or
-        two motors have one name.
+        If there is no such file, a column of numbers or a key is missing, a number is not what it
+        must be, or two motors have one name.
+
+    Warns
+    -----
+    UnlikelyValue
+        Of each of `Motor.warnings`.
     """
     rows = _from_toml(path) if Path(path).suffix.lower() == ".toml" else _from_table(path)
     found, names = [], set()
@@ -134,6 +141,8 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
             raise DataError(f"{place}: {error}") from None
         if motor.name in names:
             raise DataError(f"{place}: motor {motor.name} is listed twice; give each its own name")
+        for text in motor.warnings:
+            warnings.warn(text, UnlikelyValue, stacklevel=2)
         names.add(motor.name)
         found.append(motor)
     if not found:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pteron.atomic import make_folder, plain, write_text
+from pteron.atomic import make_folder, write_text
 from pteron.errors import OutputError
 from pteron.identification import Identification
+from pteron.json_values import json_ready
 from pteron.manipulator import save
 from pteron.report.identification.contents import short_sources, shortened
 from pteron.report.write import checked_folder
@@ -133,5 +134,5 @@ def _line(text: str) -> str:
 
 
 def numbers(result: Identification) -> dict[str, Any]:
-    """Return the numbers of an identification as plain data, null where one is not finite."""
-    return {key: plain(value) for key, value in result.as_dict().items()}
+    """Return the numbers of an identification as JSON has them, null where one is not finite."""
+    return {key: json_ready(value) for key, value in result.as_dict().items()}
