@@ -16,6 +16,7 @@ from pteron.closures.determinants import determinant
 from pteron.equations.machine import Machine, State
 
 _ACROSS = 1e-9
+"""Sine, or cosine, of an angle between directions that counts as zero."""
 
 
 def constraint_rows(machine: Machine, state: State) -> Expression | None:

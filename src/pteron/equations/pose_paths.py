@@ -1,17 +1,17 @@
 """Closures of a platform that may turn any way, in Study's coordinates, along a path of machines.
 
 A pose is z = (x, y), up to scale: the platform's rotation is the quaternion x, and its point P is
-the vector part of 2 y x* / (x.x); the products below are those of quaternions, x.y = 0. What a
-platform point b misses a sphere about a with radius r by, or a plane n.c = h, times x.x, is
+the vector part of 2 y x* / (x.x); the products below are those of quaternions, x.y = 0. A closure
+holds a platform point b on a sphere about a with radius r, or on a plane n.c = h. Its residual,
+times x.x, is
 
     e.e - r^2 x.x,  e = 2 y + x b - a x,    or    (n x).(2 y + x b) - h x.x.
 
-So all closures are quadrics. Six of them meet in 40 poses, three about a point that stays, y = 0,
-in 8, and three spheres and planes of the same three points in 16, for all machines but special
-ones, complex ones among them. On a straight path from one of which the poses are known, in general
-complex numbers, they neither meet nor vanish (Sommese and Wampler, The numerical solution of
-systems of polynomials, 2005, chapter 7). `stepped` goes along such
-a path.
+So all closures are quadrics. Six spheres meet in 40 poses, three about a point P that stays, y = 0,
+in 8, and three spheres and three planes of the same three points in 16, complex poses among them,
+for all machines but special ones. Along a straight path between two machines, from one in general
+complex numbers whose poses are known, poses neither meet nor vanish (Sommese and Wampler, The
+numerical solution of systems of polynomials, 2005, chapter 7). `stepped` makes a step along it.
 """
 
 from __future__ import annotations
@@ -100,6 +100,7 @@ _AIM = 0.004
 """The first step at which the path's next step is not made longer: its fourth power counts."""
 
 _SHORTER, _LONGER = 0.3, 2.5
+"""Least and greatest factor from one step of the path to the next."""
 
 
 class OnPath(NamedTuple):

@@ -29,7 +29,7 @@ class Terms:
     links: tuple[Expression, ...]
     """Om_u1..Om_un, Om_l1..Om_ln, each (6, 4), or (6, 3) for rods."""
     platform: Expression
-    """Om_e (m, 4)."""
+    """Om_e (m, k), a column for each of the platform's k parameters."""
 
 
 def terms(machine: Machine, state: State) -> Terms:

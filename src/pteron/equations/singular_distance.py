@@ -15,6 +15,7 @@ from pteron.equations.kinematics import FAR
 from pteron.equations.machine import Machine
 
 _TINY = 1e-30
+"""Added to a squared slope: it keeps 0/0 out where measure and slope are both zero."""
 
 
 def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expression]:

@@ -27,7 +27,7 @@ _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which gains are not told from inertia."""
 
 _ITERATIONS = 50
-"""Most iterations."""
+"""Most iterations; gains that have not settled by then are refused."""
 
 _SETTLED = 1e-3
 """Change of the predicted currents, over the residuals, below which an iteration is the last

@@ -1,4 +1,7 @@
-"""The model that identification fits: linear in base parameters, friction, offsets and payload."""
+"""The model that identification fits: forces linear in base parameters and further terms.
+
+Further terms are friction of actuated and passive joints, offsets, a payload and motors' rotors.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ class Terms:
     passive : {"none", "shared", "each"}
         Viscous friction in the passive joints of the legs.
     payload : bool
-        The platform's four parameters once more, where a payload is carried.
+        The platform's inertial parameters once more, where a payload is carried.
     rotors : bool
         The inertia of each motor, reflected through its drive: J_m = J r^2 with J of the rotor and
         r in rad/m (kg), or in rad/rad at a crank (kg m^2). Its column is q'': at a crank it joins

@@ -1,7 +1,7 @@
 """A CasADi function as a list of named operations: what printers, fields and passes walk through.
 
-They need no more than this: single-assignment nodes in order, and what goes where. Nodes
-are sorted into stages, so that what depends on shared inputs alone is done once for a batch, and
+All of these need no more than single-assignment nodes in order, and what goes where. Nodes are
+sorted into stages, so that what depends on shared inputs alone is done once for a batch, and
 sines and cosines of the inputs leave the loop that a compiler vectorises.
 """
 

@@ -1,9 +1,9 @@
 """Target `jax`: a pure function of arrays, which jits, maps, differentiates and runs on a GPU.
 
-It is elementwise from its inputs' components to its outputs', so that XLA fuses it. Not into one
-loop: on the CPU it makes 23 of the inverse dynamics, since it does not repeat a root or a quotient
-that several expressions use, and so it moves 1016 bytes a state where 128 would do; components
-apart, or blocks of states, made it no better.
+The function is elementwise from its inputs' components to its outputs', so that XLA fuses it. Not
+into one loop: on the CPU XLA makes 23 of the inverse dynamics, since it does not repeat a root or a
+quotient that several expressions use, and so it moves 1016 bytes a state where 128 would do;
+components apart, or blocks of states, made it no better.
 """
 
 from __future__ import annotations

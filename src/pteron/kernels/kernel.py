@@ -1,4 +1,4 @@
-"""A kernel: a CasADi function made executable, with its name, its shapes and its cost."""
+"""Kernels: CasADi functions made executable, with shapes and cost, and checks of their inputs."""
 
 from __future__ import annotations
 

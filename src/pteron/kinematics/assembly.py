@@ -1,6 +1,6 @@
-"""Every pose of given joint coordinates, where there is no closed form: machines that turn.
+"""Every pose of given joint coordinates, for platforms with one angle that have no closed form.
 
-Those of platforms that tilt are another page's, `tilting_assembly`. About one axis:
+Platforms that tilt are in `tilting_assembly`.
 
 With their joints held, n legs keep points of the platform on spheres, circles or planes, in n - 1
 dimensions. Moved by what phi makes of the points' offsets these meet at P. A sphere, circle or

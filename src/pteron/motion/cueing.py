@@ -31,11 +31,20 @@ COLUMNS = ("t", "ax", "ay", "az", "wx", "wy", "wz")
 rad/s, both in its own axes: x ahead, y to the left, z up."""
 
 _GRAVITY = 9.81
-_DAMPING = 1.0
+"""m/s^2, by which an acceleration that lasts becomes a tilt."""
 
-_SAMPLES, _HALVINGS, _ROOM, _TRIES = 2048, 8, 3.0, 30
-"""Random poses of a box, and bisections, by which its size is found; how many times the demand it
-is at most; and sizes, each nine tenths of the last, that are tried until one is proved."""
+_DAMPING = 1.0
+"""Damping ratio of the filters: critical, so that none overshoots more than it must."""
+
+_ROOM = 3.0
+"""Greatest size of the box, over what the vehicle's motion demands."""
+
+_SAMPLES, _HALVINGS = 2048, 8
+"""Random poses of the box, and bisections, by which its size is found before it is proved."""
+
+_TRIES = 30
+"""Each size tried until one is proved is nine tenths of the last; below this power the cue is
+refused."""
 
 
 @dataclass(frozen=True)

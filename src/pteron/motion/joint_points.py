@@ -1,4 +1,4 @@
-"""Points of a machine's joints and of its platform's parts in given poses, for pictures."""
+"""Points of a machine's joints and platform in given poses, and the joints' guides, to be drawn."""
 
 from __future__ import annotations
 

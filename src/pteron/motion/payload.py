@@ -1,4 +1,4 @@
-"""A machine with a payload: a point mass joined to its platform."""
+"""A machine with a payload, a point mass joined to its platform; a warning of an unlikely mass."""
 
 from __future__ import annotations
 

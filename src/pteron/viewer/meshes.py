@@ -1,4 +1,4 @@
-"""The meshes that all bodies are drawn with: cylinder, ball and cube."""
+"""The meshes that the viewer draws with: cylinder, ball, cube, plane faces and cells of a grid."""
 
 from __future__ import annotations
 

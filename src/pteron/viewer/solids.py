@@ -1,4 +1,4 @@
-"""The machine in one pose as bars, balls and blocks, for the viewer's picture.
+"""The machine in one pose as bars, balls, blocks and plane faces, and arrows, for the viewer.
 
 A bar is a cylinder from one point to another; all bars of a machine are copies of one mesh, and so
 are all balls and all blocks, so that a browser draws each kind at once.
@@ -21,8 +21,8 @@ from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH
 from pteron.plots.machine_drawing import base_outline, rods
 from pteron.plots.space_axes import upright
 
-_LINK, _ROD, _ARM, _GUIDE, _AXIS, _JOINT = 0.011, 0.006, 0.007, 0.008, 0.003, 0.016
-_CYLINDER = 0.014
+_LINK, _ROD, _ARM, _GUIDE, _AXIS = 0.011, 0.006, 0.007, 0.008, 0.003
+_JOINT, _CYLINDER = 0.016, 0.014
 """Radii as shares of the machine's size."""
 
 _AXLE = 0.03

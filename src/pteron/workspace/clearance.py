@@ -1,4 +1,4 @@
-"""Clearance: the distances between a machine's bodies."""
+"""Clearance: the distances between a machine's bodies, and the conditions that no two touch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Warnings about drives: possible but unlikely values, most often in a wrong unit."""
+"""Warnings about drives: unlikely values, most often in a wrong unit, and too weak or heavy motors.
+
+`drive_warnings` looks at a drive by itself, `load_warnings` at all drives holding the machine.
+"""
 
 from __future__ import annotations
 

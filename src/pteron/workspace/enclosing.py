@@ -9,10 +9,10 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
 _WIDER = 1e-9
-"""Relative; far more than rounding."""
+"""Share of its size by which the box is widened: far more than rounding."""
 
 _SINGULAR = 1e-9
-"""Share of the largest eigenvalue below which nothing bounds a direction."""
+"""Share of the largest eigenvalue below which nothing bounds a direction: then there is no box."""
 
 
 def enclosing_box(robot: Manipulator, low: Array, high: Array, *, limits: bool = True) -> Array:

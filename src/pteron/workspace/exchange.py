@@ -24,7 +24,7 @@ _PER_ROW = 3
 """Points added in a round for each condition: those where it is least."""
 
 _ROUNDS = 12
-"""Most rounds."""
+"""Most rounds; after them the best unknowns so far, which keep all conditions, are the result."""
 
 _ROUNDING = 1e-12
 """A condition's value above minus this counts as kept."""

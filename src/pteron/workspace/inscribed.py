@@ -25,7 +25,7 @@ _STARTS = 3
 """Places of a search grid from which the shape is enlarged."""
 
 _SHARES = 40
-"""Most times that a shape is made smaller by the tolerance until it is proved."""
+"""Most times that a shape is made smaller by the tolerance until it is proved, or refused."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Contacts of working modes: poses at which a leg can change the side of its elbow."""
+"""The workspace of each working mode, and contacts of modes: poses where an elbow changes side.
+
+A leg changes the side of its elbow at an edge of its reach that both modes' workspaces meet.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +19,13 @@ from pteron.workspace.conditions import EDGES, IntervalTest, condition_margins, 
 from pteron.workspace.paving import Paving, paving
 
 _HALVINGS = 50
-"""Bisections that lead to a contact."""
+"""Bisections, between a corner inside an edge and one beyond it, that lead to a contact."""
 
 _ROUNDS = 30
-"""Most times that boxes are halved."""
+"""Most times that boxes are halved; after them it is not decided whether two modes meet."""
 
 _MOST = 200_000
-"""Most boxes about an edge of reach in which a contact is sought."""
+"""Most boxes about an edge of reach in which a contact is sought; with more it is not decided."""
 
 
 @dataclass(frozen=True)

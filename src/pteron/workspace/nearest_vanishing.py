@@ -51,6 +51,7 @@ _BACK = 10
 """Newton's steps back into reach."""
 
 _CONVERGED = 1e-14
+"""Greatest value of what is to vanish at which Newton's steps end."""
 
 _RETRACTIONS, _GAIN = 16, 1e-6
 """Most rounds in which a state is brought nearer, and the least gain, over the distance."""

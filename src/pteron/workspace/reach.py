@@ -26,7 +26,7 @@ _RIM = 0.08
 """Share of the reach's width that a slice shows around it."""
 
 _UPSIDE = np.pi / 2.0
-"""Angle of a platform that tilts to which slices look for its reach, either way, rad."""
+"""Greatest angle, rad, either way, that a slice along an angle of the platform shows."""
 
 Plane = str | tuple[str, str]
 """The two coordinates of the pose that vary: "xy", "xz", "yz", or a pair of names."""

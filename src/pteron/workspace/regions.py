@@ -13,10 +13,10 @@ from pteron.errors import DataError, shown
 from pteron.kernels import Array
 
 _FARTHEST = 1e70
-"""Numbers whose squares and fourth powers are still numbers are smaller."""
+"""Bound on the numbers of a region, whose fourth powers must not overflow; others are refused."""
 
 _WIDER = 1e-12
-"""m, and relative: far more than the rounding of what is compared."""
+"""Tolerance of comparisons, m and relative: far more than their rounding."""
 
 
 @runtime_checkable

@@ -26,7 +26,7 @@ _HALVINGS = 40
 """Bisections of the size."""
 
 _SHARES = 20
-"""Most times that the size is made smaller by the tolerance until it is proved."""
+"""Most times that the size is made smaller by the tolerance until it is proved, or refused."""
 
 _MOST = math.pi / 2.0
 """Greatest tilt that is looked at, rad: beyond it the angles of a pose are singular."""

@@ -27,7 +27,7 @@ _MARGIN = 1e-3
 """Largest margin of a body inside its cone, relative to its mass; a uniform rod has 0.067."""
 
 _LEAST_MARGIN = 1e-6
-"""Least margin of a body."""
+"""Least margin of a body, over its mass: for a CAD body that is next to none."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ _SMALLER, _SLOWER = 0.9, 1.05
 """Factors on size and duration of a cycle, until it keeps the limits."""
 
 _SMALLEST = 0.02
-"""Least scale of a cycle."""
+"""Least scale of a cycle; where not even that keeps the limits there is none."""
 
 _AT_REST = 1e4
 """Duration of a cycle in which nothing but gravity is felt, s."""

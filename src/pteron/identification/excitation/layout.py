@@ -27,7 +27,7 @@ _PER_UNIT: dict[str, float] = {**PER_SECOND, "mm": 1e3, "um": 1e6, "deg": 180.0 
 """Units by name, each with the number that makes one SI unit."""
 
 _MOST_SAMPLES = 10_000_000
-"""Samples that a file may have."""
+"""Most samples of a file; more are refused."""
 
 _ROUNDING = 1e-6
 """Share of a sample that counts as rounding."""

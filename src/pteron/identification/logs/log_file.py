@@ -46,8 +46,11 @@ from pteron.platforms.coordinates import COORDINATES
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table, write_table
 
 _FEWEST = 50
+"""Least rows of a log; a shorter one is refused."""
+
 _AHEAD = 10_000
 """Rows looked at when a log is opened: the usual step is their median."""
+
 _PER_METRE = {"mm": 1e3, "um": 1e6}
 
 Values = NDArray[np.float64]

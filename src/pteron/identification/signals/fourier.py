@@ -14,7 +14,7 @@ from pteron.kernels import Array
 from pteron.motion.trajectories.fourier import FourierSeries, fourier_basis, row_blocks
 
 _MOST = 120
-"""Most harmonics."""
+"""Most harmonics of a series where no highest frequency is given."""
 
 _SIGNIFICANT = 5.0
 """Size of a harmonic, in standard deviations of noise, above which it belongs to the motion: by

@@ -40,7 +40,7 @@ class States:
     time : array, shape (R,)
         s.
     joints, joint_rates, joint_accelerations : array, shape (R, n)
-        m and s.
+        m, at cranks rad, and s.
     pose, velocity, acceleration : array, shape (R, m)
         m, rad and s.
     payload : array of int, shape (R,)

@@ -31,7 +31,7 @@ _POSES = 64
 """Poses of a motion at which the longest stable step under friction is computed."""
 
 _MOST = 10_000_000
-"""Samples that a simulation may have."""
+"""Most samples of a simulation; a longer one is refused."""
 
 _STATE = ("start, pose", "start, velocity")
 """Names in messages of the two parts of a start."""

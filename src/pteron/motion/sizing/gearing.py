@@ -1,4 +1,4 @@
-"""The ratio between a motor and its joint: which is best, and which a motor's limits allow.
+"""Ratios between a motor and its joint that the motor's limits allow, and its torque at a ratio.
 
 A motor of rotor inertia J behind a ratio i, motor angle over the joint's coordinate, has the torque
 T = f / i + J i q''. What the joint needs without the motor, f, does not depend on the ratio, for

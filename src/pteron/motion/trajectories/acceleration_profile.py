@@ -30,7 +30,7 @@ class Profile(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """Duration from rest to rest, in units."""
+        """Duration from rest to rest, in the unit of `time`."""
         return float(self.time[-1])
 
     def spread(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:

@@ -25,7 +25,7 @@ from pteron.motion.trajectories.tool import Curve
 from pteron.shapes import PoseLike
 
 _NEAR = 1e-6
-"""m or rad by which the platform may miss the pose that its joints have gone to."""
+"""m or rad by which the platform may miss the pose that its joints go to; more is refused."""
 
 _FAST = 1e6
 """m/s or rad/s of a joint that has no limit."""

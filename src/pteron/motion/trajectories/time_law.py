@@ -22,7 +22,7 @@ STEP = 1e-3
 """Time between the samples of a motion, s."""
 
 _MOST = 10_000_000
-"""Samples that a motion may have."""
+"""Most samples of a motion; a longer one is refused."""
 
 _LOOK = 2001
 """Points of a motion from which its shortest duration is computed, and at which a given one is
