@@ -1,4 +1,4 @@
-"""The errors a user can meet; every one says what was given, what was expected and what to do."""
+"""The errors and the warning that a user can meet: each says what is wrong, and what to do."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class OutputError(PteronError):
 
 
 class UnlikelyValue(UserWarning):
-    """A value that is possible, but likely in another unit: millimetres, degrees."""
+    """A value that is possible, but likely in another unit, such as millimetres or degrees."""
 
 
 class UnreachablePose(PteronError):

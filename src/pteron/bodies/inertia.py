@@ -13,6 +13,7 @@ from pteron.bodies.vectors import number, numbers, positive
 from pteron.errors import ModelError
 
 _ROUNDING = 1e-12
+"""Share of an inertia by which it may miss what a real body has at least, from rounding."""
 
 
 @runtime_checkable
@@ -21,7 +22,7 @@ class Inertia(Protocol):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of its parameters, in order: some of "m", "mgx", "mgy" and "I"."""
+        """The kinds of its parameters, in order: some of `bodies.parameters.LENGTH_POWERS`."""
 
     @property
     def values(self) -> tuple[float, ...]:

@@ -23,7 +23,10 @@ _VANISHING = 1e-9
 """Singular value of unit vectors below which they do not span another direction."""
 
 _ROUNDING = 4 * math.ulp(1.0)
+"""Difference from length 1 up to which a vector is kept as it is given."""
+
 _UPRIGHT = 1e-15
+"""Cosine of two unit vectors up to which the one is kept as perpendicular to the other."""
 
 
 def number(value: object, key: str) -> float:

@@ -14,6 +14,7 @@ from pteron.legs.leg import Locus, Plane, Sphere, Turned
 from pteron.platforms.motion import PlatformEquations
 
 _ROUNDING = 1e-14
+"""Share of two squares by which their difference may be below zero from rounding."""
 
 
 def moved(locus: Locus, offset: Expression) -> Locus:

@@ -1,7 +1,7 @@
 """The closure of legs with ball joints at their ends, under a platform that turns about any axis.
 
 While its joint is held each leg keeps its platform point on a sphere, or on a circle of a tripod's
-plane. The poses have no closed form; see `kinematics.assembly`.
+plane. The poses have no closed form; `kinematics.tilting_assembly` finds them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class TiltingLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The most poses that joint coordinates may have: 40, or 8 where a point stays."""
+        """The most poses of joint coordinates: 40 of six legs, 16 of a tripod, 8 where P stays."""
         if len(self.legs) == 6:
             return 40
         return 16 if "z" in self.platform.coordinates else 8

@@ -1,4 +1,4 @@
-"""Lemma 1: two links that close a triangle are the intersection of two circles.
+"""Two links that close a triangle: the intersection of two circles, the paper's Lemma 1.
 
 Vectors lie in the plane of the links, as two-vectors (2, 1).
 """
@@ -16,6 +16,7 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import cross
 
 _ROUNDING = 1e-15
+"""Difference from 0, 1 or -1 that counts as rounding."""
 
 
 def edges_of_reach(lu: Expression, ll: Expression, n2: Expression) -> tuple[Expression, Expression]:

@@ -1,7 +1,8 @@
-"""Legs with a crank, R-S-S and planar R-R-R: a last link leads from its end to the platform point.
+"""Legs with a crank, R-S-S and planar R-R-R: a last link leads from the crank's end on.
 
-The crank turns about d through the guide point r. The last link counts its length in space where it
-is a rod, in the crank's plane where it is a planar link; this is all that tells the kinds apart.
+The crank turns about d through the guide point r; the last link ends at the platform point. The
+last link counts its length in space where it is a rod, in the crank's plane where it is a planar
+link; this is all that tells the kinds apart.
 """
 
 from __future__ import annotations

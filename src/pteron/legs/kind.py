@@ -79,6 +79,7 @@ class ReachBound(NamedTuple):
 
 
 _ROUNDING = 1e-9
+"""Share of a body's length by which its centre of mass may be beyond the ends, from rounding."""
 
 _EquationsClass = type[LegEquations]
 

@@ -1,4 +1,4 @@
-"""P-R-R legs, of planar machines: a slider and a link in one plane."""
+"""P-R-R legs (prismatic, revolute, revolute), of planar machines: slider and link in one plane."""
 
 from __future__ import annotations
 

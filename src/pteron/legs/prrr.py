@@ -1,4 +1,4 @@
-"""P-R-R-R legs, the paper's: a slider and two links in a plane across the revolute axes.
+"""P-R-R-R legs, the paper's: a slider (P) and two links in a plane across the revolute axes (R).
 
 In a PRRU leg a fourth revolute axis, along the platform's k, meets R3 at the platform point, so
 that the platform may turn against the leg.
@@ -54,6 +54,7 @@ from pteron.legs.slide import SLIDER_KEYS
 from pteron.legs.two_bar import two_bar_needs
 
 _LEAST_SLIDE = 1e-6
+"""Least share of a slide that moves the leg's plane; with less the leg is refused."""
 
 
 def _check_slide(e: Vector | None, d: Vector) -> None:

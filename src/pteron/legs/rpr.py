@@ -1,4 +1,4 @@
-"""R-P-R legs, of planar machines: a ram between two revolute joints, driven in its middle.
+"""R-P-R legs, of planar machines: a ram (P) between two revolute joints (R), driven in its middle.
 
 The cylinder swings about the base joint, the piston ends at the platform point; both turn alike.
 """

@@ -1,4 +1,4 @@
-"""R-P-S legs, of tripods: a ram in an upright plane, with a ball joint at the platform."""
+"""R-P-S legs, of tripods: a ram (P) in an upright plane, with a ball joint (S) at the platform."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from pteron.legs.rpr import RPR, RPREquations
 
 @dataclass(frozen=True)
 class RPS(RPR):
-    """An R-P-S leg, which keeps its platform point in the plane through r across `direction`.
+    """An R-P-S leg: it keeps its platform point in the plane through r, normal to `direction`.
 
-    It is an R-P-R leg (`RPR`, whose parameters it has) that ends in a ball joint.
+    It is an R-P-R leg (`RPR`, whose parameters it has) that ends in a ball joint; r is the guide
+    point.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""R-R-R legs, of planar machines: a crank and a link in one plane, as of a five-bar or a 3-RRR."""
+"""R-R-R legs (three revolute joints), of planar machines such as a five-bar: a crank and a link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""R-R-S legs, of ball-balancing tables and ankles: a crank and a link in an upright plane."""
+"""R-R-S legs (revolute, revolute, spherical), of ball-balancing tables.
+
+A crank and a link move in one upright plane; a ball joint ends the link at the platform.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,10 @@ from pteron.legs.rrr import RRR, RRREquations
 
 @dataclass(frozen=True)
 class RRS(RRR):
-    """An R-R-S leg, which keeps its platform point in the plane through r across `direction`.
+    """An R-R-S leg: it keeps its platform point in the plane through r, normal to `direction`.
 
-    It is an R-R-R leg (`RRR`, whose parameters it has) that ends in a ball joint.
+    It is an R-R-R leg (`RRR`, whose parameters it has) that ends in a ball joint; r is the guide
+    point.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """R-U-P-U legs: the telescopic shaft that turns the platform, the fourth axis of many Deltas.
 
-It holds no point of the platform: its joint follows phi, and its two parts swing with the direction
-from the base to the platform point. The cardan error of its joints is left out.
+A turning joint (R) drives two universal joints (U) with a slide (P) between them. The leg holds no
+point of the platform: its joint follows phi, and its two parts swing with the direction from the
+base to the platform point. The cardan error of its joints is left out.
 """
 
 from __future__ import annotations

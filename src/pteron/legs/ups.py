@@ -1,4 +1,4 @@
-"""U-P-S legs, the hexapod's: a ram between a universal joint on the base and a ball joint.
+"""U-P-S legs, the hexapod's: a ram (P) from a universal joint (U) on the base to a ball joint (S).
 
 The cylinder swings about the base joint, the piston ends at the platform point; both are rods, of
 which the spin about their axis has no inertia.

@@ -15,6 +15,7 @@ from pteron.manipulator.given import RobotLike, as_manipulator
 from pteron.manipulator.manipulator import Manipulator
 
 _ORTHOGONAL = 1e-9
+"""Greatest element by which R R^T of a rotation may differ from 1."""
 
 
 def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:

@@ -14,6 +14,8 @@ from pteron.legs import KINDS
 from pteron.manipulator.tables import MachineTable, leg_table, platform_table
 
 _WIDTH = 110
+"""Width of comments that have lines of their own."""
+
 _COLUMN = 46
 """The last column in which comments begin; those of longer lines stand above them."""
 

@@ -1,4 +1,4 @@
-"""Kinds of platforms, one file each; `platforms.motion` is the page to read before another."""
+"""Kinds of platforms, entered in `kinds.py`; read `platforms.motion` before writing another."""
 
 from pteron.platforms.kinds import equations_class
 from pteron.platforms.motion import PlatformEquations

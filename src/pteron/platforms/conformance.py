@@ -17,6 +17,7 @@ from pteron.platforms.coordinates import COORDINATES
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _POINTS = 3
+"""Platform points of the motion."""
 
 _SMALL = 0.3
 """Size of the motion, SI units: a tripod does not tilt by much."""

@@ -34,7 +34,7 @@ _SIZES = (160, 3840)
 """Least and greatest side, pixels."""
 
 _MOST = 20_000
-"""Frames of one film."""
+"""Most frames of one film; a longer one is refused."""
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,16 @@ from pteron.workspace import BEYOND_LIMITS, REACHABLE
 _WIDTH = 5.0
 """Width of the figure, inches: texts stay legible on a phone."""
 
-_HATCHES = {BEYOND_LIMITS: "....", 1: "////", 2: "\\\\\\\\", 3: "xxxx", 4: "----"}
-"""Hatches by the status of a pose: beyond a limit, or out of reach of leg 1, 2, 3 or 4."""
+_HATCHES = {
+    BEYOND_LIMITS: "....",
+    1: "////",
+    2: "\\\\\\\\",
+    3: "xxxx",
+    4: "----",
+    5: "||||",
+    6: "++++",
+}
+"""Hatches by the status of a pose: beyond a limit, or out of reach of leg 1 to 6."""
 
 _WIDE = 20.0
 """Ratio of the greatest value to the median above which colours are logarithmic."""

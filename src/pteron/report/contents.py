@@ -52,6 +52,7 @@ from pteron.workspace.reach import Plane, reached, slice_planes
 from pteron.workspace.tilts import largest_tilt
 
 _ANGLES = 361
+"""Angles of the platform, over a turn, at which the type-II measure is shown."""
 
 _CONSTANT = 1e-6
 """Change of the type-II measure below which it is constant."""
