@@ -9,10 +9,12 @@ import os
 import shutil
 import signal
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer.testing
 
 # What is kept is named after the source that it depends on, see test_kept.
 _CACHE = Path(__file__).parent.parent / ".pytest_cache" / "pteron"
@@ -21,6 +23,9 @@ os.environ.setdefault("PTERON_KERNELS", "vm")
 
 # Graphs of equations are many small objects without cycles: looking for those takes a twentieth.
 gc.set_threshold(100_000, 50, 50)
+
+# A command of the tests is run as in a shell, but for what each process makes of all commands first.
+typer.testing._get_command = lru_cache(typer.testing._get_command)  # type: ignore[attr-defined]
 
 # What a shell starts in the background ignores Ctrl-C; the tests of interruption want it.
 signal.signal(signal.SIGINT, signal.default_int_handler)

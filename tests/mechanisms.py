@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import cycle, islice
 
 import descriptions
 import numpy as np
@@ -345,6 +346,22 @@ def gated(cases, gate=GATE, mark=NIGHTLY):
     every = dict.fromkeys(cases)
     assert not set(gate).isdisjoint(every)
     return [case if case in gate else pytest.param(case, marks=mark) for case in every]
+
+
+def in_turn(cases, gate=GATE, share=3, argument="name", **options):
+    """Return what parametrizes the claims of a file, each in the gate by the next of its cases.
+
+    A file with claims enough has each case of its gate, and each claim `share` of them: a machine
+    is tried against what is said of machines, and a claim against kinds of machines, but not every
+    pair of the two before `make nightly`.
+    """
+    turns = cycle(gate)
+
+    def parametrized(test):
+        some = gated(cases, list(islice(turns, share)))
+        return pytest.mark.parametrize(argument, some, **options)(test)
+
+    return parametrized
 
 
 @lru_cache

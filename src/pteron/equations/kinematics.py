@@ -24,7 +24,8 @@ def inverse_position(machine: Machine, pose: Expression) -> Expression:
 
 def reach(machine: Machine, pose: Expression) -> list[Reach]:
     """Return whether each leg reaches the pose, how far it is from its edge, and how bent."""
-    points = machine.state(pose).platform.points
+    rest = ca.SX.zeros(machine.freedom)
+    points = machine.platform.motion(pose, rest, rest).points
     return [leg.reach(c.position) for leg, c in zip(machine.legs, points, strict=True)]
 
 

@@ -84,7 +84,7 @@ def _divided(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]] | 
 def _cost(graph: TermGraph, roots: list[int]) -> int:
     """Return the operations, but for negations."""
     cost, alone = 0, {abs(value) for value in roots}
-    order = graph.order(alone)
+    order = graph.order(roots)
     for k in order:
         kind, operands = graph.nodes[k][0], graph.operands(k)
         if kind in ("sum", "product"):
@@ -202,7 +202,7 @@ def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
                     heapq.heappush(heap, (-len(found), _pair(v, value)))
             lists[k].append(value)
     for k, values in lists.items():
-        graph.nodes[k] = (kind, *values)
+        graph.replace(k, kind, *values)
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from itertools import chain
 from math import isfinite
 from typing import Any
 
@@ -30,15 +31,22 @@ class TermGraph:
         self.nodes: list[Node] = [()]
         self.numbers: dict[Node, int] = {}
         self._constants: dict[int, float] = {}
+        self._orders: dict[tuple[int, ...], list[int]] = {}
 
     def add(self, *node: Any) -> int:
         """Return the number of a node, which is new or there already."""
-        number = self.numbers.setdefault(node, len(self.nodes))
-        if number == len(self.nodes):
+        number = self.numbers.get(node)
+        if number is None:
+            number = self.numbers[node] = len(self.nodes)
             self.nodes.append(node)
             if node[0] == "constant" and isfinite(node[1]):
                 self._constants[number] = node[1]
         return number
+
+    def replace(self, k: int, *node: Any) -> None:
+        """Put another node of the same value in the place of one."""
+        self.nodes[k] = node
+        self._orders.clear()
 
     def constant(self, c: float) -> int:
         """Return the value of a number."""
@@ -78,16 +86,20 @@ class TermGraph:
         """Return the value of a product."""
         constant, factors = 1.0, []
         for value in values:
-            c = self.constant_of(value)
-            constant *= sign_of(value) if c is None else c
+            k = abs(value)
+            c = self._constants.get(k)
             if c is None:
-                factors.append(abs(value))
-        sign, size = sign_of(constant), abs(constant)
-        if size == 0.0 or not factors:
+                factors.append(k)
+            else:
+                constant *= c
+            if value < 0:
+                constant = -constant
+        if constant == 0.0 or not factors:
             return self.constant(constant)
-        if size != 1.0:
-            factors.append(self.constant(size))
-        return sign * (factors[0] if len(factors) == 1 else self.add("product", *sorted(factors)))
+        if abs(constant) != 1.0:
+            factors.append(self.constant(abs(constant)))
+        number = factors[0] if len(factors) == 1 else self.add("product", *sorted(factors))
+        return number if constant > 0.0 else -number
 
     def quotient(self, a: int, b: int) -> int:
         """Return the value of a/b; 1/b becomes an operation that others may use."""
@@ -120,32 +132,37 @@ class TermGraph:
 
     def order(self, roots: Iterable[int]) -> list[int]:
         """Return the nodes that the roots depend on, operands first."""
+        start = tuple(map(abs, roots))
+        if start in self._orders:
+            return self._orders[start]
         order: dict[int, None] = {}
-        stack = [abs(value) for value in roots]
+        stack = list(start)
         while stack:
-            waiting = [k for v in self.operands(stack[-1]) if (k := abs(v)) not in order]
+            last = stack[-1]
+            waiting = last not in order and [
+                k for k in map(abs, self.operands(last)) if k not in order
+            ]
             if waiting:
                 stack += waiting
             else:
                 order[stack.pop()] = None
-        return list(order)
+        self._orders[start] = found = list(order)
+        return found
 
     def uses(self, roots: Iterable[int]) -> Counter[int]:
         """Return the number of times that each node is an operand or a root."""
         roots = list(roots)
-        uses = Counter(abs(value) for value in roots)
-        for k in self.order(roots):
-            for v in self.operands(k):
-                uses[abs(v)] += 1
-        return uses
+        operands = chain.from_iterable(map(self.operands, self.order(roots)))
+        return Counter(map(abs, chain(roots, operands)))
 
     def rebuilt(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
         """Return a graph made from this one by a rule, node by node."""
         new = TermGraph()
         values: dict[int, int] = {}
         for k in self.order(roots):
-            values[k] = rule(new, k, [sign_of(v) * values[abs(v)] for v in self.operands(k)])
-        return new, [sign_of(v) * values[abs(v)] for v in roots]
+            values[k] = value = rule(new, k, [values[v] for v in self.operands(k)])
+            values[-k] = -value
+        return new, [values[v] for v in roots]
 
     def copied(self, new: TermGraph, k: int, values: list[int]) -> int:
         """Return the value in a new graph that differs in the operands alone: the plainest rule."""

@@ -96,6 +96,9 @@ class _OneState:
 @lru_cache(maxsize=256)
 def _lowered(function: ca.Function) -> ca.Function:
     """Return the function with the sines and cosines of `sincos`."""
+    graph = graph_of(function)
+    if not any(node.operation in ("sin", "cos") for node in graph.nodes):
+        return function
     entries = [symbol.nonzeros() for symbol in function.sx_in()]
 
     def rule(node: Node, arguments: list[Expression]) -> Expression:
@@ -105,7 +108,6 @@ def _lowered(function: ca.Function) -> ca.Function:
         close = near()(*arguments)[node.operation == "cos"]
         return ca.if_else(ca.fabs(arguments[0]) <= LIMIT, close, value)
 
-    graph = graph_of(function)
     values = graph.values(lambda i, j: entries[i][j], rule)
     return function_like(function, graph.results(values))
 

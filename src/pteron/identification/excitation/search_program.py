@@ -27,7 +27,7 @@ from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, parameters
-from pteron.motion.trajectories.fourier import fourier_basis
+from pteron.motion.trajectories.fourier import fourier_bases
 
 Criterion = Literal["condition", "logdet"]
 """The cost: the scaled condition number, or the volume of the confidence ellipsoid."""
@@ -143,8 +143,7 @@ class _Kept:
 
 def _bases(setting: Setting, times: Array) -> Array:
     """Return what takes coefficients to q, q' and q'' at instants (T,): (3, T, 2 H + 1)."""
-    shape = setting.harmonics, setting.period
-    return np.array([fourier_basis(times, *shape, derivative) for derivative in range(3)])
+    return np.array(list(fourier_bases(times, setting.harmonics, setting.period)))
 
 
 def _instants(setting: Setting) -> Array:

@@ -27,7 +27,7 @@ from pteron.identification.logs import Log
 from pteron.identification.signals.filters import SETTLING, smoothed
 from pteron.identification.signals.fourier import FittedSeries, fitted_series
 from pteron.kernels import Array
-from pteron.motion.trajectories.fourier import fourier_basis
+from pteron.motion.trajectories.fourier import fourier_bases
 
 Derivatives = Literal["periodic", "central", "spline"]
 """The differentiators' names."""
@@ -191,9 +191,8 @@ class FourierFit:
     def curve(self, log: Log) -> Curve:
         """Return the series at the log's samples."""
         series = self.series(log)
-        q, dq, ddq = (
-            sparse.csr_matrix(fourier_basis(log.time, series.harmonics, self.period, k))
-            for k in range(3)
+        q, dq, ddq = map(
+            sparse.csr_matrix, fourier_bases(log.time, series.harmonics, self.period)
         )
         return Curve(series.coefficients, (q, dq, ddq), 0)
 

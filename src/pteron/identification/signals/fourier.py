@@ -44,8 +44,16 @@ class Projection:
         size = 2 * self.harmonics + 1
         return cho_factor(sum((basis.T @ basis for basis in bases), np.zeros((size, size))))  # type: ignore[no-any-return]
 
+    @cached_property
+    def _first(self) -> Array:
+        """The basis functions at the first block of samples: of short logs, at all of them."""
+        rows = next(row_blocks(len(self.time)))
+        return fourier_basis(self.time[rows], self.harmonics, self.period)
+
     def basis(self, rows: slice) -> Array:
-        """Return the basis functions at some of the samples."""
+        """Return the basis functions at a block of the samples."""
+        if rows.start == 0:
+            return self._first
         return fourier_basis(self.time[rows], self.harmonics, self.period)
 
     def coefficients(self, signal: Callable[[slice], Array], size: int) -> Array:

@@ -85,29 +85,30 @@ class FourierSeries:
 def fourier_curve(coefficients: Array, period: float, times: Array) -> Curve:
     """Return the sums of coefficients (2 H + 1, m) at times (T,), s, and two derivatives."""
     harmonics = len(coefficients) // 2
-    value, first, second = (
-        np.concatenate(
-            [
-                fourier_basis(times[rows], harmonics, period, derivative) @ coefficients
-                for rows in row_blocks(len(times))
-            ]
-        )
-        for derivative in range(3)
-    )
+    blocks = [
+        [basis @ coefficients for basis in fourier_bases(times[rows], harmonics, period)]
+        for rows in row_blocks(len(times))
+    ]
+    value, first, second = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     return value, first, second
 
 
-def fourier_basis(times: Array, harmonics: int, period: float, derivative: int = 0) -> Array:
-    """Return 1, the cosine and the sine of each harmonic, or a derivative of them, (T, 2 H + 1).
+def fourier_basis(times: Array, harmonics: int, period: float) -> Array:
+    """Return 1, the cosine and the sine of each harmonic at times (T,), s: (T, 2 H + 1).
 
     The columns are those of 1, then of all cosines, then of all sines.
     """
+    return next(fourier_bases(times, harmonics, period))
+
+
+def fourier_bases(times: Array, harmonics: int, period: float) -> Iterator[Array]:
+    """Yield the basis of Fourier series, and its first and second derivative."""
     w = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
     angles = np.outer(np.remainder(times, period), w)
     cosines, sines = np.cos(angles), np.sin(angles)
-    for _ in range(derivative):
+    for constant in (1.0, 0.0, 0.0):
+        yield np.hstack([np.full((len(times), 1), constant), cosines, sines])
         cosines, sines = -w * sines, w * cosines
-    return np.hstack([np.full((len(times), 1), float(derivative == 0)), cosines, sines])
 
 
 def row_blocks(rows: int) -> Iterator[slice]:
