@@ -24,7 +24,7 @@ os.environ.setdefault("PTERON_KERNELS", "vm")
 # Graphs of equations are many small objects without cycles: looking for those takes a twentieth.
 gc.set_threshold(100_000, 50, 50)
 
-# A command of the tests is run as in a shell, but for what each process makes of all commands first.
+# A command line is run as in a shell, but all commands are put together once a process.
 typer.testing._get_command = lru_cache(typer.testing._get_command)  # type: ignore[attr-defined]
 
 # What a shell starts in the background ignores Ctrl-C; the tests of interruption want it.

@@ -348,6 +348,11 @@ def gated(cases, gate=GATE, mark=NIGHTLY):
     return [case if case in gate else pytest.param(case, marks=mark) for case in every]
 
 
+def several(cases, gate):
+    """Return the cases of a claim with several arguments; those not of the gate wait."""
+    return [case if case in gate else pytest.param(*case, marks=NIGHTLY) for case in cases]
+
+
 def in_turn(cases, gate=GATE, share=3, argument="name", **options):
     """Return what parametrizes the claims of a file, each in the gate by the next of its cases.
 
@@ -355,7 +360,7 @@ def in_turn(cases, gate=GATE, share=3, argument="name", **options):
     is tried against what is said of machines, and a claim against kinds of machines, but not every
     pair of the two before `make nightly`.
     """
-    turns = cycle(gate)
+    turns = cycle([case for case in gate if case in set(cases)])
 
     def parametrized(test):
         some = gated(cases, list(islice(turns, share)))

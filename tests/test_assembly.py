@@ -74,7 +74,7 @@ def well_held(robot, poses):
 
 
 @pytest.mark.parametrize("seed", gated(range(2), [0]))
-@pytest.mark.parametrize("kinds", gated(MOST, SOME))
+@pytest.mark.parametrize("kinds", gated(MOST, SOME[::2]))
 def test_direct_inverts_inverse(kinds, seed):
     robot = random_machine(seed, kinds)
     poses, joints = reached(robot, 200, seed)
@@ -100,7 +100,7 @@ def test_direct_inverts_inverse(kinds, seed):
 
 
 @pytest.mark.parametrize("seed", gated(range(4), [0]))
-@pytest.mark.parametrize("kinds", gated(OPEN, SOME))
+@pytest.mark.parametrize("kinds", gated(OPEN, SOME[1::2]))
 def test_modes_counted_another_way(kinds, seed):
     robot = random_machine(100 + seed, kinds)
     _agree(robot, reached(robot, 3, seed)[1])

@@ -10,7 +10,7 @@ import casadi as ca
 import codac_bounds
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS
+from mechanisms import CATALOG, MECHANISMS, in_turn
 
 import pteron
 from pteron.errors import DataError, ModelError
@@ -37,7 +37,7 @@ from pteron.workspace.margins import distance_to_limits
 
 MACHINES = {**CATALOG, **MECHANISMS}
 SOME = ["quadrupteron-oblique", "delta", "3-rrr", "random 3T1R 0", "random PRR 0"]
-EVERY = pytest.mark.parametrize("name", SOME)
+EVERY = in_turn(SOME, SOME, share=2)
 QUADRUPTERON = CATALOG["quadrupteron"]
 
 

@@ -177,6 +177,7 @@ WITH_BLOCKS = [name for name, text in TEXTS.items() if name != "README.md" and b
 SLOW = {
     *("docs/plots.md", "docs/play.md", "docs/simulation.md", "docs/controllers.md"),
     *("docs/how-to/prove-a-workspace.md", "docs/how-to/singularities.md"),
+    "docs/how-to/platforms-that-tilt.md",
 }
 
 

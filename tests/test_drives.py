@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from logs_of_motions import Friction, log_of, motion
-from mechanisms import CATALOG, gated, random_machine, states
+from mechanisms import CATALOG, in_turn, random_machine, states
 
 import pteron
 from pteron import Drive, ModelError, Stribeck
@@ -16,7 +16,7 @@ MACHINES = {
     **{name: CATALOG[name] for name in ("quadrupteron", "delta-4", "par4", "five-bar")},
     "random PRSU": random_machine(2, "PRSU"),
 }
-EVERY = pytest.mark.parametrize("name", gated(MACHINES, ["delta-4", "five-bar", "random PRSU"]))
+EVERY = in_turn(MACHINES, ["delta-4", "five-bar", "random PRSU"], share=1)
 
 
 def driven(robot):

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from differences import along, gradient
-from mechanisms import BATCH_SHAPES, CATALOG, MACHINES, MECHANISMS, gated, relative_error, states
+from mechanisms import BATCH_SHAPES, CATALOG, MACHINES, MECHANISMS, in_turn, relative_error, states
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -14,9 +14,10 @@ from pteron.equations.machine import Machine
 from pteron.kernels import program
 from pteron.legs.leg import LegEquations
 
-EVERY = pytest.mark.parametrize("name", gated(MACHINES))
-TWO_LINKS = pytest.mark.parametrize("name", gated(MECHANISMS))
+EVERY = in_turn(MACHINES)
+TWO_LINKS = in_turn(MECHANISMS, share=2)
 FEW = ["quadrupteron-oblique", "delta", "random 3T 0", "random PRR 0"]
+SOME = in_turn(FEW, FEW, share=2)
 COUNT = 100
 
 
@@ -51,7 +52,7 @@ def test_the_regressor_is_linear_in_the_parameters_and_the_papers(name):
     assert (np.abs(found - D) / scale).max() < 1e-12
 
 
-@pytest.mark.parametrize("name", FEW)
+@SOME
 def test_the_factors_of_equation_15_multiply_to_the_regressor(name):
     robot = MACHINES[name]
     motion = states(robot, COUNT)
@@ -120,7 +121,7 @@ def test_the_equation_of_motion(name):
     np.testing.assert_allclose(pteron.kinetic_energy(robot, pose, velocity), energy, rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", FEW)
+@SOME
 def test_the_rate_of_the_mass_matrix_less_twice_c_is_skew(name):
     robot = MACHINES[name]
     pose, velocity, _ = states(robot, 20)
@@ -224,7 +225,7 @@ def test_the_platforms_motion_from_that_of_the_joints(name):
     assert relative_error(back[1], motion[2]) < 1e-10
 
 
-@pytest.mark.parametrize("name", FEW)
+@SOME
 def test_a_machine_turned_with_gravity_feels_the_same_forces(name):
     robot = MACHINES[name]
     rotation = Rotation.random(rng=len(name)).as_matrix()

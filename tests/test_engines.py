@@ -56,13 +56,17 @@ def machine(name):
     return robot, descriptions.states(descriptions.describe(robot), COUNT, 1), None
 
 
-@pytest.fixture(
-    scope="module", params=mechanisms.gated([*CATALOG, *RANDOM, *TILTING, *EACH, XYZ], GATE)
+EVERY = mechanisms.in_turn(
+    [*CATALOG, *RANDOM, *TILTING, *EACH, XYZ], GATE, share=4, argument="case", indirect=True
 )
+
+
+@pytest.fixture(scope="module")
 def case(request):
     return machine(request.param)
 
 
+@EVERY
 @pytest.mark.parametrize("engine", ENGINES)
 def test_forces_through_the_closure(case, engine):
     robot, motion, home = case
@@ -108,6 +112,7 @@ def test_working_modes_and_turned_machines():
         assert relative_error(forces, pteron.inverse_dynamics(robot, *motion)) < 1e-8
 
 
+@EVERY
 def test_accelerations_by_constrained_dynamics(case):
     """Pinocchio's constraintDynamics, with three rows a loop, against `forward_dynamics`."""
     pin = pytest.importorskip("pinocchio")
@@ -166,6 +171,7 @@ def test_a_drives_inertia_is_armature():
     np.testing.assert_allclose(np.diag(reflected), [0.02, 0.02, 0.02, 0.02 * ratio**4])
 
 
+@EVERY
 def test_mjcf_opens_at_the_home_pose_with_its_loops_closed(case):
     mujoco = pytest.importorskip("mujoco")
     robot, _, home = case
@@ -211,6 +217,7 @@ def test_mjcf_has_drives_and_limits():
     np.testing.assert_allclose(model.actuator_gear[:, 0], [1.0, 1.0, 1.0, -2.0])
 
 
+@EVERY
 def test_the_parts_are_the_whole_machine(case):
     """Mass, and every body real: no moment above the sum of the other two."""
     robot, _, home = case
@@ -227,6 +234,7 @@ def test_the_parts_are_the_whole_machine(case):
     assert set(robot.coordinates) <= set(names)
 
 
+@EVERY
 def test_coordinates_close_the_loops(case):
     robot, (pose, *_), _ = case
     opened = tree(robot, pose[0])
@@ -296,7 +304,10 @@ def test_what_a_file_cannot_hold_is_said_in_it():
 
 
 @pytest.mark.parametrize(
-    "name", mechanisms.gated([*CATALOG, *mechanisms.TILTED], [*CATALOG, "ankle"])
+    "name",
+    mechanisms.gated(
+        [*CATALOG, *mechanisms.TILTED], ["tripteron", "delta-4", "h4", "3-rpr", "ankle"]
+    ),
 )
 def test_every_link_of_a_urdf_has_an_inertia_that_engines_take(tmp_path, name):
     path, _ = export_urdf(name, tmp_path)
@@ -391,6 +402,7 @@ def test_roll_pitch_yaw_also_where_pitch_is_upright():
         np.testing.assert_allclose(back, turn, rtol=0, atol=2e-15)
 
 
+@EVERY
 def test_the_looks_join_up(case):
     """A leg is seen as one line: each body's looks begin where those of the one before end."""
     from pteron.export.engines.shapes import dressed

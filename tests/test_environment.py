@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from mechanisms import CATALOG, NIGHTLY, TILTED, random_machine, with_elbows
+from mechanisms import CATALOG, NIGHTLY, TILTED, in_turn, random_machine, with_elbows
 from scipy.integrate import solve_ivp
 from test_sizing import driven
 
@@ -24,13 +24,7 @@ MACHINES = {
     "planar": random_machine(0, "CLP"),
     **{name: TILTED[name] for name in ("wrist", "ball-table", "stewart")},
 }
-EVERY = pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=NIGHTLY) if name in ("ball-table", "stewart") else name
-        for name in MACHINES
-    ],
-)
+EVERY = in_turn(MACHINES, [name for name in MACHINES if name not in ("ball-table", "stewart")])
 
 
 @lru_cache

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trees
 from lagrange import Lagrange
-from mechanisms import CATALOG, gated, random_machine, relative_error
+from mechanisms import CATALOG, gated, in_turn, random_machine, relative_error
 
 import pteron
 
@@ -47,11 +47,17 @@ class Case(NamedTuple):
     oracle: Lagrange
 
 
-@pytest.fixture(
-    scope="module",
-    params=gated([*CATALOG, *((kinds, seed) for kinds in KINDS for seed in range(MANY))], GATE),
+EVERY = in_turn(
+    [*CATALOG, *((kinds, seed) for kinds in KINDS for seed in range(MANY))],
+    GATE,
+    share=4,
+    argument="case",
+    indirect=True,
     ids=lambda p: p if isinstance(p, str) else f"{p[0]}-{p[1]}",
 )
+
+
+@pytest.fixture(scope="module")
 def case(request):
     if request.param in CATALOG:
         robot = CATALOG[request.param]
@@ -76,6 +82,7 @@ def loaded(forces, jacobian, wrench):
     return forces - np.linalg.solve(jacobian.swapaxes(1, 2), wrench[..., None])[..., 0]
 
 
+@EVERY
 def test_joints(case):
     machine, poses = descriptions.describe(case.robot), case.motion[0]
     away = pteron.inverse_kinematics(case.robot, poses)
@@ -85,17 +92,20 @@ def test_joints(case):
     assert np.abs(away).max() < 1e-12
 
 
+@EVERY
 def test_jacobian(case):
     poses = case.motion[0]
     assert error(pteron.jacobian(case.robot, poses), case.oracle.jacobian(poses)) < 1e-12
 
 
+@EVERY
 def test_forces(case):
     robot, motion, wrench, oracle = case
     expected = loaded(oracle.forces(*motion), oracle.jacobian(motion[0]), wrench)
     assert error(pteron.inverse_dynamics(robot, *motion, wrench), expected) < 1e-12
 
 
+@EVERY
 @pytest.mark.parametrize("engine", ENGINES)
 def test_forces_of_an_engine(case, engine):
     robot, motion, wrench, _ = case
@@ -110,6 +120,7 @@ def test_forces_of_an_engine(case, engine):
     assert error(pteron.inverse_dynamics(robot, *motion, wrench), expected) < 1e-12
 
 
+@EVERY
 def test_accelerations_come_back_from_their_forces(case):
     robot, (pose, velocity, acceleration), wrench, _ = case
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration, wrench)
@@ -117,6 +128,7 @@ def test_accelerations_come_back_from_their_forces(case):
     assert error(found, acceleration) < 1e-10
 
 
+@EVERY
 def test_regressor(case):
     robot, motion, _, oracle = case
     bare = replace(robot, platform=replace(robot.platform, bars=(), geared=()))
@@ -124,6 +136,7 @@ def test_regressor(case):
     assert error(pteron.regressor(robot, *motion), oracle.regressor(*motion)) < 1e-12
 
 
+@EVERY
 def test_energies(case):
     robot, (pose, velocity, _), _, oracle = case
     kinetic, potential = oracle.energies(pose, velocity)

@@ -62,7 +62,7 @@ def named(robot, log):
 
 @pytest.mark.parametrize(
     "name",
-    gated(["quadrupteron", "delta", "par4", "five-bar", "mixed"], ["delta", "five-bar", "mixed"]),
+    gated(["quadrupteron", "delta", "par4", "five-bar", "mixed"], ["five-bar", "mixed"]),
 )
 def test_no_fault_is_named_where_there_is_none(name):
     robot, log, _ = clean(name)
@@ -208,7 +208,7 @@ def test_forces_that_stand_out_do_not_spoil_the_grade():
     assert any("stand out" in reason for reason in result.verdict.reasons)
 
 
-@pytest.mark.parametrize("seed", gated(range(4), [0, 1]))
+@pytest.mark.parametrize("seed", gated(range(4), [0]))
 def test_small_motion_is_not_accused_of_flipped_signs(seed):
     robot = random_machine(seed, False)
     how = brisk(robot) | {"size": 0.02 * brisk(robot)["size"], "turn": 0.01}
@@ -217,7 +217,9 @@ def test_small_motion_is_not_accused_of_flipped_signs(seed):
         found(robot, log)
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "delta", "par4", "mixed"])
+@pytest.mark.parametrize(
+    "name", gated(["quadrupteron", "delta", "par4", "mixed"], ["par4", "mixed"])
+)
 def test_columns_are_what_a_fault_does_to_the_forces(name):
     """Other joints and lengths, against the machine built anew."""
     robot, log, _ = clean(name)

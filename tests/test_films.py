@@ -10,6 +10,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from mechanisms import gated
 from PIL import Image, ImageSequence
 from test_cli import done, refused, run
 
@@ -51,7 +52,7 @@ def unpacked(path):
     return np.array(frames), times
 
 
-@pytest.mark.parametrize("turns", [0.0, 1.0])
+@pytest.mark.parametrize("turns", gated([0.0, 1.0], [1.0]))
 def test_an_mp4_plays_in_a_browser_at_the_speed_it_says(turns):
     made = film(TRIPTERON, CYCLE, "cycle.mp4", fps=8.0, speed=0.5, size=SIZE, turns=turns)
     told, frames = decoded(made.path)
@@ -70,7 +71,7 @@ def test_an_mp4_plays_in_a_browser_at_the_speed_it_says(turns):
     assert b64encode(made.path.read_bytes()).decode() in made._repr_html_()
 
 
-@pytest.mark.parametrize("name", ["tripteron", "five-bar", "h4"])
+@pytest.mark.parametrize("name", gated(["tripteron", "five-bar", "h4"], ["five-bar"]))
 def test_a_gif_shows_the_machine_move_in_one_view(name):
     robot = pteron.load(name)
     start = np.zeros(robot.freedom)

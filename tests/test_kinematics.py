@@ -8,7 +8,7 @@ import pytest
 from differences import along, gradient
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mechanisms import CATALOG, MECHANISMS, NEAREST, gated, random_machine, states
+from mechanisms import CATALOG, MECHANISMS, NEAREST, gated, in_turn, random_machine, states
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.stats import ks_2samp
@@ -16,14 +16,11 @@ from scipy.stats import ks_2samp
 import pteron
 from pteron.errors import DataError, ModelError, SingularPose
 
-EVERY = pytest.mark.parametrize(
-    "name",
-    gated(
-        MECHANISMS,
-        (
-            *("quadrupteron", "quadrupteron-oblique +--+", "tripteron-oblique", "delta"),
-            *("tripteron on a wall", "random 3T1R 0", "random RRR 0", "random PRR 0"),
-        ),
+EVERY = in_turn(
+    MECHANISMS,
+    (
+        *("quadrupteron", "quadrupteron-oblique +--+", "tripteron-oblique", "delta"),
+        *("tripteron on a wall", "random 3T1R 0", "random RRR 0", "random PRR 0"),
     ),
 )
 TURNING = [name for name, robot in MECHANISMS.items() if robot.platform.turns]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG
+from mechanisms import CATALOG, in_turn
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
@@ -89,7 +89,7 @@ MACHINES = {
     "par4": (limited("par4", **CONES), crank_cones),
     "delta-4": (limited("delta-4", travel=(0.1, 3.0)), shafts),
 }
-EVERY = pytest.mark.parametrize("name", MACHINES)
+EVERY = in_turn(MACHINES, tuple(MACHINES))
 
 
 def passive(robot, pose):

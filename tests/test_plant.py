@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import NIGHTLY
+from mechanisms import several
 
 import pteron
 from pteron.identification import (
@@ -52,7 +52,7 @@ def recorded(name, duration):
 
 @pytest.mark.parametrize(
     ("name", "duration"),
-    [("tripteron", 2.5), ("delta", 0.5), pytest.param("par4", 0.5, marks=NIGHTLY)],
+    several([("tripteron", 2.5), ("delta", 0.5), ("par4", 0.5)], [("delta", 0.5)]),
 )
 def test_its_forces_are_those_of_the_model(name, duration):
     _, built, friction, recording = recorded(name, duration)

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 import tilting
 from differences import OFFSETS
-from mechanisms import CATALOG, gated, random_machine, scaled, states
+from mechanisms import CATALOG, gated, in_turn, random_machine, scaled, states
 
 import pteron
 from pteron.errors import DataError, UnreachablePose
@@ -39,7 +39,7 @@ def test_the_published_router():
 
 RANDOM = ("PRSU", "SSSSI", "CCC")
 SOME = ("3-rpr", "delta", "delta-4", "tripteron-oblique", "CCC", "SSSSI")
-EVERY = pytest.mark.parametrize("name", gated([*CATALOG, *RANDOM], SOME))
+EVERY = in_turn([*CATALOG, *RANDOM], SOME)
 
 
 @EVERY

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, gated, random_machine, with_elbows
+from mechanisms import CATALOG, MECHANISMS, in_turn, random_machine, with_elbows
 from test_workspace import fourfold, with_limits
 
 import pteron
@@ -65,9 +65,7 @@ MACHINES = {
     "shaft": with_a_tool(CATALOG["delta-4"]),
     "planar": CATALOG["3-rrr"],
 }
-EVERY = pytest.mark.parametrize(
-    "name", gated(MACHINES, ("quadrupteron", "hostile", "shaft", "planar"))
-)
+EVERY = in_turn(MACHINES, ("quadrupteron", "hostile", "shaft", "planar"), share=2)
 
 VOID = {"meta", "input", "br", "hr", "img", "link"}
 

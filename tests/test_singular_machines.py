@@ -7,7 +7,7 @@ import descriptions
 import numpy as np
 import pytest
 import singular_poses
-from mechanisms import CATALOG, random_machine, states
+from mechanisms import CATALOG, gated, random_machine, states
 
 import pteron
 from pteron.kernels import numeric
@@ -55,7 +55,9 @@ def test_the_published_example_is_refused_with_the_reason():
         replace(robot, legs=(*robot.legs[:2], leg))
 
 
-@pytest.mark.parametrize("kinds", ["RRR", "PRSU", "CS", "CR", "LS", "CPR", "CSS", "LRU"])
+@pytest.mark.parametrize(
+    "kinds", gated(["RRR", "PRSU", "CS", "CR", "LS", "CPR", "CSS", "LRU"], ["PRSU", "CS", "LRU"])
+)
 def test_the_measure_vanishes_at_singular_poses(kinds):
     robot = random_machine(3, kinds)
     rng = np.random.default_rng(3)
@@ -90,7 +92,7 @@ def test_no_box_with_a_rod_across_the_plane_is_proved():
     assert prove(robot, Box(away - 1e-4, away + 1e-4), type_ii=0.5 * size).holds
 
 
-@pytest.mark.parametrize("kinds", ["CS", "CPR", "LRU", "PRSU"])
+@pytest.mark.parametrize("kinds", gated(["CS", "CPR", "LRU", "PRSU"], ["CPR", "PRSU"]))
 def test_the_measure_of_a_mixed_machine_is_that_of_forces_in_space(kinds):
     robot = random_machine(2, kinds)
     poses, machine = states(robot, 4)[0], descriptions.describe(robot)

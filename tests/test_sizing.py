@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, random_machine, with_elbows
+from mechanisms import CATALOG, in_turn, random_machine, with_elbows
 
 import pteron
 from pteron.motion import (
@@ -54,7 +54,7 @@ def driven(robot, **more):
 
 
 MACHINES = {name: driven(robot) for name, robot in BARE.items()}
-EVERY = pytest.mark.parametrize("name", MACHINES)
+EVERY = in_turn(MACHINES, tuple(MACHINES))
 
 
 @lru_cache

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, LARGE, NIGHTLY, gated, states
+from mechanisms import CATALOG, LARGE, gated, several, states
 from structured_text import Block, Trap, parse, read
 from test_export import ROBOTS, identification_file, stiff
 
@@ -43,13 +43,7 @@ SOME_BLOCKS = [
 
 def each(blocks):
     """Parametrize over blocks; not all are in the gate."""
-    return pytest.mark.parametrize(
-        ("machine", "what"),
-        [
-            block if block in SOME_BLOCKS else pytest.param(*block, marks=NIGHTLY)
-            for block in blocks
-        ],
-    )
+    return pytest.mark.parametrize(("machine", "what"), several(blocks, SOME_BLOCKS))
 
 
 each_block = each(BLOCKS)
@@ -213,7 +207,7 @@ def test_results_are_those_of_casadi(machine, what):
             np.testing.assert_allclose(output, expected, rtol=0, atol=1e-13 * abs(expected).max())
 
 
-@pytest.mark.parametrize("machine", ROBOTS)
+@pytest.mark.parametrize("machine", gated(ROBOTS, ["oblique", "mixed", "five_bar"]))
 @pytest.mark.parametrize("what", ["inverse_kinematics", "inverse_dynamics", "forward_dynamics"])
 def test_out_of_reach_keeps_the_last_outputs(machine, what):
     run = runner(machine, what)

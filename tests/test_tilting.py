@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
-from mechanisms import gated
+from mechanisms import in_turn
 
 import pteron
 from pteron.errors import ModelError
@@ -17,21 +17,31 @@ MIXED += [("3T3R", ("UPS",), "xyz"), ("3R", ("RSS",), "xyz"), ("1T2R", ("RPS",),
 SOME = [*MIXED[: len(tilting.LEGS)], ("3R", ("RSS",), "xyz")]
 
 
-@pytest.fixture(
-    params=gated(MIXED, SOME), ids=lambda case: f"{case[0]} {'-'.join(case[1])} {case[2]}"
+EVERY = in_turn(
+    MIXED,
+    SOME,
+    share=2,
+    argument="drawn",
+    indirect=True,
+    ids=lambda case: f"{case[0]} {'-'.join(case[1])} {case[2]}",
 )
+
+
+@pytest.fixture
 def drawn(request):
     motion, kinds, angles = request.param
     robot, home = tilting.machine(motion, kinds, 3, angles)
     return robot, tilting.states(robot, home, 12)
 
 
+@EVERY
 def test_platforms_conform(drawn):
     robot, _ = drawn
     for seed in range(3):
         assert of_platforms.faults(robot.platform, seed) == ()
 
 
+@EVERY
 def test_the_equation_of_motion_is_lagranges(drawn):
     robot, (x, dx, ddx) = drawn
     forces = pteron.inverse_dynamics(robot, x, dx, ddx)
@@ -46,6 +56,7 @@ def test_the_equation_of_motion_is_lagranges(drawn):
     np.testing.assert_allclose(regressed, forces, atol=1e-10 * np.abs(forces).max())
 
 
+@EVERY
 def test_a_wrench_does_its_work(drawn):
     robot, (x, dx, _) = drawn
     rng = np.random.default_rng(4)
@@ -63,6 +74,7 @@ def test_a_wrench_does_its_work(drawn):
     np.testing.assert_allclose(power, -work, rtol=1e-6, atol=1e-6)
 
 
+@EVERY
 def test_a_step_finds_the_pose_of_joints(drawn):
     robot, (x, *_) = drawn
     x = x[np.abs(numeric(robot, "type_ii")(x)[0]) > 0.1]
@@ -74,6 +86,7 @@ def test_a_step_finds_the_pose_of_joints(drawn):
     np.testing.assert_allclose(found, x, atol=1e-12)
 
 
+@EVERY
 def test_a_file_holds_all_of_it(drawn, tmp_path):
     robot, _ = drawn
     assert pteron.load(pteron.save(robot, tmp_path / "machine.toml")) == robot

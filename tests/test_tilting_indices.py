@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import tilting
-from mechanisms import NIGHTLY
+from mechanisms import several
 
 import pteron
 from pteron.indices import evaluate, indices_of
 
-CASES = [("1T2R", ("RPS", "PRS", "RRS")), pytest.param("3T3R", ("UPS",), marks=NIGHTLY)]
+CASES = [("1T2R", ("RPS", "PRS", "RRS")), ("3T3R", ("UPS",))]
 CASES += [("2R", ("UPS", "PSS", "RSS")), ("3R", ("UPS", "PSS", "RSS"))]
 
 
@@ -23,7 +23,7 @@ def twists(robot, pose):
     return np.array(columns).T
 
 
-@pytest.mark.parametrize(("motion", "kinds"), CASES)
+@pytest.mark.parametrize(("motion", "kinds"), several(CASES, [CASES[0], CASES[2]]))
 def test_indices_are_those_of_the_homogeneous_jacobian(motion, kinds):
     robot, home = tilting.machine(motion, kinds, 3)
     poses = tilting.states(robot, home, 3)[0]

@@ -27,9 +27,12 @@ from pteron.shapes import Numbers
 from pteron.workspace.margins import pose_margins
 from pteron.workspace.unreachable import beyond_limits, nowhere
 
-_SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))
-"""Numbers of random poses and their least type-I and type-II measures, tried in turn: less is asked
-where legs have little common reach."""
+_DRAWN = 200
+"""Random poses."""
+
+_MEASURES = 0.3, 0.02, 0.0
+"""Their least type-I and type-II measures, tried in turn: less is asked where legs have little
+common reach."""
 
 _SOURCES = (*EQUATIONS, "kinematics", "workspace")
 """The packages that a home pose depends on."""
@@ -157,10 +160,17 @@ def _best(robot: Manipulator) -> Array:
 
 
 def _random_poses(robot: Manipulator) -> Array:
-    for count, least in _SEARCHES:
+    first, *less = _MEASURES
+    with suppress(ModelError):
+        return random_poses(robot, _DRAWN, type_i=first, type_ii=first)
+    try:
+        one = random_poses(robot, 1, type_i=0.0, type_ii=0.0)
+    except ModelError:
+        raise nowhere(robot) from None
+    for least in less:
         with suppress(ModelError):
-            return random_poses(robot, count, type_i=least, type_ii=least)
-    raise nowhere(robot)
+            return random_poses(robot, _DRAWN, type_i=least, type_ii=least)
+    return one
 
 
 def _least_travel(robot: Manipulator, poses: Array) -> Array:

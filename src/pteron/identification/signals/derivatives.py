@@ -191,9 +191,7 @@ class FourierFit:
     def curve(self, log: Log) -> Curve:
         """Return the series at the log's samples."""
         series = self.series(log)
-        q, dq, ddq = map(
-            sparse.csr_matrix, fourier_bases(log.time, series.harmonics, self.period)
-        )
+        q, dq, ddq = map(sparse.csr_matrix, fourier_bases(log.time, series.harmonics, self.period))
         return Curve(series.coefficients, (q, dq, ddq), 0)
 
     def fastest(self, band: float) -> float | None:
