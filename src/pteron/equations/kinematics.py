@@ -1,4 +1,4 @@
-"""Positions, Jacobians and joint motions: Eqs. (4) to (12), and back."""
+"""Positions, reach, margins, Jacobians and joint motions: Eqs. (4) to (12), and back."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """CasADi functions ("programs") of a machine's kinematics and dynamics, each found by its name.
 
 A program depends on the machine's geometry and gravity alone: inertial parameters and drives are
-inputs, so that machines of one geometry share it (in a `general_program` these numbers are an input
-too). On request a last output, `status`, is 1 where the result counts and 0 where it does not; in
-exported code it is the other way round, 0 where all is well.
+inputs, so that machines of one geometry share it (in a `general_program` geometry and gravity are
+an input too). On request a last output, `status`, is 1 where the result counts and 0 where it does
+not; in exported code it is the other way round, 0 where all is well.
 """
 
 from __future__ import annotations

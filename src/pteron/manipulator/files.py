@@ -1,4 +1,4 @@
-"""Manipulators in TOML files: `load` reads one, by catalog name or path."""
+"""Manipulators in TOML files, those of the catalog too: `load` reads one, by name or path."""
 
 from __future__ import annotations
 

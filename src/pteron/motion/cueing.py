@@ -1,8 +1,9 @@
 """Washout: the accelerations and turns of a vehicle as a motion of its simulator's platform.
 
-A classical washout (L. D. Reid, M. A. Nahon, UTIAS Report 296, 1985): what is quick is moved, what
-lasts is tilted into, and the platform always returns to the middle. Its poses are then pressed into
-a box of poses that is proved to lie in the workspace, so that none of them leaves it.
+A classical washout (L. D. Reid, M. A. Nahon, UTIAS Report 296, 1985): the platform moves with quick
+accelerations, tilts where they last, so that gravity stands for them, and always returns to the
+middle. Its poses are then pressed into a box of poses that is proved to lie in the workspace, so
+that none of them leaves it.
 """
 
 from __future__ import annotations
@@ -56,15 +57,15 @@ class Washout:
     scale : float
         Share of the vehicle's accelerations and rates that is shown.
     translation : float
-        rad/s: accelerations quicker than that are moved.
+        rad/s: with accelerations quicker than that the platform moves.
     return_speed : float
         rad/s, with which the platform comes back to the middle.
     tilting : float
-        rad/s: accelerations slower than that are tilted into.
+        rad/s: accelerations slower than that tilt it.
     tilt_rate : float
         Greatest rate of that tilt, rad/s: people do not notice what is slower than some 0.05.
     rotation : float
-        rad/s: turns quicker than that are turned.
+        rad/s: with turns quicker than that the platform turns.
     smoothing : float
         rad/s, above which nothing is shown.
     """

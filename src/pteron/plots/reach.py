@@ -1,4 +1,4 @@
-"""Pictures of slices through the reach: the margin inside, and the leg that ends it outside."""
+"""Pictures of slices through the reach: its margin and the leg that ends it, or another measure."""
 
 from __future__ import annotations
 

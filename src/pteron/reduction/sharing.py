@@ -1,4 +1,4 @@
-"""The regressor's columns: one for each parameter, or for the like parameters of several legs.
+"""The regressor's columns, one a parameter or for the like ones of several legs, and their order.
 
 For legs that share parameters, as equal legs do, their columns add up.
 """

@@ -1,4 +1,4 @@
-"""The boundary that stops a machine on its path to a pose: a leg's reach, or a limit."""
+"""The boundary that stops a machine on its path: a leg's reach, a limit, or its mode's end."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ _MEASURES = 0.3, 0.02, 0.0
 common reach."""
 
 _SOURCES = (*EQUATIONS, "kinematics", "workspace")
-"""The packages that a home pose depends on."""
+"""The packages that a home pose depends on: a change of their source makes a stored one void."""
 
 _STARTS = 12
 """Random poses, the best ones, that are improved by a local search."""

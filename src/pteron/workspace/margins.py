@@ -31,8 +31,8 @@ class PoseMargins:
         The size of the type-II measure over the best that the machine's geometry allows, limits or
         not: 0 where the actuators do not hold the platform.
     joints : array, shape (..., n)
-        Distance of each leg's joint, or of a passive one, from its nearer limit, over half its
-        range, the least; negative beyond it, and 1 for a leg without limits.
+        The least over each leg's joints, passive ones too, of the distance from the nearer limit
+        over half the range; negative beyond it, and 1 for a leg without limits.
     least : array, shape (...)
         The least of them all, which is what `home_pose` makes as large as it can.
     """

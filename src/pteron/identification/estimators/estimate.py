@@ -1,4 +1,4 @@
-"""The result of every estimator: values, their covariance, and the residuals."""
+"""The result of every estimator: values, their covariance, and the residuals with their test."""
 
 from __future__ import annotations
 

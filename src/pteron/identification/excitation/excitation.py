@@ -1,4 +1,4 @@
-"""An exciting trajectory: the motion, its conditioning, and its margins to every limit."""
+"""An exciting trajectory: the motion, its conditioning, its margins to all limits, its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joint motion and drive forces along a curve of poses, and the largest speed within limits.
+"""Joint motion and drive forces along a curve of poses: its largest rate within limits, its peaks.
 
 Along a curve x(p) the drives' forces are c + a p'' + b p'^2, and what friction takes: dry friction
 by the sign of the joint's motion, viscous friction by its speed.

@@ -7,8 +7,8 @@ a u + b x + c <= 1 with u = s'' and x = s'^2, for each limit at each s. TOPP-RA 
 Viscous friction goes with s', which is the root of x: where it is against the drive a tangent of
 the root bounds it from above, where it helps to brake a chord from rest to a largest speed bounds
 it from below. Both are close at the speeds that they are taken for: those of the pass before.
-Dry friction has the sign of the joint's motion: in full against it, without what it has more at
-rest where it helps.
+Dry friction has the sign of the joint's motion: where it is against the drive it counts in full,
+where it helps without Stribeck's part, which a joint in motion loses.
 """
 
 from __future__ import annotations
