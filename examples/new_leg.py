@@ -17,7 +17,7 @@ import pteron
 from pteron.bodies.inertia import PlanarInertia, PointMass, RodInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
-from pteron.legs import KINDS, Drive
+from pteron.legs import KINDS, Drive, Reading
 from pteron.legs.keys import Key
 from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, Sphere
@@ -39,6 +39,7 @@ class SliderRod(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     drive: Drive | None = None
+    reading: Reading | None = None
 
     type = "SliderRod"
     joint = SLIDER

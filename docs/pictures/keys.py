@@ -17,6 +17,7 @@ from pteron.manipulator.tables import (
     MachineTable,
     PlatformTable,
     RadiiTable,
+    ReadingTable,
     StribeckTable,
     TiltingTable,
     leg_table,
@@ -33,6 +34,7 @@ TABLES: dict[str, type[Table]] = {
     "a cone": ConeTable,
     "a drive": DriveTable,
     "stribeck": StribeckTable,
+    "reading": ReadingTable,
     **{name: leg_table(kind) for name, kind in KINDS.items()},
 }
 """Subjects of the page's tables; those of legs by their type."""

@@ -18,6 +18,7 @@ from pteron.identification.logs import Description, Log, LogFile, find_descripti
 from pteron.identification.signals import States, preprocessing_of, samples, spline_motion
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.manipulator.readings import reading_scales
 from pteron.motion import Motion, Simulation, check_motion, replay
 from pteron.shapes import PoseLike
 from pteron.tables import CsvFile, Dialect, ParquetFile, Table, open_table, read_table, whole_table
@@ -150,7 +151,7 @@ def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
         start = home_pose(robot)
     motion = replay(robot, rows, start=start)
     has_forces = set(rows.columns) >= set(robot.force_names)
-    forces = rows.numbers(robot.force_names) if has_forces else None
+    forces = rows.numbers(robot.force_names) / reading_scales(robot) if has_forces else None
     return Playback(motion, forces, Path(rows.source).name)
 
 

@@ -146,6 +146,15 @@ def scaled(a: Vector, factor: float) -> Vector:
     return (factor * a[0], factor * a[1], factor * a[2])
 
 
+def moved(point: Vector, direction: Vector, way: float) -> Vector:
+    """Return a point moved `way` along a direction."""
+    return (
+        point[0] + way * direction[0],
+        point[1] + way * direction[1],
+        point[2] + way * direction[2],
+    )
+
+
 def parallel(a: Vector, b: Vector) -> bool:
     """Say whether two unit vectors are parallel, in the same or in opposite sense."""
     return norm(cross(a, b)) < PARALLEL_TOLERANCE

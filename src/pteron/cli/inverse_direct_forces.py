@@ -55,9 +55,11 @@ def inverse(
     """Compute the joint coordinates at poses.
 
     A table has the columns x y z phi or x y z roll pitch yaw, those that the machine has; the
-    result has its columns and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad.
+    result has its columns and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad,
+    as the drives count them where a leg has a `reading`.
     """
     from pteron.kinematics import inverse_kinematics
+    from pteron.manipulator.readings import to_readings
 
     machine = load_robot(robot, elbows)
     columns = machine.coordinates
@@ -66,7 +68,9 @@ def inverse(
     check_destination(out, table, rows.table, added)
     joints = rows.served(
         machine,
-        lambda poses: inverse_kinematics(machine, poses, on_failure=on_failure),
+        lambda poses: to_readings(
+            machine, inverse_kinematics(machine, poses, on_failure=on_failure)
+        ),
         columns,
         on_failure,
     )
@@ -105,6 +109,7 @@ def direct(
     and x y z phi, those that the machine has. Where there is no real pose, these are empty.
     """
     from pteron.kinematics import direct_kinematics
+    from pteron.manipulator.readings import from_readings
 
     machine = load_robot(robot, elbows)
     columns = machine.joint_names
@@ -114,7 +119,9 @@ def direct(
     check_destination(out, table, rows.table, added)
     poses = rows.served(
         machine,
-        lambda values: direct_kinematics(machine, values, on_failure=failure),
+        lambda values: direct_kinematics(
+            machine, from_readings(machine, values), on_failure=failure
+        ),
         columns,
         failure,
     )
@@ -179,6 +186,7 @@ def forces(
 
     from pteron.dynamics import drive_forces, inverse_dynamics
     from pteron.kinematics import joint_rates
+    from pteron.manipulator.readings import reading_scales
     from pteron.motion import overloads
 
     machine = load_robot(robot, elbows)
@@ -213,7 +221,7 @@ def forces(
         return np.concatenate([given, driven, rates], axis=-1)
 
     served = rows.served(machine, serve, columns, on_failure)
-    found = served[:, :n]
+    found = served[:, :n] * reading_scales(machine)
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
     result = rows.table.extended(dict(zip(added, found.T, strict=True)))

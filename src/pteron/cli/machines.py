@@ -170,6 +170,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
         "unit": leg.joint.unit,
         "force_unit": leg.joint.force_unit,
         "drive": asdict(leg.drive) if leg.drive else None,
+        "reading": asdict(leg.reading) if leg.reading else None,
     }
 
 

@@ -41,18 +41,20 @@ def motion_frame(machine: Manipulator, motion: Motion) -> pl.DataFrame:
 
     from pteron.dynamics import drive_forces
     from pteron.kinematics import inverse_kinematics, joint_accelerations, joint_rates
+    from pteron.manipulator.readings import reading_scales, to_readings
 
     path = motion.pose, motion.velocity, motion.acceleration
     columns = {"t": motion.time}
+    scales = reading_scales(machine)
     joints = (
-        inverse_kinematics(machine, path[0]),
-        joint_rates(machine, *path[:2]).actuated,
-        joint_accelerations(machine, *path).actuated,
+        to_readings(machine, inverse_kinematics(machine, path[0])),
+        joint_rates(machine, *path[:2]).actuated / scales,
+        joint_accelerations(machine, *path).actuated / scales,
     )
     for names, parts in ((machine.coordinates, path), (machine.joint_names, joints)):
         for order, part in zip(("", "d", "dd"), parts, strict=True):
             for name, values in zip(names, part.T, strict=True):
                 columns[f"{order}{name}"] = np.asarray(values + 0.0)
-    forces = drive_forces(machine, *path)
+    forces = drive_forces(machine, *path) * scales
     columns.update(zip(machine.force_names, forces.T, strict=True))
     return pl.DataFrame(columns)

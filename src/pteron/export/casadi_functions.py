@@ -21,6 +21,7 @@ from pteron.export.start_pose import good_poses, joint_limits, keeps_limits, sta
 from pteron.kernels import program, specialised
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
+from pteron.manipulator.readings import refuse_readings
 
 _NAMES = {
     "inverse_kinematics": "joint_coordinates",
@@ -80,6 +81,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     ['pose', 'velocity', 'acceleration', 'wrench']
     """
     robot = as_manipulator(robot)
+    refuse_readings(robot, "CasADi's functions")
     missing = "direct_step" if closure_of(robot).closed_form else "direct_kinematics"
     found = {name: _plain(robot, name, what) for name, what in _NAMES.items() if name != missing}
     found |= {function.name(): function for function in _driven(robot)}

@@ -1,4 +1,4 @@
-"""Units of the drives' commands: joint forces, motor torques, or per cent of rated torque."""
+"""Units of what drives are told and count: forces or torques, readings of the joints."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from typing import Literal, get_args
 
 import casadi as ca
 
+from pteron.bodies.motion import Expression
 from pteron.equations.laws import LAWS
 from pteron.errors import ModelError
 from pteron.kernels import Program
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.manipulator.readings import has_readings, reading_scales, reading_zeros
 
 Output = Literal["force", "torque", "percent"]
 """Units of commands: forces at the joints, torques of the motors, or per cent of rated torque."""
@@ -72,6 +74,41 @@ def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
     names = [port.name for port in given.inputs], [port.name for port in ports]
     function = ca.Function(given.name, symbols, results, *names)
     return Program(given.name, function, given.inputs, tuple(ports))
+
+
+_PER_READING = {
+    **dict.fromkeys(("joint_rates", "joint_accelerations", "actuated", "jacobian"), -1),
+    **dict.fromkeys(("forces", "regressor"), 1),
+}
+"""Outputs and inputs that the scale of a joint's reading multiplies, with its power."""
+
+
+def at_readings(given: Program, robot: Manipulator) -> Program:
+    """Return a program whose joints, rates and forces are as the drives count them."""
+    if not has_readings(robot):
+        return given
+    zeros, scales = ca.DM(reading_zeros(robot)), ca.DM(reading_scales(robot))
+
+    def per_joint(value: Expression, power: int) -> Expression:
+        """Return a vector by joints, or a matrix whose columns are joints, with scales in it."""
+        if value.shape[1] == len(robot.legs) and value.shape[0] > 1:
+            return ca.mtimes(value, ca.diag(scales**power))
+        return value * ca.reshape(scales**power, *value.shape)
+
+    symbols, taken, results = given.function.sx_in(), [], []
+    for port, symbol in zip(given.inputs, symbols, strict=True):
+        power = 1 if port.name == "joints" else -_PER_READING.get(port.name, 0)
+        zero = ca.reshape(zeros, *symbol.shape) if port.name == "joints" else 0.0
+        taken.append(zero + per_joint(symbol, power) if power else symbol)
+    for port, result in zip(given.outputs, given.function.call(taken), strict=True):
+        if port.name == "joints":
+            results.append(per_joint(result - ca.reshape(zeros, *result.shape), -1))
+        else:
+            power = _PER_READING.get(port.name, 0)
+            results.append(per_joint(result, power) if power else result)
+    names = [port.name for port in given.inputs], [port.name for port in given.outputs]
+    function = ca.Function(given.name, symbols, results, *names)
+    return Program(given.name, function, given.inputs, given.outputs)
 
 
 def told_meaning(robot: Manipulator, output: Output) -> str:

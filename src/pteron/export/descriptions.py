@@ -9,6 +9,7 @@ from pteron.equations.control import MEMORY
 from pteron.export.command_units import NAMES, Output, told_meaning
 from pteron.kernels import Port
 from pteron.manipulator import Manipulator
+from pteron.manipulator.readings import has_readings
 
 SUMMARIES = {
     "inverse_kinematics": "Joint coordinates of a pose.",
@@ -101,13 +102,14 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     rates, seconds = (", ".join(f"{unit}/{per}" for _, unit in kinds) for per in ("s", "s^2"))
     moment = ", N m about k" if platform.angles else ""
     wrench = "force, N, and moment about it, N m, in base axes" if platform.tilts else f"N{moment}"
+    told = "what the drives read of the joints" if has_readings(robot) else "joint coordinates"
     texts = {
         "pose": f"platform pose: {pose}",
         "poses": f"poses by rows: {pose}",
         "found": f"platform pose that has the joint coordinates: {pose}",
         "velocity": f"the pose's rate: {rates}",
         "acceleration": f"the pose's acceleration: {seconds}",
-        "joints": f"joint coordinates, {joints}",
+        "joints": f"{told}, {joints}",
         "joint_rates": f"their rates, {_by_leg([f'{unit}/s' for unit in units])}",
         "joint_accelerations": "their accelerations, " + _by_leg([f"{unit}/s^2" for unit in units]),
         "forces": f"actuator forces, {forces}, positive the way the joint coordinates grow",

@@ -36,6 +36,7 @@ from pteron.kernels.c import c_compiler
 from pteron.kernels.code import rendered
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.readings import refuse_readings
 
 _FUNCTIONS = ("drive_accelerations", "joint_coordinates", "jacobian", "squared_type_i")
 """Functions of the exported C that `fmu.c` calls."""
@@ -98,6 +99,7 @@ def export_fmu(
         If the folder cannot be written.
     """
     robot = as_manipulator(robot)
+    refuse_readings(robot, "an FMU")
     prefix = prefix_of(robot)
     start = start_pose(robot) if pose is None else _expected(robot, pose)
     rest = np.zeros(robot.freedom)

@@ -16,7 +16,7 @@ from pteron.controllers import CONTROLLERS, Controller
 from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
-from pteron.export.command_units import DRIVEN, Output, factors, in_units
+from pteron.export.command_units import DRIVEN, Output, at_readings, factors, in_units
 from pteron.export.descriptions import (
     BASE_PARAMETERS,
     BRANCHES,
@@ -48,6 +48,7 @@ from pteron.kernels.functions import TABLE
 from pteron.kernels.graph import CONSTANT
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, parameter_names, parameters
+from pteron.manipulator.readings import to_readings
 
 FUNCTIONS = (
     "inverse_kinematics",
@@ -214,6 +215,7 @@ def _exported(
             f"functions: {name!r} takes every body's parameters, which identified base parameters "
             f"do not tell; {other}, or export the model file that pteron identify wrote"
         )
+    given = at_readings(given, robot)
     if what in DRIVEN:
         given = in_units(given, robot, output)
     shared = [port.name for port in given.inputs if port.shared]
@@ -284,7 +286,8 @@ def _states(
     # Where the joints are given a pose is but next to theirs.
     apart = 1e-3 if "joints" in {port.name for port in ports} else 0.0
     for pose in random_poses(robot, 3, seed=rng):
-        known = {"pose": pose + apart, "joints": inverse_kinematics(robot, pose), **fixed}
+        at_drives = to_readings(robot, inverse_kinematics(robot, pose))
+        known = {"pose": pose + apart, "joints": at_drives, **fixed}
         if law:
             start = law.memory(pose, np.zeros_like(pose))
             known["memory"] = start + 1e-3 * rng.normal(size=start.shape)

@@ -26,6 +26,7 @@ from pteron.kernels.code import rendered
 from pteron.kinematics import inverse_kinematics, jacobian
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.readings import without_readings
 from pteron.platforms import Platform
 from pteron.platforms.joints import platform_joints
 
@@ -70,10 +71,12 @@ class _Joint:
     middle: float | None
     """Rad: a crank's angle is given less than half a turn from it; None of what is no crank."""
     home: float
+    counted: tuple[float, float] | None
+    """The coordinate where its drive reads 0, mm or degrees, and its scale; None: as the joint."""
     least: float | None
     most: float | None
     speed: float | None
-    """The last four in mm or degrees, the speed per second; None where the file has none."""
+    """These, and `home`, in mm or degrees, the speed per second; None where the file has none."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +176,8 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     >>> [path.name for path in files]
     ['quadrupteronkins.comp', 'quadrupteron.ini', 'quadrupteron.hal']
     """
-    robot = as_manipulator(robot)
+    given = as_manipulator(robot)
+    robot = without_readings(given)  # LinuxCNC converts them itself, by SCALE and HOME_OFFSET
     prefix = prefix_of(robot)
     closed = closure_of(robot).closed_form
     closed = closed and not robot.platform.tilts  # whose poses are many, and the last one is near
@@ -181,7 +185,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     exported = chosen(robot, names, specialised=True, wrench=False, output="force", base=None)
     texts = c_texts(robot, exported)
     home = start_pose(robot)
-    axes, joints = _axes(robot), tuple(_joints(robot, home))
+    axes, joints = _axes(robot), tuple(_joints(given, home))
     platform, seen = robot.platform, home.copy()
     seen[~platform.angular] += platform.directions @ (platform.tool @ platform.at(home)[1])
     tilted = _TurnedArm.of(platform, home) if platform.tilts else None
@@ -282,5 +286,6 @@ def _joints(robot: Manipulator, home: Array) -> Iterator[_Joint]:
             scale,
             middle,
             scale * (float(at) + 2.0 * math.pi * turns),
+            (scale * leg.reading.zero, leg.reading.scale) if leg.reading else None,
             *(None if v is None else scale * v for v in (least, most, speed)),
         )

@@ -133,6 +133,7 @@ def _bare(robot: Manipulator) -> Manipulator:
         replace(
             leg.with_bodies({letter: plain(body) for letter, body in leg.bodies.items()}),
             drive=None,
+            reading=None,
         )
         for leg in robot.legs
     )

@@ -8,6 +8,7 @@ from pteron.legs.prr import PRR
 from pteron.legs.prrr import PRRR
 from pteron.legs.prs import PRS
 from pteron.legs.pss import PSS
+from pteron.legs.reading import Reading
 from pteron.legs.rpr import RPR
 from pteron.legs.rps import RPS
 from pteron.legs.rrr import RRR
@@ -32,6 +33,7 @@ __all__ = [
     "Cone",
     "Drive",
     "LegKind",
+    "Reading",
     "Stribeck",
 ]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -24,12 +24,13 @@ from pteron.bodies.motion import (
     RotationMotion,
     point_rows,
 )
-from pteron.bodies.vectors import Vector, cross, vertical
+from pteron.bodies.vectors import Vector, cross, moved, scaled, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
 from pteron.legs.drive import Drive
 from pteron.legs.keys import Key
 from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
+from pteron.legs.reading import Reading
 
 ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
     ("m", "u"): (1, ()),
@@ -84,6 +85,7 @@ class CrankLeg(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
 
     joint = CRANK
 
@@ -93,15 +95,13 @@ class CrankLeg(LegKind):
         low, high = self.limits or (0.0, 0.0)
         inside = -math.pi < low and high <= math.pi
         middle = 0.0 if inside else 0.5 * (low + high)
-        a, b = self.zero_direction, cross(self.direction, self.zero_direction)
-        c, s = math.cos(middle), math.sin(middle)
         return (
             Quantity("guide_point", "point", self.guide_point),
             Quantity("direction", "direction", self.direction, "d"),
             Quantity(
                 "zero_direction",
                 "normal",
-                a if inside else [c * x + s * y for x, y in zip(a, b, strict=True)],
+                self.zero_direction if inside else self._pointing(middle),
             ),
             Quantity("plane_axis", "normal", perpendicular_to(self.direction)),
             Quantity("upper_length", "length", (self.upper_length,), "lu"),
@@ -113,6 +113,14 @@ class CrankLeg(LegKind):
     @property
     def joint_axis(self) -> Vector:
         return self.direction
+
+    def zero_at(self, zero: float) -> dict[str, Any]:
+        return {"zero_direction": self._pointing(zero)}
+
+    def _pointing(self, angle: float) -> Vector:
+        """Return where the crank points at an angle."""
+        across = cross(self.direction, self.zero_direction)
+        return moved(scaled(self.zero_direction, math.cos(angle)), across, math.sin(angle))
 
     @property
     def lever(self) -> float:

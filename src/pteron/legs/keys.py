@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 from pteron.bodies.vectors import interval, number, perpendicular, positive, unit_vector, vector
 from pteron.errors import ModelError
 from pteron.legs.drive import Drive
+from pteron.legs.reading import Reading
 
 KeyRole = Literal[
     "point",
@@ -22,10 +23,11 @@ KeyRole = Literal[
     "planar",
     "rod",
     "drive",
+    "reading",
 ]
 """The content of a key: a vector, a unit vector, a length, a number, a whole number, +1 or -1, two
 limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
-rod, a drive. Files and pages give a leg's keys in this order."""
+rod, a drive, how the drive counts. Files and pages give a leg's keys in this order."""
 
 
 class Key(NamedTuple):
@@ -63,6 +65,12 @@ COMMON: dict[str, Key] = {
         "what drives the joint: friction, motor, limits",
         default=None,
         example={"coulomb": 3.0, "viscous": 12.0},
+    ),
+    "reading": Key(
+        "reading",
+        "how the drive counts: coordinate = zero + scale reading, as calibration finds it",
+        default=None,
+        example={"zero": 0.0012, "scale": 1.0005},
     ),
 }
 """The keys that every kind of leg has; a kind may say more closely what they are."""
@@ -132,4 +140,6 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
         return interval(value, name)
     if role == "drive" and not isinstance(value, Drive):
         raise ModelError(f"{name}: {type(value).__name__} given, a Drive expected")
+    if role == "reading" and not isinstance(value, Reading):
+        raise ModelError(f"{name}: {type(value).__name__} given, a Reading expected")
     return value

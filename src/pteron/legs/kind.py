@@ -19,6 +19,7 @@ from pteron.errors import ModelError
 from pteron.legs.drive import Drive
 from pteron.legs.keys import COMMON, Condition, Key, KeyRole, sound_fields
 from pteron.legs.leg import LegEquations, LegMotion, Passive
+from pteron.legs.reading import Reading
 from pteron.toml import told
 
 
@@ -103,6 +104,8 @@ class LegKind(ABC):
         Least and greatest joint coordinate, m or rad.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts the joint coordinate, where that is not as the geometry has it.
     """
 
     guide_point: Vector
@@ -111,6 +114,7 @@ class LegKind(ABC):
     elbow: int
     limits: tuple[float, float] | None
     drive: Drive | None
+    reading: Reading | None
 
     type: ClassVar[str]
     """The value of the file's key `type`."""
@@ -173,6 +177,25 @@ class LegKind(ABC):
                 body = bodies[key.body]
                 new[name] = body.mass if key.role == "slider" else body
         return replace(self, **new)
+
+    def with_zero(self, zero: float) -> Self | None:
+        """Return the same leg with its coordinate counted from `zero`, m or rad: less by so much.
+
+        Limits move along, and so does a `reading`: its drive reads in every posture what it did.
+        None where the geometry cannot take a zero, such as a ram's length.
+        """
+        changed = self.zero_at(zero)
+        if changed is None:
+            return None
+        if self.limits is not None:
+            changed["limits"] = tuple(limit - zero for limit in self.limits)
+        if self.reading is not None:
+            changed["reading"] = replace(self.reading, zero=self.reading.zero - zero)
+        return replace(self, **changed)
+
+    def zero_at(self, zero: float) -> dict[str, Any] | None:
+        """Return the fields of the geometry that count its coordinate from `zero`; or None."""
+        return None
 
     @property
     def goes_round(self) -> bool:

@@ -62,6 +62,8 @@ class PRR(SlideLeg):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts its coordinate.
     direction : unit vector, optional
         d, of the two revolute axes: the normal of the platform's plane, which is its default.
     elbow_limits : (float, float), optional

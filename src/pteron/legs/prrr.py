@@ -7,10 +7,10 @@ that the platform may turn against the leg.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from random import Random
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 
@@ -23,7 +23,7 @@ from pteron.bodies.motion import (
     RotationMotion,
     point_rows,
 )
-from pteron.bodies.vectors import Vector, dot, parallel, vertical
+from pteron.bodies.vectors import Vector, dot, moved, parallel, vertical
 from pteron.errors import ModelError
 from pteron.legs.circles import (
     edges_of_reach,
@@ -50,6 +50,7 @@ from pteron.legs.leg import (
     on_point,
 )
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
+from pteron.legs.reading import Reading
 from pteron.legs.slide import SLIDER_KEYS
 from pteron.legs.two_bar import two_bar_needs
 
@@ -96,6 +97,8 @@ class PRRR(LegKind):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts its coordinate.
     elbow_limits : (float, float), optional
         Least and greatest angle between the links: 0 where stretched, pi where folded.
     """
@@ -113,6 +116,7 @@ class PRRR(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
     elbow_limits: tuple[float, float] | None = None
 
     type = "PRRR"
@@ -181,6 +185,9 @@ class PRRR(LegKind):
     @property
     def joint_axis(self) -> Vector:
         return self.e
+
+    def zero_at(self, zero: float) -> dict[str, Any]:
+        return {"guide_point": moved(self.guide_point, self.e, zero)}
 
     @property
     def reach_bound(self) -> ReachBound:

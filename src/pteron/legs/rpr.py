@@ -6,7 +6,7 @@ The cylinder swings about the base joint, the piston ends at the platform point;
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from random import Random
 from typing import ClassVar, NamedTuple, Self
@@ -30,6 +30,7 @@ from pteron.legs.kind import Quantity, Transfer
 from pteron.legs.leg import Circle, Joint, LegEquations, LegMotion, Needs, Reach, on_point
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
 from pteron.legs.ram import RAM_KEYS, RamLeg
+from pteron.legs.reading import Reading
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,8 @@ class RPR(RamLeg):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts its coordinate.
     direction : unit vector, optional
         d, of the two revolute axes: the normal of the platform's plane, which is its default.
     """
@@ -69,6 +72,7 @@ class RPR(RamLeg):
     elbow: int = 1
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
     direction: Vector | None = None
 
     type = "RPR"

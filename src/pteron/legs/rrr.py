@@ -53,6 +53,8 @@ class RRR(CrankLeg):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts its coordinate.
     elbow_limits : (float, float), optional
         Least and greatest angle between the links: 0 where stretched, pi where folded.
     """

@@ -74,6 +74,8 @@ class RSS(CrankLeg):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts its coordinate.
     rods : int
         How many parallel rods `lower` is the sum of.
     bar_direction : unit vector, optional

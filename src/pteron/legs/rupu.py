@@ -8,7 +8,7 @@ base to the platform point. The cardan error of its joints is left out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from random import Random
 from typing import ClassVar, Self
@@ -25,6 +25,7 @@ from pteron.legs.drive import Drive
 from pteron.legs.keys import Condition, Key
 from pteron.legs.kind import SHAFT, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned, on_point
+from pteron.legs.reading import Reading
 from pteron.legs.rods import rod_body, universal_joints
 
 _FAST = 10.0
@@ -65,6 +66,8 @@ class RUPU(LegKind):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts its coordinate.
     direction : unit vector, optional
         Of the joint's axis: the platform's axis, which is its default.
     travel : (float, float), optional
@@ -80,6 +83,7 @@ class RUPU(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
     direction: Vector | None = None
     travel: tuple[float, float] | None = None
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from random import Random
 from typing import Any, NamedTuple
@@ -23,12 +23,13 @@ from pteron.bodies.motion import (
     RotationMotion,
     point_rows,
 )
-from pteron.bodies.vectors import Vector
+from pteron.bodies.vectors import Vector, moved
 from pteron.legs.circles import random_fraction
 from pteron.legs.drive import Drive
 from pteron.legs.keys import Key
 from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
+from pteron.legs.reading import Reading
 
 SLIDER_KEYS: dict[str, Key] = {
     "guide_point": Key("point", "r, the point of the guide where its coordinate is 0, m"),
@@ -64,6 +65,7 @@ class SlideLeg(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
 
     joint = SLIDER
     singular_text = "its link is at a right angle to its guide"
@@ -71,6 +73,9 @@ class SlideLeg(LegKind):
     @property
     def joint_axis(self) -> Vector:
         return self.slider_direction
+
+    def zero_at(self, zero: float) -> dict[str, Any]:
+        return {"guide_point": moved(self.guide_point, self.slider_direction, zero)}
 
     @property
     def reach_bound(self) -> ReachBound:

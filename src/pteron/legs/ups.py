@@ -7,7 +7,7 @@ which the spin about their axis has no inertia.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from random import Random
 from typing import ClassVar, NamedTuple, Self
@@ -31,6 +31,7 @@ from pteron.legs.keys import Key
 from pteron.legs.kind import Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Sphere, on_point
 from pteron.legs.ram import RAM_KEYS, RamLeg
+from pteron.legs.reading import Reading
 from pteron.legs.rods import rod_body, universal_joints
 
 
@@ -58,6 +59,8 @@ class UPS(RamLeg):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     drive : Drive, optional
         What drives its joint.
+    reading : Reading, optional
+        How the drive counts its coordinate.
     direction : unit vector, optional
         Of the base joint's first axis: for reactions and drawings, forces do not depend on it. By
         default that axis of the base plate across which the leg leans more.
@@ -77,6 +80,7 @@ class UPS(RamLeg):
     elbow: int = 1
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
     direction: Vector | None = None
     base_cone: Cone | None = None
     platform_cone: Cone | None = None

@@ -6,6 +6,7 @@ Imported where a file is read or written, since pydantic would slow the start of
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import lru_cache
 from typing import Annotated, Any, Literal
 
@@ -30,6 +31,7 @@ from pteron.legs import LegKind
 from pteron.legs.cones import Cone
 from pteron.legs.drive import Drive, Stribeck
 from pteron.legs.keys import Key, KeyRole
+from pteron.legs.reading import Reading
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.platforms.platform import TILTING, AngleOrder, Motion
 from pteron.toml import told
@@ -180,6 +182,20 @@ class TiltingTable(SpatialBody, _Motion):
     )
 
 
+class ReadingTable(Table):
+    """`reading`: how a drive counts its joint: coordinate = zero + scale reading."""
+
+    zero: Number = Field(0.0, description="the coordinate where it reads 0, m or rad")
+    scale: Number = Field(1.0, description="coordinate per unit of the reading")
+
+    def reading_of(self, key: str) -> Reading:
+        """Build the reading; `key` goes before what an error names."""
+        try:
+            return Reading(self.zero, self.scale)
+        except ModelError as error:
+            raise ModelError(f"{key}.{error}") from None
+
+
 def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
     """Return what a platform of a motion holds; one that is not known as if it did not tilt."""
     return TiltingTable if motion in TILTING else PlatformTable
@@ -235,6 +251,7 @@ _TYPES: dict[KeyRole, Any] = {
     "planar": PlanarBody,
     "rod": RodBody,
     "drive": DriveTable,
+    "reading": ReadingTable,
 }
 
 FORMER = {"limits": "slider_limits"}
@@ -339,6 +356,8 @@ def _held(given: Any, name: str, key: Key) -> Any:
         return None
     if key.role == "drive":
         return given.drive_of(name)
+    if key.role == "reading":
+        return given.reading_of(name)
     return given.cone_of(name) if key.role == "cone" else given
 
 
@@ -359,4 +378,6 @@ def leg_items(leg: LegKind) -> Mapping[str, Any]:
         fields = DriveTable.model_fields
         given = {name: getattr(leg.drive, name) for name in fields}
         found["drive"] = {k: v for k, v in given.items() if v != fields[k].default}
+    if leg.reading is not None:
+        found["reading"] = asdict(leg.reading)
     return found

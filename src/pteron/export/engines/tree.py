@@ -24,6 +24,7 @@ from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.kind import LegKind
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator.readings import refuse_readings
 from pteron.shapes import PoseLike
 
 _NONE = 1e-9
@@ -63,6 +64,7 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     ['x', 'y', 'z', 'theta1', 'leg1_joint1', 'leg1_joint2']
     """
     robot = as_manipulator(robot)
+    refuse_readings(robot, "a model for another engine")
     pose = chosen_home(robot, home)
     stances = leg_stances(robot, pose)
     size = _size(stances, robot.platform.at(pose)[0])

@@ -18,6 +18,7 @@ from pteron.export.klipper.sections import (
     PINS,
     SPEEDS,
     ConfigSection,
+    reading_comment,
     rotation_distance,
     signed,
 )
@@ -83,7 +84,10 @@ def cartesian(robot: Manipulator) -> Iterator[ConfigSection]:
                 ("rotation_distance", rotation_distance(robot, i - 1)),
                 *PINS,
             ),
-            (f"Its position is {joint} in mm {signed(-offset)} mm.",),
+            (
+                f"Its position is {joint} in mm {signed(-offset)} mm.",
+                *reading_comment(robot, i - 1, "rotation_distance"),
+            ),
         )
 
 

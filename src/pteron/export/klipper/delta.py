@@ -16,6 +16,7 @@ from pteron.export.klipper.sections import (
     differs,
     mm,
     number,
+    reading_comment,
     rotation_distance,
     signed,
 )
@@ -80,6 +81,7 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSecti
                 f"Its position is {'' if rise > 0.0 else '-'}{joint} in mm "
                 f"{signed(1000.0 * (center.at[2] - level))} mm.",
                 *end_stop(top, "carriage"),
+                *reading_comment(robot, center.leg, "rotation_distance"),
             ),
         )
 

@@ -18,9 +18,11 @@ from pteron.export.klipper.sections import (
     differs,
     mm,
     number,
+    reading_comment,
     signed,
 )
 from pteron.kinematics import inverse_kinematics, random_poses
+from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
 
@@ -86,6 +88,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSect
                 f"Its position is {'' if lifts[k] > 0.0 else '-'}{joint} in rad "
                 f"{signed(zeros[k])} rad: 0 where the arm is level, growing as it lifts.",
                 *end_stop(end, "arm"),
+                *reading_comment(robot, k, "gear_ratio"),
             ),
         )
 
@@ -163,4 +166,5 @@ def _rotary_top(
 def _gear(robot: Manipulator, leg: int) -> str | None:
     """Return the gear ratio, None where the machine's file does not say."""
     drive = robot.legs[leg].drive
-    return None if drive is None or drive.ratio is None else f"{number(abs(drive.ratio))}:1"
+    scale = (robot.legs[leg].reading or Reading()).scale
+    return None if drive is None or drive.ratio is None else f"{number(abs(drive.ratio / scale))}:1"

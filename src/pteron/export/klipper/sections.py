@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from pteron.errors import ModelError
+from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
 INSTEAD = "use --linuxcnc, or --c for a controller of your own"
@@ -56,7 +57,20 @@ def signed(value: float) -> str:
 
 def rotation_distance(robot: Manipulator, leg: int) -> str | None:
     """Return mm a turn of the motor, None where the machine's file does not say."""
+    scale = (robot.legs[leg].reading or Reading()).scale
     drive = robot.legs[leg].drive
     if drive is None or drive.ratio is None:
         return None
-    return number(2000.0 * math.pi / abs(drive.ratio))
+    return number(2000.0 * math.pi * abs(scale / drive.ratio))
+
+
+def reading_comment(robot: Manipulator, leg: int, key: str) -> tuple[str, ...]:
+    """Return what is said of a drive that counts its joint otherwise than its `ratio` says."""
+    reading = robot.legs[leg].reading
+    if reading is None:
+        return ()
+    ratio = "has that in it" if rotation_distance(robot, leg) else "is to have that in it"
+    return (
+        f"Its drive counts otherwise: joint = {reading.zero:.9g} + {reading.scale:.9g} reading (m, "
+        f"rad). {key} {ratio}; the zero is not, as the end stop gives it.",
+    )

@@ -18,6 +18,7 @@ from pteron.identification.logs import Description
 from pteron.identification.logs.clock import PER_SECOND
 from pteron.identification.logs.description import AngleUnit, LengthUnit, TimeUnit
 from pteron.manipulator import Manipulator
+from pteron.manipulator.readings import reading_scales, to_readings
 from pteron.tables import Dialect
 
 Contents = Literal["all", "joints", "poses"]
@@ -132,9 +133,10 @@ class Layout:
         expect_to_fit("rate", rate, 8.0 * samples * (robot.freedom + robot.joint_count))
         ticks = np.arange(math.ceil(samples - _ROUNDING) + 1)
         state = movement.states(ticks / rate)
-        values = {"joints": [state.joints], "poses": [state.pose]}.get(self.contents) or [
-            *(state.joints, state.pose, state.rates, state.accelerations),
-            *(state.velocity, state.acceleration, drive_forces(robot, *state[:3])),
+        joints, scales = to_readings(robot, state.joints), reading_scales(robot)
+        values = {"joints": [joints], "poses": [state.pose]}.get(self.contents) or [
+            *(joints, state.pose, state.rates / scales, state.accelerations / scales),
+            *(state.velocity, state.acceleration, scales * drive_forces(robot, *state[:3])),
         ]
         columns = {"t": np.asarray(ticks * self._factor("s") / rate, dtype=np.float64)}
         for (name, unit), column in zip(self._columns(robot), np.hstack(values).T, strict=True):

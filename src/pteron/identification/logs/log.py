@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
 from pteron.legs.kind import SLIDER, ActuatedJoint
+from pteron.legs.reading import Reading
 from pteron.shapes import PerCoordinate, PerJoint, Series
 
 _WIDE = 1.5
@@ -102,6 +103,8 @@ class Log:
         are.
     rows_in_file : array of int, shape (T,), optional
         Index from 0 of each sample among the data rows of its file, where some are left out.
+    readings : tuple of Reading or None, optional
+        Each leg's `reading`, by which joints and forces were converted from what the drives read.
 
     Raises
     ------
@@ -122,6 +125,7 @@ class Log:
     symbols: tuple[ActuatedJoint, ...] | None = None
     coordinates: tuple[str, ...] | None = None
     rows_in_file: _Phases | None = None
+    readings: tuple[Reading | None, ...] = ()
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:

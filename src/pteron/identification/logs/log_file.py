@@ -41,7 +41,9 @@ from pteron.identification.logs.sizes import (
 )
 from pteron.identification.logs.spikes import MARGIN, Spikes
 from pteron.identification.logs.time_stamps import TimeStamps
+from pteron.legs import Reading
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.readings import from_readings, reading_scales
 from pteron.platforms.coordinates import COORDINATES
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table, write_table
 
@@ -221,11 +223,12 @@ class LogFile:
                 self._groups, np.split(values[:, 1:], edges, axis=1), strict=True
             )
         )
-        joints *= self._factors
+        joints = from_readings(self._robot, joints * self._factors)
         of_joints, of_pose = self._bounds
         check_bounds(joints, of_joints, c.joints, source, first)
         if self.description.gains is not None:
             forces = forces * np.array(self.description.gains)
+        forces = forces / reading_scales(self._robot)
         check_forces(forces, c.forces.shown, source, first)
         if c.pose.names:
             check_bounds(pose, of_pose, c.pose, source, first)
@@ -241,6 +244,7 @@ class LogFile:
             step=self._step,
             symbols=joint_symbols(self._robot),
             coordinates=self._robot.coordinates,
+            readings=tuple(leg.reading for leg in self._robot.legs),
         )
 
     def _phases(self, values: Values, first: int) -> NDArray[np.int64]:
@@ -279,8 +283,11 @@ class LogFile:
         spans, source, c = joint_spans(self._robot), self.source, self._columns
         limits = self.description.limits or (None,)
         joints = [Channel(name, source, spans, joint=j) for j, name in enumerate(c.joints.shown)]
-        forces = zip(c.forces.shown, cycle(limits), strict=False)
-        return joints + [Channel(name, source, spans, limits=pair) for name, pair in forces]
+        forces = zip(c.forces.shown, cycle(limits), reading_scales(self._robot), strict=False)
+        return joints + [
+            Channel(name, source, spans, limits=pair and (pair[0] / scale, pair[1] / scale))
+            for name, pair, scale in forces
+        ]
 
 
 def _in_si(values: Values, unit: str) -> Values:
@@ -371,9 +378,9 @@ def write_log(log: Log, path: str | Path) -> Path:
     """Write a log to a CSV or Parquet file, whole or not at all, at full precision.
 
     The columns are t (s), rho1.. (m), force1.. (N) or current1.. (A), the pose's coordinates (m,
-    rad) and payload; at a crank theta (rad) and torque (N m). Forces in volts or per cent say so in
-    their names. The description is not written: it speaks of the columns of the file that the log
-    came from.
+    rad) and payload; at a crank theta (rad) and torque (N m). Joints and forces are as the drives
+    count them (`readings`). Forces in volts or per cent say so in their names. The description is
+    not written: it speaks of the columns of the file that the log came from.
 
     Raises
     ------
@@ -381,10 +388,13 @@ def write_log(log: Log, path: str | Path) -> Path:
         If the file cannot be written; one that was there is left as it was.
     """
     unit = log.description.force_unit
-    columns = {"t": log.time} | dict(zip(log.joint_names, log.joints.T, strict=True))
+    counted = [one or Reading() for one in log.readings or [None] * len(log.joint_names)]
+    scales = np.array([one.scale for one in counted])
+    joints = (log.joints - [one.zero for one in counted]) / scales
+    columns = {"t": log.time} | dict(zip(log.joint_names, joints.T, strict=True))
     for j, name in enumerate(log.force_names):
         stem = f"current{j + 1}" if unit == "A" else name
-        columns[stem + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]
+        columns[stem + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j] * scales[j]
     if log.pose is not None:
         names = log.coordinates or tuple(COORDINATES)[: log.pose.shape[1]]
         columns |= dict(zip(names, log.pose.T, strict=True))

@@ -10,6 +10,7 @@ import numpy as np
 from pteron.html_table import Column, html_table
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.manipulator.readings import reading_scales, to_readings
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.limits import limits_of
 
@@ -118,19 +119,20 @@ class Simulation:
 
         Its columns are t; x y z phi, dx dy dz dphi, ddx ddy ddz ddphi and xref yref zref phiref,
         those that the machine has; its joints (rho1, theta2) and their rates (drho1, dtheta2);
-        forces (force1, torque2); and payload.
+        forces (force1, torque2); and payload. Joints and forces are as the drives count them.
         """
         import polars as pl
 
         names, joints = self.robot.coordinates, self.robot.joint_names
+        scales = reading_scales(self.robot)
         blocks = (
             (names, self.pose),
             ([f"d{name}" for name in names], self.velocity),
             ([f"dd{name}" for name in names], self.acceleration),
             ([f"{name}ref" for name in names], self.reference.pose),
-            (joints, self.joints),
-            ([f"d{name}" for name in joints], self.joint_rates),
-            (self.robot.force_names, self.forces),
+            (joints, to_readings(self.robot, self.joints)),
+            ([f"d{name}" for name in joints], self.joint_rates / scales),
+            (self.robot.force_names, self.forces * scales),
         )
         columns = {"t": self.time}
         for titles, values in blocks:

@@ -15,6 +15,7 @@ from pteron.kernels import Array
 from pteron.kinematics import follow
 from pteron.kinematics.evaluate import checked, unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.readings import from_readings
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
 from pteron.shapes import Columns, PoseLike
@@ -151,7 +152,7 @@ def _followed(robot: Manipulator, time: Array, joints: Array, start: PoseLike | 
             "their assembly mode"
         )
     cranks = [leg.goes_round for leg in robot.legs]
-    joints = np.where(cranks, np.unwrap(joints, axis=0), joints)
+    joints = from_readings(robot, np.where(cranks, np.unwrap(joints, axis=0), joints))
     _, rates, gains = _spline(time, joints)
     poses = follow(robot, joints, checked(robot, start, "start"))
     return Motion(time, poses, *unchecked(robot, "platform_motion", poses, rates, gains))

@@ -1,0 +1,68 @@
+"""Joint coordinates and what the drives read, by the legs' `reading`: q = zero + scale reading.
+
+Rates follow by the scale. Forces follow by virtual work: a force that a drive tells for its reading
+is scale times the one at the joint's coordinate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pteron.errors import ModelError
+from pteron.legs.reading import Reading
+from pteron.manipulator.manipulator import Manipulator
+
+Array = NDArray[np.float64]
+
+
+def has_readings(robot: Manipulator) -> bool:
+    """Return whether the joint coordinates of some leg are not what its drive reads."""
+    return any(leg.reading not in (None, Reading()) for leg in robot.legs)
+
+
+def reading_scales(robot: Manipulator) -> Array:
+    """Return each joint's scale, (n,): coordinate per unit of its reading."""
+    return np.array([(leg.reading or Reading()).scale for leg in robot.legs])
+
+
+def reading_zeros(robot: Manipulator) -> Array:
+    """Return each joint's coordinate where its drive reads 0, (n,), m or rad."""
+    return np.array([(leg.reading or Reading()).zero for leg in robot.legs])
+
+
+def from_readings(robot: Manipulator, readings: ArrayLike) -> Array:
+    """Return joint coordinates (..., n) of readings (..., n)."""
+    given = np.asarray(readings, dtype=float)
+    return reading_zeros(robot) + reading_scales(robot) * given if has_readings(robot) else given
+
+
+def to_readings(robot: Manipulator, joints: ArrayLike) -> Array:
+    """Return the readings (..., n) of joint coordinates (..., n)."""
+    given = np.asarray(joints, dtype=float)
+    return (given - reading_zeros(robot)) / reading_scales(robot) if has_readings(robot) else given
+
+
+def without_readings(robot: Manipulator) -> Manipulator:
+    """Return the machine as if its drives read the joint coordinates."""
+    legs = tuple(replace(leg, reading=None) for leg in robot.legs)
+    return replace(robot, legs=legs) if has_readings(robot) else robot
+
+
+def refuse_readings(robot: Manipulator, writer: str) -> None:
+    """Refuse a machine with readings where what is written counts joint coordinates.
+
+    Raises
+    ------
+    ModelError
+        If it has some; `writer` is what is written, as a message calls it.
+    """
+    if has_readings(robot):
+        legs = [str(i) for i, leg in enumerate(robot.legs, start=1) if leg.reading is not None]
+        raise ModelError(
+            f"{robot.name}: {writer} counts joint coordinates, and the drives of legs "
+            f"{', '.join(legs)} read others (key `reading`); leave that key out of a copy of the "
+            "file, and convert by q = zero + scale reading"
+        )
