@@ -12,8 +12,11 @@ import numpy as np
 MOTIONS = {"3T": (3, False), "3T1R": (3, True), "2T": (2, False), "2T1R": (2, True)}
 """How many ways the platform moves without turning, and whether it turns."""
 
-FLAT = {"PRRR", "RRR", "PRR", "RPR"}
+FLAT = {"PRRR", "RRR", "PRR", "RPR", "RPS", "PRS", "RRS"}
 """The kinds whose last link moves in the plane perpendicular to d, as the others' swings."""
+
+TILTS = {"3T3R": 6, "3R": 3, "2R": 2, "1T2R": 3}
+"""The motions of platforms that turn about any axis, and how many coordinates they have."""
 
 LENGTH = 0.1
 """Metres that count as much as a radian where singular values are taken."""
@@ -35,6 +38,19 @@ class Body:
     @property
     def about_center(self):
         return self.inertia - self.mass * (self.x**2 + self.y**2)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Mass, mass times the centre of mass, and tensor about the reference point."""
+
+    mass: float
+    first: np.ndarray
+    tensor: np.ndarray
+
+    @property
+    def moments(self):
+        return self.mass, *self.first, *self.tensor.ravel()
 
 
 @dataclass(frozen=True)
@@ -91,9 +107,17 @@ class Machine:
     geared: tuple
     """Moment of inertia and ratio of the parts that turn by ratio times the platform's angle."""
     gravity: np.ndarray
+    tilts: str | None = None
+    """Which motion, if it turns about any axis."""
+    axes: tuple = ()
+    """Of the turns by its angles in the order in which they follow each other, each with its
+    angle's place in the pose; a tripod's yaw counts behind the pose."""
+    center: np.ndarray | None = None
 
     @property
     def freedom(self):
+        if self.tilts:
+            return TILTS[self.tilts]
         return self.moves.shape[1] + self.turns
 
 
@@ -101,8 +125,33 @@ def describe(robot):
     """Return the description of a pteron robot."""
     if isinstance(robot, Machine):
         return robot
-    frame = np.column_stack(robot.platform.frame)
-    count, turns = MOTIONS[robot.platform.motion]
+    platform = robot.platform
+    frame = np.column_stack(platform.frame)
+    if platform.motion in TILTS:
+        last, turns = TILTS[platform.motion] - 1, list(frame.T)
+        axes = [(axis, last - 2 + i) for i, axis in enumerate(turns)]
+        if platform.motion == "1T2R":
+            axes = [(turns[2], 3), (turns[1], 2), (turns[0], 1)]
+        elif platform.motion == "2R":
+            axes = [(platform.axis, 0), (platform.second_axis, 1)]
+        elif platform.angle_order == "rpy":
+            axes = axes[::-1]
+        body = platform.inertia
+        return Machine(
+            legs=tuple(_leg(leg, None) for leg in robot.legs),
+            frame=frame,
+            moves=np.eye(3),
+            turns=True,
+            slides=False,
+            platform=Solid(body.mass, np.array(body.first_moment), body.tensor),
+            bars=(),
+            geared=(),
+            gravity=np.array(robot.gravity),
+            tilts=platform.motion,
+            axes=tuple(axes),
+            center=platform.center,
+        )
+    count, turns = MOTIONS[platform.motion]
     return Machine(
         legs=tuple(_leg(leg, frame[:, 2]) for leg in robot.legs),
         frame=frame,
@@ -124,6 +173,8 @@ def _leg(leg, k):
         # A shaft is hardly ever across the axis that it turns, nor a rod across its guide.
         first = k if e is None else e
         d = _across(first)
+    elif leg.type == "UPS":
+        first = d = np.eye(3)[0]  # nothing depends on them
     else:
         d = np.array(leg.direction)
         first = np.array(getattr(leg, "zero_direction", _across(d)))
@@ -174,9 +225,56 @@ class Place(NamedTuple):
     the cosine between d and a guide; or the cosine between a rod and its guide."""
 
 
+def about(axis, angle):
+    """Return the matrix of a turn about a unit vector, (3, 3)."""
+    a = ca.DM(axis)
+    return ca.cos(angle) * (ca.SX.eye(3) - a @ a.T) + ca.sin(angle) * ca.skew(a) + a @ a.T
+
+
+def tilted(machine, pose):
+    """Return the position of P, (3, 1), and the platform's axes as columns, (3, 3)."""
+    if machine.tilts == "1T2R":
+        p, yaw = _held(machine, pose)
+        pose = ca.vertcat(pose, yaw)
+    else:
+        p = pose[:3] if machine.tilts == "3T3R" else ca.DM(machine.center)
+    turn = ca.SX.eye(3)
+    for axis, place in machine.axes:
+        turn = turn @ about(axis, pose[place])
+    return p, turn @ ca.DM(machine.frame)
+
+
+def _held(machine, pose):
+    """Return the position of P and the yaw at which the planes of a tripod's legs hold its points.
+
+    The yaw is the one of two that is nearest to 0.
+    """
+    x, y, k = machine.frame.T
+    level = about(y, pose[2]) @ about(x, pose[1]) @ ca.DM(machine.frame)
+    normals = [leg.d for leg in machine.legs]
+    arms = [level @ ca.DM(leg.s0) for leg in machine.legs]
+    total = ca.SX(3, 1)
+    for i, (n, leg, u) in enumerate(zip(normals, machine.legs, arms, strict=True)):
+        weight = np.cross(normals[i - 2], normals[i - 1]) @ k
+        total += weight * ca.vertcat(ca.dot(n, u), ca.dot(np.cross(k, n), u), n @ leg.r)
+    a, b, c = ca.vertsplit(total)
+    middle = ca.atan2(-b, a)
+    yaw = middle - ca.sign(middle) * ca.acos(c / ca.sqrt(a * a + b * b))
+    turn = about(k, yaw)
+    wanted = [
+        n @ leg.r - ca.dot(n, turn @ u)
+        for n, leg, u in list(zip(normals, machine.legs, arms, strict=True))[:2]
+    ]
+    matrix = ca.DM([[n @ x, n @ y] for n in normals[:2]])
+    across = ca.solve(matrix, ca.vertcat(*wanted))
+    return pose[0] * ca.DM(k) + ca.DM(np.column_stack([x, y])) @ across, yaw
+
+
 def carried(machine, pose):
     """Return the matrix (3, 3) from the platform's frame to the base's: columns phi times as long
     as the platform's axes where the platform slides."""
+    if machine.tilts:
+        return tilted(machine, pose)[1]
     phi = pose[-1] if machine.turns else 0.0
     return phi * ca.DM(machine.frame) if machine.slides else turned(machine, phi)
 
@@ -190,6 +288,8 @@ def turned(machine, angle):
 
 def position(machine, pose):
     """Return the position of P, (3, 1)."""
+    if machine.tilts:
+        return tilted(machine, pose)[0]
     return ca.mtimes(ca.DM(machine.moves), pose[: machine.moves.shape[1]])
 
 
@@ -221,6 +321,9 @@ def _place(leg, c, phi):
         w -= slide * e
     elif leg.flat:
         w -= ca.dot(w, d) * d
+    elif leg.lu is None:
+        n = ca.norm_2(w)
+        return Place(n, c, slide, angle, w / n, w, 1)
     x, y, out = ca.dot(w, first), ca.dot(w, second), ca.dot(w, d)
     n = ca.sqrt(x**2 + y**2)
     if leg.lu is None:

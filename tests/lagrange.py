@@ -15,7 +15,8 @@ from descriptions import carried, describe, places, position, turned
 class Body(NamedTuple):
     """Its parameters, its reference point, and its axes.
 
-    A slider has m and no axis, a rod m, mgx, I and x, others m, mgx, mgy, I and x, y.
+    A slider has m and no axis, a rod m, mgx, I and x, a link m, mgx, mgy, I and x, y; a body that
+    turns about any axis has m, three moments and its tensor, row by row, and three axes.
     """
 
     parameters: tuple
@@ -93,8 +94,15 @@ def _energies(body, parameters, x, dx, gravity):
     for k, axis in enumerate(body.axes, start=1):
         kinetic += parameters[k] * ca.dot(velocity, ca.jtimes(axis, x, dx))
         potential -= parameters[k] * ca.dot(gravity, axis)
-    for axis in body.axes[:1]:
-        kinetic += 0.5 * parameters[-1] * ca.sumsqr(ca.jtimes(axis, x, dx))
+    rates = [ca.jtimes(axis, x, dx) for axis in body.axes]
+    if len(rates) == 3:
+        tensor = ca.reshape(parameters[4:], 3, 3)
+        second = 0.5 * ca.trace(tensor) * ca.SX.eye(3) - tensor  # the integral of r r^T dm
+        return kinetic + 0.5 * ca.trace(
+            second @ ca.horzcat(*rates).T @ ca.horzcat(*rates)
+        ), potential
+    for rate in rates[:1]:
+        kinetic += 0.5 * parameters[-1] * ca.sumsqr(rate)
     return kinetic, potential
 
 
@@ -117,7 +125,8 @@ def bodies(machine, x):
         else:
             lowers.append(_rod(leg.lower, at.point, direction))
     p, turn = position(machine, x), carried(machine, x)
-    platform = Body(machine.platform.moments, p, (turn[:, 0], turn[:, 1]))
+    axes = ca.horzsplit(turn)
+    platform = Body(machine.platform.moments, p, tuple(axes if machine.tilts else axes[:2]))
     bars = [Body((mass,), p + ca.mtimes(turn, ca.DM(hinge)), ()) for mass, hinge in machine.bars]
     geared = [
         Body((0.0, 0.0, inertia), p, (turned(machine, ratio * x[-1])[:, 0],))

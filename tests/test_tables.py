@@ -12,7 +12,7 @@ import polars as pl
 import pytest
 
 from pteron.errors import DataError, OutputError
-from pteron.tables import CsvFile, Table, check_output, read_table, write_table
+from pteron.tables import CsvFile, Table, check_output, in_si, read_table, write_table
 
 
 @pytest.fixture
@@ -210,6 +210,26 @@ def test_a_file_that_cannot_be_written_is_refused_early(tmp_path: Path, name: st
         check_output(tmp_path / name)
     assert words in str(caught.value)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["folder.csv"]
+
+
+def test_units_in_names_are_converted(given):
+    units = {"t": "s", "x": "m", "dx": "m/s", "roll": "rad", "fx": "N"}
+    table = given(
+        b"t (ms),x[mm],dx (mm/s),roll (deg),fx [N],note (mm)\n500,2,3,180,4,a\n,1,1,1,1,b\n"
+    )
+    table = in_si(table, units)
+    assert table.columns == ("t", "x", "dx", "roll", "fx", "note (mm)")
+    found = table.numbers(list(units), "nan")
+    np.testing.assert_allclose(found[0], [0.5, 0.002, 0.003, np.pi, 4.0], rtol=1e-15)
+    with pytest.raises(DataError, match=r"column t: the cell is empty"):
+        table.numbers(["t"])
+    for content, words in (
+        (b"x (deg)\n1\n", r"column x \(deg\): the unit of x is one of m, mm, um"),
+        (b"dx (mm)\n1\n", r"the unit of dx is one of m/s, mm/s"),
+        (b"x,x (mm)\n1,2\n", r"x and x \(mm\) given; keep one of them"),
+    ):
+        with pytest.raises(DataError, match=words):
+            in_si(given(content), units)
 
 
 def test_a_table_that_a_file_cannot_hold_leaves_the_old_file(tmp_path: Path):

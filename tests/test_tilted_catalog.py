@@ -8,6 +8,8 @@ from mechanisms import TILTED, gated
 from test_cli import run
 
 import pteron
+from pteron.motion import replay
+from pteron.playback import playback
 from pteron.workspace import home_pose, pose_margins
 
 HOMES = {
@@ -35,3 +37,26 @@ def test_it_is_clean_and_level_at_home(name):
     assert pose_margins(robot, home).least > 0.4
     turned = pteron.rotation_of(robot, home, form="tilt-torsion")
     np.testing.assert_allclose(turned, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", gated(["ankle", "wrist", "ball-table"], ["ankle"]))
+def test_commands_serve_platforms_that_have_no_place_to_move_to(name, tmp_path):
+    done = run(f"workspace {name} --certify --tolerance 0.3")
+    assert done.exit_code == 0, done.stderr
+    lengths = TILTED[name].platform.lengths
+    assert ("Proved length" if lengths else "deg to every side: proved.") in done.stdout
+    done = run(f"cycle {name} --out {tmp_path / 'cycle.csv'}")
+    assert "that of a point 100 mm from P, is 10 m/s^2 at most" in done.stderr
+    motion = replay(name, tmp_path / "cycle.csv")
+    assert 9.9 < np.abs(0.1 * np.linalg.norm(motion.acceleration[:, -2:], axis=-1)).max() < 10.01
+
+
+def test_tables_of_poses_may_be_in_mm_and_degrees(tmp_path):
+    robot, table = TILTED["ball-table"], tmp_path / "poses.csv"
+    table.write_text("t,z (mm),roll [deg],pitch [deg]\n0,120,5,-3\n1,121,5,-3\n", encoding="utf-8")
+    first, _ = json.loads(run(f"inverse ball-table --table {table} --json").stdout)
+    pose = [0.12, *np.radians([5.0, -3.0])]
+    joints = [first[name] for name in robot.joint_names]
+    np.testing.assert_allclose(joints, pteron.inverse_kinematics(robot, pose), rtol=1e-12)
+    shown = playback(robot, table)
+    np.testing.assert_allclose(shown.motion.pose[0], pose, rtol=1e-12)

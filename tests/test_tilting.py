@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
+from lagrange import Lagrange
 from mechanisms import in_turn
 
 import pteron
@@ -50,6 +51,8 @@ def test_the_equation_of_motion_is_lagranges(drawn):
     moved += np.einsum("bij,bj->bi", pteron.coriolis_matrix(robot, x, dx), dx)
     moved += pteron.gravity_forces(robot, x)
     np.testing.assert_allclose(across, moved, atol=1e-11 * np.abs(moved).max())
+    oracle = Lagrange(robot)
+    np.testing.assert_allclose(oracle.forces(x, dx, ddx), forces, atol=1e-10 * np.abs(forces).max())
     back = pteron.forward_dynamics(robot, x, dx, forces)
     np.testing.assert_allclose(back, ddx, atol=1e-10)
     regressed = pteron.regressor(robot, x, dx, ddx) @ pteron.parameters(robot)

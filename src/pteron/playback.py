@@ -21,7 +21,16 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import reading_scales
 from pteron.motion import Motion, Simulation, check_motion, replay
 from pteron.shapes import PoseLike
-from pteron.tables import CsvFile, Dialect, ParquetFile, Table, open_table, read_table, whole_table
+from pteron.tables import (
+    CsvFile,
+    Dialect,
+    ParquetFile,
+    Table,
+    in_si,
+    open_table,
+    read_table,
+    whole_table,
+)
 from pteron.workspace import home_pose
 
 
@@ -142,11 +151,15 @@ def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
     has = set(columns)
     if has.issuperset((*robot.joint_names, *robot.force_names)):
         return bool(has & {f"d{name}" for name in robot.coordinates})
-    return bool(has.intersection((*robot.coordinates, *robot.joint_names)))
+    if has.intersection((*robot.coordinates, *robot.joint_names)):
+        return True
+    bare = {name.partition("(")[0].partition("[")[0].strip() for name in columns}
+    return bare.issuperset(robot.coordinates) and bare.isdisjoint(robot.joint_names)
 
 
 def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
     """Return the motion of a table, with its forces where it has them all."""
+    rows = in_si(rows, {**robot.column_units, "t": "s"})
     if start is None and not set(rows.columns) >= set(robot.coordinates):
         start = home_pose(robot)
     motion = replay(robot, rows, start=start)

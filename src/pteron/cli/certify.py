@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,9 @@ _NOT_PROVED = 1
 
 TOLERANCE = 0.05
 """Default of the greatest undecided share of a volume: it takes some seconds."""
+
+_SHAPES = {1: ("length", "interval"), 2: ("area", "square"), 3: ("volume", "cube")}
+"""What is proved at an orientation, by how many ways the platform moves, and the shape in it."""
 
 _MAY_BE_SINGULAR = (
     "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."
@@ -103,12 +107,25 @@ class Proofs:
             raise Exit(_NOT_PROVED)
 
     def _certify(self, robot: Manipulator, pose: Array, warnings: list[str], as_json: bool) -> None:
-        from pteron.workspace import conditions, largest_cube, paving
+        from pteron.workspace import conditions, largest_cube, largest_tilt, paving
 
         for text in warnings:
             note(f"Warning: {text}")
         tolerance = TOLERANCE if self.tolerance is None else self.tolerance
         asked = conditions(robot, **self.floors)
+        if not robot.platform.lengths:
+            with spinner(f"Proving how far {robot.name} leans"):
+                leans = largest_tilt(robot, pose, given=asked)
+            if as_json:
+                data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
+                show_json(data | {"proved": True, "warnings": warnings})
+            else:
+                rest = list(_angles(robot, pose).items())[2:]
+                show(_heading(robot, dict(rest), self.floors))
+                show(f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.")
+                if not self.floors["type_ii"]:
+                    show(_MAY_BE_SINGULAR)
+            return
         with spinner(f"Proving the workspace of {robot.name}"):
             found = paving(robot, pose, tolerance=tolerance, given=asked)
             shares = found.boundary_shares
@@ -216,14 +233,8 @@ def _show(
     shares: dict[str, float],
     cube: Inscribed | None,
 ) -> None:
-    where = ", ".join(pose_text(name, angle) for name, angle in _angles(robot, pose).items())
-    kept = [f"{name} {value:g}" for name, value in floors.items() if value]
-    noun = "area" if found.unit == "m^2" else "volume"
-    shape = "square" if robot.platform.planar else "cube"
-    show(
-        f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
-        + (f", with floors {', '.join(kept)}" if kept else ""),
-    )
+    noun, shape = _SHAPES[len(found.axes)]
+    show(_heading(robot, _angles(robot, pose), floors))
     if not found.outer_volume:
         show("Proved: no position serves.")
         return
@@ -247,6 +258,13 @@ def _show(
     show(table("what ends it", number, rows=rows, numbers=(number,)))
     if not floors["type_ii"]:
         show(_MAY_BE_SINGULAR)
+
+
+def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, float]) -> str:
+    where = ", ".join(pose_text(name, angle) for name, angle in angles.items())
+    kept = ", ".join(f"{name} {value:g}" for name, value in floors.items() if value)
+    text = f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
+    return f"{text}, with floors {kept}" if kept else text
 
 
 def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:

@@ -54,16 +54,17 @@ def inverse(
 ) -> None:
     """Compute the joint coordinates at poses.
 
-    A table has the columns x y z phi or x y z roll pitch yaw, those that the machine has; the
-    result has its columns and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad,
-    as the drives count them where a leg has a `reading`.
+    A table has the columns x y z phi or x y z roll pitch yaw, those that the machine has, in m and
+    rad, or in units that their names say: x (mm), roll (deg). The result has its columns, in SI
+    units, and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad, as the drives
+    count them where a leg has a `reading`.
     """
     from pteron.kinematics import inverse_kinematics
     from pteron.manipulator.readings import to_readings
 
     machine = load_robot(robot, elbows)
     columns = machine.coordinates
-    rows = given_rows(table, pose, "pose", columns)
+    rows = given_rows(machine, table, pose, "pose", columns)
     added = machine.joint_names
     check_destination(out, table, rows.table, added)
     joints = rows.served(
@@ -113,7 +114,7 @@ def direct(
 
     machine = load_robot(robot, elbows)
     columns = machine.joint_names
-    rows = given_rows(table, joints, "joints", columns)
+    rows = given_rows(machine, table, joints, "joints", columns)
     failure: Failure = on_failure or ("raise" if rows.single else "nan")
     added = ["row", "mode", *machine.coordinates]
     check_destination(out, table, rows.table, added)
@@ -196,7 +197,7 @@ def forces(
     motion = [*names["pose"], *names["velocity"], *names["acceleration"]]
     typed = [pose, velocity, acceleration, wrench]
     if all(text is None for text in typed):
-        rows = rows_of_table(table, "pose", motion)
+        rows = rows_of_table(machine, table, "pose", motion)
     elif table is not None:
         raise DataError("pose and --table given; give one of them")
     else:

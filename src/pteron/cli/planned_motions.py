@@ -27,8 +27,10 @@ def standard_motion(
     from dataclasses import replace
 
     from pteron.motion import check_path, cycle_path, pick_and_place, time_optimal
+    from pteron.motion.trajectories.cycle import STILL_RADIUS
     from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION
     from pteron.motion.trajectories.time_law import in_time
+    from pteron.motion.trajectories.tool import carries
 
     middle = given_pose(machine, around, "--around")
     found = pick_and_place(machine, middle, scale=scale)
@@ -37,11 +39,16 @@ def standard_motion(
         return time_optimal(machine, path, limits, step=step)
     check_path(machine, path)
     if duration is None and not limits.any:
+        turning = bool(machine.platform.angles) and not carries(machine.platform)
+        beside = f", and that of a point {1e3 * STILL_RADIUS:g} mm from P," if turning else ""
         note(
-            "Note: no limits given, and the machine's drives have none: the tool's acceleration is "
-            f"{PEAK_ACCELERATION:g} m/s^2 at most"
+            "Note: no limits given, and the machine's drives have none: the tool's acceleration"
+            f"{beside} is {PEAK_ACCELERATION:g} m/s^2 at most"
         )
-        limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)
+        if turning:
+            duration = found.duration
+        else:
+            limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)
     return in_time(machine, found.cycle.at, duration, limits, step)
 
 
@@ -67,9 +74,9 @@ def line_motion(
         raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}, or --via")
     poses = [] if via is not None and from_ is None else [given_pose(machine, from_, "--from")]
     if via is not None:
-        from pteron.tables import read_table
+        from pteron.tables import in_si, read_table
 
-        passed = read_table(via).numbers(machine.coordinates)
+        passed = in_si(read_table(via), machine.column_units).numbers(machine.coordinates)
         note_unlikely(machine, machine.coordinates, passed, via)
         poses += list(passed)
     if to is not None:

@@ -60,7 +60,6 @@ def _machine(found: dict[str, Any]) -> Table:
 
     home, reach, base = found["home"], found["reach"], found["base_parameters"]
     singular = ", ".join(f"{math.degrees(a):.4g}" for a in found["singular_orientations"] or ())
-    factor, unit = (1e3, "litres") if reach["unit"] == "m^3" else (1e2, "dm^2")
     angles = [name for name in found["coordinates"] if coordinate(name).unit == "rad"]
     told = {
         "home pose": " ".join(f"{value:.4g}" for value in home["pose"]),
@@ -69,8 +68,12 @@ def _machine(found: dict[str, Any]) -> Table:
     }
     if len(angles) == 1:
         told[f"singular {angles[0]} there"] = f"{singular} deg" if singular else "none"
+    if reach is not None:
+        factor, unit = (1e3, "litres") if reach["unit"] == "m^3" else (1e2, "dm^2")
+        told["reach"] = f"{factor * reach['volume']:.4g} {unit}"
+    if found["largest_tilt"] is not None:
+        told["leans to every side by"] = f"{math.degrees(found['largest_tilt']):.1f} deg"
     told |= {
-        "reach": f"{factor * reach['volume']:.4g} {unit}",
         "cycle" if found["cycle"]["standard"] else "motion": f"{found['cycle']['duration']:.3g} s",
         "base parameters": f"{base['rank']} of {base['of']}",
     }

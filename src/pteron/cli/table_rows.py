@@ -103,11 +103,15 @@ class Rows:
 
 
 def given_rows(
-    file: str | None, typed: Sequence[str] | None, what: str, names: Sequence[str]
+    robot: Manipulator,
+    file: str | None,
+    typed: Sequence[str] | None,
+    what: str,
+    names: Sequence[str],
 ) -> Rows:
     """Return the rows of a table's file, or the one that was typed; `names` are its columns."""
     if not typed:
-        return rows_of_table(file, what, names)
+        return rows_of_table(robot, file, what, names)
     if file is not None:
         raise DataError(f"{what} and --table given; give one of them")
     return single_row(names, parsed_numbers(typed, names, what))
@@ -123,16 +127,16 @@ def single_row(columns: Sequence[str], values: Sequence[float]) -> Rows:
     return Rows(Table("the command line", pl.DataFrame(cells)), single=True)
 
 
-def rows_of_table(file: str | None, what: str, names: Sequence[str]) -> Rows:
-    """Return the rows of a table's file."""
+def rows_of_table(robot: Manipulator, file: str | None, what: str, names: Sequence[str]) -> Rows:
+    """Return the rows of a table's file, in SI units."""
     if file is None:
         raise DataError(f"no {what} given; give {' '.join(names)}, or --table FILE")
-    from pteron.tables import read_table
+    from pteron.tables import in_si, read_table
 
     if hasattr(signal, "siginterrupt"):
         # Polars, once imported, lets a read of standard input go on through Ctrl-C.
         signal.siginterrupt(signal.SIGINT, True)
-    return Rows(read_table(file))
+    return Rows(in_si(read_table(file), robot.column_units))
 
 
 def check_destination(
@@ -188,7 +192,7 @@ def deliver(
 
 def _show(robot: Manipulator, result: Table, shown: Sequence[str], *, single: bool) -> None:
     """Print the first rows for a person, with units."""
-    known = column_units(robot)
+    known = robot.column_units
     units = [known.get(name, "") for name in shown]
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
     rows = [
@@ -201,16 +205,6 @@ def _show(robot: Manipulator, result: Table, shown: Sequence[str], *, single: bo
         show(table("row", *headings, rows=rows, numbers=("row", *headings)))
     if len(result) > SHOWN_ROWS:
         note(f"{SHOWN_ROWS} of {_count(len(result))} shown; --out FILE writes them all")
-
-
-def column_units(robot: Manipulator) -> dict[str, str]:
-    """Return the units of a machine's pose coordinates, joint coordinates and forces."""
-    joints = [leg.joint for leg in robot.legs]
-    return {
-        **dict(zip(robot.coordinates, robot.units, strict=True)),
-        **{name: j.unit for name, j in zip(robot.joint_names, joints, strict=True)},
-        **{name: j.force_unit for name, j in zip(robot.force_names, joints, strict=True)},
-    }
 
 
 def _text(cell: float | int | None, unit: str) -> str:

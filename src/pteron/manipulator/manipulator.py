@@ -165,6 +165,24 @@ class Manipulator:
             "forces": self.force_names,
         }
 
+    @property
+    def column_units(self) -> dict[str, str]:
+        """Units of those columns by name; m, rad, N, N m, and per s or s^2."""
+        joints = [leg.joint for leg in self.legs]
+        units: dict[str, Sequence[str]] = {
+            "pose": self.units,
+            "joints": [joint.unit for joint in joints],
+            "forces": [joint.force_unit for joint in joints],
+            "wrench": [{"f": "N", "m": "N m"}[name[0]] for name in self.platform.wrench_columns],
+        }
+        rates = {"velocity": "pose", "acceleration": "pose"}
+        rates |= {"joint_rates": "joints", "joint_accelerations": "joints"}
+        for name, of in rates.items():
+            per = "/s^2" if "acceleration" in name else "/s"
+            units[name] = [unit + per for unit in units[of]]
+        names = self.column_names
+        return {n: u for what in names for n, u in zip(names[what], units[what], strict=True)}
+
 
 def faults_of(name: object, platform: Platform, legs: Sequence[LegKind | None]) -> list[str]:
     """Return all that is wrong with a machine, a line each; a leg that is None is wrong itself."""

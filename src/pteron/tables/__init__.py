@@ -19,6 +19,7 @@ from pteron.tables.files import (
 )
 from pteron.tables.parquet_file import ParquetFile
 from pteron.tables.table import Table, listed
+from pteron.tables.units import in_si
 
 __all__ = [
     "ENDINGS",
@@ -29,6 +30,7 @@ __all__ = [
     "Table",
     "check_output",
     "declaration",
+    "in_si",
     "listed",
     "open_table",
     "read_table",

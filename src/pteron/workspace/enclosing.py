@@ -60,7 +60,7 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array, *, limits: bool =
         constant += float(at @ across @ at)
         square += (bound.radius + slack) ** 2
     values = np.linalg.eigvalsh(normal)
-    if not len(robot.legs) or values[0] <= _SINGULAR * values[-1]:
+    if size and values[0] <= _SINGULAR * values[-1]:
         raise ModelError(
             "the reach has no end that is known: the guides let the platform move along them for "
             "ever; give the legs limits, or say within which box",

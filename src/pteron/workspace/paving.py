@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.errors import DataError
+from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, as_array
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.evaluate import checked_one
@@ -209,13 +209,19 @@ def paving(
     if not tolerance > 0.0:
         raise DataError(f"tolerance: {tolerance!r} given, a share above 0 expected")
     expect_regular(robot)
+    if within is None and not robot.platform.lengths:
+        raise ModelError(
+            f"a {robot.platform.motion} platform has no places to move to: say within which angles",
+            subject=robot.name,
+        )
     box = region_box(robot, at, within)
     asked = conditions(robot) if given is None else given
     inner, boundary, complete = _refined(interval_test(robot, asked), box, tolerance, most)
     axes = tuple(robot.coordinates[i] for i in np.flatnonzero(box[0] < box[1]))
     volumes = [math.fsum(np.prod(b[:, 1] - b[:, 0], axis=1)) for b in (inner, boundary)]
     turning = sum(axis in robot.platform.angles for axis in axes)
-    unit = f"m^{len(axes) - turning}" + " rad" * turning
+    powers = (("m", len(axes) - turning), ("rad", turning))
+    unit = " ".join(f"{name}^{k}" if k > 1 else name for name, k in powers if k)
     return Paving(
         robot, asked, box, inner, boundary, axes, volumes[0], sum(volumes), unit, complete
     )

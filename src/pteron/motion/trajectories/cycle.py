@@ -24,7 +24,7 @@ ACROSS = 0.305
 """Width of the standard cycle, m."""
 
 STILL_RADIUS = 0.1
-"""Distance from P of the point whose acceleration counts where P stays and is the tool, m."""
+"""Distance from P of the point whose acceleration counts where a cycle is one of angles, m."""
 
 _LIFT_ENDS = 0.4
 """Share of the path out in which the platform rises, and again in which it sinks."""
@@ -162,14 +162,14 @@ class Cycle:
     def acceleration(self, tau: Array) -> Array:
         """Return the tool's acceleration (T, k) by tau, whatever moves it.
 
-        Where nothing does, that of a point `STILL_RADIUS` from P, along the angles.
+        Where turning is not for the sake of the path, that of a point `STILL_RADIUS` from P comes
+        behind it.
         """
         if carries(self.platform) or not self.platform.angles:
             return self.path(tau)[2]
         state = self.at(tau)
-        if any(self.platform.tool) or self.platform.lengths:
-            return tool_path(self.platform, *state)[2]
-        return STILL_RADIUS * state[2]
+        turning = STILL_RADIUS * state[2][:, self.platform.angular]
+        return np.hstack([tool_path(self.platform, *state)[2], turning])
 
 
 _Shares = tuple[Array, Array, Array]

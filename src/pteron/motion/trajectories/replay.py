@@ -19,7 +19,7 @@ from pteron.manipulator.readings import from_readings
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
 from pteron.shapes import Columns, PoseLike
-from pteron.tables import Table, listed, read_table
+from pteron.tables import Table, in_si, listed, read_table
 
 TIME = "t"
 """The column of the time, s."""
@@ -72,6 +72,7 @@ def replay(
     poses, joints = names["pose"], names["joints"]
     whole = [*poses, *names["velocity"], *names["acceleration"]]
     rows = rows_of(table, [TIME, *whole, *joints])
+    rows = in_si(rows, {**robot.column_units, TIME: "s"})
     has = set(rows.columns)
     m = robot.freedom
     if has.issuperset(whole):

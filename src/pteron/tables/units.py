@@ -1,0 +1,70 @@
+"""Units that the names of a table's columns say, such as ``x (mm)`` and ``roll [deg]``."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+import polars as pl
+
+from pteron.errors import DataError, shown
+from pteron.tables.table import Table
+
+_FACTORS = {
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "rad": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
+}
+"""How many of an SI unit others are."""
+
+_NAMED = re.compile(r"(?P<name>[^\s(\[]+)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]")
+
+
+def in_si(table: Table, units: Mapping[str, str]) -> Table:
+    """Return the table with columns such as ``x (mm)`` in SI units, named without their unit.
+
+    Parameters
+    ----------
+    table : Table
+        The table; other columns stay as they are.
+    units : mapping
+        The SI unit of each column that may be there, such as m, rad/s or N m, by its name.
+
+    Raises
+    ------
+    DataError
+        If a unit is not one of what the column holds, a column is there twice, or a cell that is to
+        be converted holds text.
+    """
+    frame, found = table.frame, set[str]()
+    for column in table.columns:
+        match = _NAMED.fullmatch(column)
+        if match is None or match["name"] not in units:
+            continue
+        name = match["name"]
+        if name in table.columns or name in found:
+            raise DataError(f"{table.source}: {name} and {column} given; keep one of them")
+        factor = _factor(match["unit"], units[name])
+        if factor is None:
+            si, _, per = units[name].partition("/")
+            known = ", ".join(f"{unit}/{per}" if per else unit for unit in _FACTORS.get(si, (si,)))
+            raise DataError(
+                f"{table.source}: column {shown(column, bare=True)}: the unit of {name} is one of "
+                f"{known}"
+            )
+        if factor != 1.0:
+            values = factor * table.numbers([column], "nan")[:, 0]
+            frame = frame.with_columns(pl.Series(column, values, nan_to_null=True))
+        frame = frame.rename({column: name})
+        found.add(name)
+    return replace(table, frame=frame)
+
+
+def _factor(unit: str, si: str) -> float | None:
+    """Return how many of an SI unit another one is, None if it measures something else."""
+    (own, _, per), (base, _, wanted) = unit.partition("/"), si.partition("/")
+    if re.sub("[ ^]", "", per) != re.sub("[ ^]", "", wanted):
+        return None
+    return _FACTORS.get(base, {base: 1.0}).get(own.strip())
