@@ -448,11 +448,10 @@ def test_pictures_hatch_and_name_what_does_not_serve(whole):
     assert len(map_figure(whole, "condition").axes) == 6  # three planes, each with its colours
     with pytest.raises(DataError, match="speed: is not in this map"):
         map_figure(whole, "speed")
-    held = {"z": -0.73, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
-    grid = pose_grid("hexa", held, {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}, points=20)
-    figure = map_figure(map_index("hexa", "margin", grid), "margin")
-    named = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert named[1:7] == [f"out of reach of leg {leg}" for leg in range(1, 7)]
+    status = np.resize(np.arange(7, dtype=np.int8), plane.status.shape)
+    figure = map_figure(replace(plane, status=status), "margin")  # as of a hexapod
+    told = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert told[:6] == [f"out of reach of leg {leg}" for leg in range(1, 7)]
 
 
 def test_a_film_goes_through_the_last_coordinate(whole, tmp_path):
