@@ -20,9 +20,9 @@ class PteronError(ValueError):
     Attributes
     ----------
     message : str
-        What is wrong.
+        The fault.
     subject : str
-        What the error's text names before it, a file or a machine; empty where it names none.
+        The file or machine that the error's text names before it; empty where it names none.
     """
 
     def __init__(self, message: str = "", *, subject: str = "") -> None:

@@ -35,15 +35,15 @@ class Adaptive(Controller):
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        How quickly an error goes, rad/s; by default 0.1 / period.
+        Rate at which an error goes, rad/s; by default 0.1 / period.
     derivative : float or one for each joint, optional
         K_d, N s/m at a slider and N m s/rad at a crank; by default bandwidth times the joint's
         mass, see `joint_masses`.
     adaptation : float, optional
-        How quickly what the motion shows is learnt, rad/s; by default a fiftieth of the bandwidth,
-        and less where something would be learnt faster than errors go.
+        Rate at which what the motion shows is learnt, rad/s; by default a fiftieth of the
+        bandwidth, and less where something would be learnt faster than errors go.
     uncertainty : float
-        By which share the parameters may be off; 0.5 is a half. A first moment that is zero counts
+        Share by which the parameters may be off; 0.5 is a half. A first moment that is zero counts
         as the mass times the body's radius of gyration.
     friction : bool
         Whether dry and viscous friction, offsets and motors' inertia are estimated too, or taken

@@ -22,7 +22,7 @@ class Controller(ABC):
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        How quickly an error goes, rad/s; by default 0.1 / period.
+        Rate at which an error goes, rad/s; by default 0.1 / period.
     """
 
     period: float = 1e-3

@@ -19,7 +19,7 @@ class FeedForwardPD(Feedback):
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        How quickly an error goes, rad/s; by default 0.1 / period. Times the joints' masses, see
+        Rate at which an error goes, rad/s; by default 0.1 / period. Times the joints' masses, see
         `joint_masses`, it gives the gains.
     damping : float or one for each joint
         1 is the least without overshoot.

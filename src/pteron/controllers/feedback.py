@@ -28,7 +28,7 @@ class Feedback(Controller):
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        How quickly an error goes, rad/s; by default 0.1 / period.
+        Rate at which an error goes, rad/s; by default 0.1 / period.
     damping : float or one for each joint
         1 is the least without overshoot.
     proportional, derivative : float or one for each joint, optional

@@ -30,7 +30,7 @@ class Law:
     gains : array, shape (G,)
         SI units.
     base : BaseParameters, optional
-        What an adaptive law estimates.
+        The base parameters that an adaptive law estimates.
 
     Examples
     --------

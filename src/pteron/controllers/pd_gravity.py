@@ -20,7 +20,7 @@ class PDGravity(Feedback):
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        How quickly an error goes, rad/s; by default 0.2 / period, since springs alone are to hold
+        Rate at which an error goes, rad/s; by default 0.2 / period, since springs alone are to hold
         the joints in motion. Times the joints' masses, see `joint_masses`, it gives the gains.
     damping : float or one for each joint
         1 is the least without overshoot.

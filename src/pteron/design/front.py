@@ -35,7 +35,7 @@ class Front:
     evaluated : int
         Number of designs it was found among.
     kept : int
-        How many of them keep all that is asked.
+        Number of them that keep all that is asked.
     """
 
     task: Task

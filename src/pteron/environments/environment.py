@@ -40,7 +40,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         A machine of the catalog, a TOML file, or a machine. An action of 1 gives each
         drive's max_force, or enough to move briskly.
     motion : Motion, optional
-        What is to be followed, again and again; by default a random pose is to be reached.
+        The motion to be followed, again and again; by default a random pose is to be reached.
     period : float
         Time of an action, s.
     spread : float, optional

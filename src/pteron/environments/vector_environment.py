@@ -32,7 +32,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
     robot, motion, period, spread, tolerance, render_mode
         As `PteronEnv` has them.
     num_envs : int
-        How many.
+        Number of environments.
     max_episode_steps : int, optional
         Steps after which an episode is truncated.
 

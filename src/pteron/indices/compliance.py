@@ -36,7 +36,7 @@ class Stiffness:
         Natural frequencies of the bodies' masses, in platform coordinates, on these springs, Hz,
         ascending; infinite where nothing gives way.
     lengths : int
-        How many of the pose's coordinates, the first ones, are lengths.
+        Number of the pose's coordinates, the first ones, that are lengths.
     """
 
     compliance: Matrices

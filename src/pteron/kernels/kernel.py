@@ -37,7 +37,7 @@ class Port:
     Parameters
     ----------
     name : str
-        What it holds, such as "pose".
+        Name of the quantity that it holds, such as "pose".
     shape : tuple of int
         Its shape for one state; the batch axes lead.
     shared : bool

@@ -25,7 +25,7 @@ def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
     columns : sequence of str
         The names that are asked for; none where a table has no meaning.
     name : str
-        What messages call the value.
+        The value's name in messages.
 
     Returns
     -------

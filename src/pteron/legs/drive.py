@@ -17,7 +17,7 @@ class Stribeck:
     Parameters
     ----------
     force : float
-        What is added to Coulomb's friction at rest, N or N m.
+        Friction that is added to Coulomb's at rest, N or N m.
     speed : float
         m/s or rad/s.
     """
@@ -42,7 +42,7 @@ class Drive:
     coulomb, viscous, offset : float
         Friction, N, N s/m and N; at cranks N m, N m s and N m. A balancing spring is an offset.
     rotor_inertia : float
-        Of the motor, about its own axis, with what turns with it, kg m^2.
+        Inertia of the motor about its own axis, with what turns with it, kg m^2.
     ratio : float, optional
         Motor angle over the joint's coordinate, rad/m or rad/rad; left out, the motor turns, or
         moves, as the joint does.

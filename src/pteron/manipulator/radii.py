@@ -16,13 +16,13 @@ class Radii:
     Parameters
     ----------
     guide : float
-        Of a slider's guide.
+        Radius of a slider's guide, m.
     upper : float
-        Of an upper link or a crank.
+        Radius of an upper link or a crank, m.
     lower : float
-        Of a last link or each rod.
+        Radius of a last link or of each rod, m.
     platform : float
-        Of the platform's arms.
+        Radius of the platform's arms, m.
 
     Raises
     ------

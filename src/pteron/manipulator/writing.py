@@ -35,7 +35,7 @@ def written(
     Parameters
     ----------
     document : mapping
-        What the file holds; each leg has its `type`.
+        The contents of the file; each leg has its `type`.
     explained : bool
         Whether it says of every key what it is, and names those that it has not, as comments; of
         legs of one kind at the first.

@@ -18,9 +18,9 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     robot : Manipulator, name or path
         The machine; limits are each drive's `max_force` and `max_speed`.
     forces : array, shape (..., n)
-        Of the drives, such as `drive_forces` returns: friction and motors count. N, N m.
+        Forces of the drives, such as `drive_forces` returns: friction and motors count. N, N m.
     speeds : array, shape (..., n)
-        Of the joints, m/s or rad/s.
+        Speeds of the joints, m/s or rad/s.
 
     Returns
     -------

@@ -36,7 +36,7 @@ def with_payload(robot: RobotLike, mass: float) -> Manipulator:
     robot : Manipulator, name or path
         The machine.
     mass : float
-        Of the payload m_L, kg; 0 or more.
+        The payload m_L, kg; 0 or more.
 
     Returns
     -------

@@ -41,7 +41,7 @@ def front_figure(
     objectives : array, shape (K, M)
         M objectives of each of K designs; one alone is drawn over the designs' numbers, from 1.
     names, units : sequence of str
-        Of the objectives; those with the unit m are shown in mm.
+        Names and units of the objectives; those with the unit m are shown in mm.
     start : array, shape (M,), optional
         Objectives of the machine that the search began with.
     chosen : mapping of str to int, optional

@@ -62,10 +62,14 @@ class Surd:
 
 
 _COSINE_TOLERANCE = 1e-9
+"""Greatest difference of a unit vector's component, or its square, from a simple fraction."""
+
 _COSINE_DENOMINATOR = 300
 """A random number in [-1, 1] passes for a fraction of this denominator with odds below 1e-4."""
 
 _LENGTH_TOLERANCE = 1e-15
+"""Greatest difference of a length, m, or its square, from a simple fraction."""
+
 _LENGTH_DENOMINATOR = 10**6
 """Lengths in metres are decimals to the micrometre, or roots of such."""
 

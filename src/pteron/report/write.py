@@ -33,9 +33,8 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
     folder : str or path
         Where to write; made if it is missing.
     motion : Motion, Simulation, Table, str or path, optional
-        What the page shows, and whose forces it tells, in place of the standard pick-and-place
-        cycle; see `pteron.playback.playback`. The forces are those that the drives
-        must give for it.
+        The motion that the page shows, with the forces that the drives must give for it, in place
+        of the standard pick-and-place cycle; see `pteron.playback.playback`.
 
     Returns
     -------

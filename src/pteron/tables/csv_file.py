@@ -39,8 +39,9 @@ class CsvFile:
     source : str
         Its name in messages.
     dialect : Dialect, optional
-        How it is written, as far as that is declared in the TOML file beside it; the rest is found.
-        By default it must be plain: commas, decimal points, UTF-8, names in the first line.
+        The form it is written in, as far as that is declared in the TOML file beside it; the rest
+        is found. By default it must be plain: commas, decimal points, UTF-8, names in the first
+        line.
     block : int
         Bytes read at a time.
 

@@ -38,7 +38,7 @@ def open_table(
     noun : str
         The word for such files in messages.
     dialect : Dialect, optional
-        How a CSV file is written, as far as that is declared; the rest is found. By default it must
+        The form of a CSV file, as far as that is declared; the rest is found. By default it must
         be plain.
 
     Raises

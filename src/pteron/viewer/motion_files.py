@@ -25,7 +25,7 @@ def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> 
     name : str
         The file's name: its ending says whether it is CSV or Parquet.
     data : bytes
-        What is in it; see `pteron.playback.playback`.
+        Its contents; see `pteron.playback.playback`.
     start : array, shape (m,)
         A pose in the assembly mode of the joints, m and rad.
 

@@ -33,7 +33,8 @@ class Readings:
     joints : array, shape (n,)
         m or rad.
     forces : array, shape (n,)
-        Of the drives, at rest or as the machine moves, N or N m; NaN where they are not determined.
+        Forces of the drives, at rest or as the machine moves, N or N m; NaN where they are not
+        determined.
     shares : array, shape (n,)
         Their sizes over what the drives can do; NaN where the file does not say it.
     condition : float

@@ -23,9 +23,9 @@ class LegStance:
     Attributes
     ----------
     slides, carries : tuple
-        Of each joint that is before the cut: whether it slides, and the body it carries, by letter.
+        For each joint before the cut: whether it slides, and the body it carries, by letter.
     axes, points : tuple of array, shape (3,)
-        Of these joints.
+        Axis, and a point on it, of each of these joints, m.
     references : dict of array, shape (3,)
         Where the reference point of each body is.
     along, across : dict of array, shape (3,)

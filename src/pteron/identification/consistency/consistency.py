@@ -28,16 +28,16 @@ class Consistency:
     feasible : bool
         Whether real bodies within the bounds have the identified base parameters exactly.
     distance : float
-        How far the identified values are from those of real bodies: the Mahalanobis distance, in
+        Distance of the identified values from those of real bodies: the Mahalanobis distance, in
         standard deviations. Without a covariance a relative distance: each value's shift is
         divided by the size its parameters have.
     p_value : float
-        How likely the noise alone puts them that far or farther (chi-square, `rank` degrees of
+        Chance that noise alone puts them that far or farther (chi-square, `rank` degrees of
         freedom, which is more than the true probability); NaN without a covariance.
     shifts : array, shape (rank,)
         base_values - values in the standard deviation of each value; relative without covariance.
     metric : {"covariance", "relative"}
-        Which of the two.
+        The measure of distance and shifts.
     at_border : tuple of str
         Bodies that only just exist and bounds that hold: where the identified values are not
         feasible those that hold them back (by their multipliers), else those of this model.

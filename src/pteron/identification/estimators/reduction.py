@@ -28,12 +28,12 @@ class Reduced:
     kept, dependent : tuple of int
         The columns.
     names, dependent_names : tuple of str
-        What they are called.
+        Names of these columns.
     shares : array, shape (kept, dependent)
         Dependent column j is the kept ones times shares[:, j]: the value of kept column k is its
         own plus shares[k, j] of each dependent one.
     gap : float
-        What the weakest kept column has of its own, over what the strongest dependent one has. At
+        Independent part of the weakest kept column, over that of the strongest dependent one. At
         less than 1000 or so the rank is a matter of the tolerance.
     """
 

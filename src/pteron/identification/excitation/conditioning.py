@@ -26,9 +26,9 @@ class Conditioning:
         2-norm condition number of the stacked base regressor with columns of length 1 (see
         `scaled_condition`): without units.
     unscaled : float
-        That of the regressor as it is, in SI units.
+        Condition number of the regressor as it is, in SI units.
     nominal : float
-        That with every column times the machine's own value of its base parameter, so that all
+        The same with every column times the machine's own value of its base parameter, so that all
         columns are forces; infinite, and no measure of anything, if a value is 0.
     logdet : float
         log det of the information matrix of one sample on average, W^T W / T; the larger the

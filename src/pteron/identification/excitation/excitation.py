@@ -35,9 +35,9 @@ class Start:
     Attributes
     ----------
     draw : int
-        Which of the random motions it was, counted from 0.
+        Number of the random motion, counted from 0.
     before, after : Conditioning
-        How good the random motion was, and the best that was made of it.
+        Conditioning of the random motion, and of the best that was made of it.
     finished : bool
         Whether it was improved thoroughly, rather than left for better ones or cut short.
     """

@@ -43,7 +43,7 @@ class Layout:
     contents : {"all", "joints", "poses"}
         Everything; or only time and joint coordinates, or time and poses.
     joint_columns : sequence of n str, optional
-        What the joint coordinates are called, in the order of the legs.
+        Names of the joint coordinates' columns, in the order of the legs.
     length_unit : {"m", "mm", "um"}
         Of sliders and poses. Rates and accelerations are in that unit a second, forces in N (N m).
     angle_unit : {"rad", "deg"}

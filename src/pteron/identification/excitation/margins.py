@@ -40,7 +40,7 @@ class Margin:
     limit : str
         The name of the limit, a field of `Limits`.
     least : float
-        What is left of it at the tightest instant, in `unit`; below 0 it is violated.
+        The part of it that is left at the tightest instant, in `unit`; below 0 it is violated.
     leg : int or None
         The leg it happens to, counted from 1; None for the platform's orientation.
     time : float

@@ -23,7 +23,7 @@ class Sensors:
         rates are differences of two of them, so that they lag half a sample. 0: coordinates and
         rates are exact.
     cutoff : float, optional
-        Of a filter of first order on the rates, Hz; without effect on exact ones.
+        Cut-off of a filter of first order on the rates, Hz; without effect on exact ones.
     """
 
     encoder: float | tuple[float, ...] = 0.0

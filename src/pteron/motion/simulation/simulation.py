@@ -29,19 +29,19 @@ class Simulation:
     time : array, shape (T,)
         s, from 0.
     pose, velocity, acceleration : array, shape (T, m)
-        Of the platform; m, rad and s. The acceleration is the one right after the sample.
+        The platform's motion; m, rad and s. The acceleration is the one right after the sample.
     joints, joint_rates : array, shape (T, n)
         m and m/s; rad and rad/s at cranks.
     forces : array, shape (T, n)
-        What the drives give from this sample on, limits and delay included; N, N m at cranks.
+        Forces of the drives from this sample on, limits and delay included; N, N m at cranks.
     asked : array, shape (T, n)
-        What the controller asked for at this sample.
+        Forces that the controller asked for at this sample.
     reference : Motion
-        What the machine was to do, at the same times; where nothing was asked for, it rests.
+        The motion asked of the machine, at the same times; where none was asked for, it rests.
     payload : array, shape (T,)
-        What it carried, kg.
+        The mass that it carried, kg.
     memory : array, shape (T, K)
-        What the controller knew: of an adaptive one, its estimates.
+        The controller's memory: of an adaptive one, its estimates.
     step : float
         Length of the integration's steps, s; NaN where they have no fixed length.
     stopped : str or None

@@ -42,7 +42,7 @@ class Sizing:
     time : array, shape (K,)
         The motion's samples and the middles between them, s.
     forces : array, shape (K, n)
-        What the drives give, N or N m.
+        Forces that the drives give, N or N m.
     loads : array, shape (K, n)
         The same without the motors' inertia: what does not depend on the ratio.
     speeds, accelerations : array, shape (K, n)

@@ -35,15 +35,15 @@ class Motor:
     Parameters
     ----------
     name : str
-        What it is called.
+        Its name in messages and tables.
     rotor_inertia : float
         Inertia of its rotor, with what turns with it before the gear, kg m^2.
     rated_torque : float
-        What it gives all the time, N m.
+        Torque that it gives all the time, N m.
     peak_torque : float
-        What it gives for a moment, N m.
+        Torque that it gives for a moment, N m.
     max_speed : float
-        rad/s.
+        Its greatest speed, rad/s.
 
     Raises
     ------

@@ -34,9 +34,9 @@ def size(
     motion : Motion
         One cycle.
     dwell : float
-        How long the platform rests after the motion, s; the drives hold it there.
+        Time for which the platform rests after the motion, s; the drives hold it there.
     wrench : array, shape (m,), optional
-        What acts on the platform at P all along: a force in N and, where it turns, a moment about k
+        Load on the platform at P all along: a force in N and, where it turns, a moment about k
         in N m.
 
     Returns

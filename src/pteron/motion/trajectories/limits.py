@@ -24,11 +24,11 @@ class MotionLimits:
     Attributes
     ----------
     speed, acceleration : array, shape (n,)
-        Of the joints, m/s and m/s^2 or rad/s and rad/s^2.
+        Limits of the joints, m/s and m/s^2 or rad/s and rad/s^2.
     force : array, shape (n,)
-        Of the drives, N or N m: their friction and their motors' inertia take a part of it.
+        Limits of the drives, N or N m: their friction and their motors' inertia take a part of it.
     tool_speed, tool_acceleration : float
-        Of the tool's centre point, m/s and m/s^2.
+        Limits of the tool's centre point, m/s and m/s^2.
     """
 
     speed: Array
@@ -67,7 +67,7 @@ def limits_of(
     speed, acceleration, force : float or sequence of n floats, optional
         Of each joint: m/s, m/s^2 and N, or rad/s, rad/s^2 and N m.
     tool_speed, tool_acceleration : float, optional
-        Of the tool's centre point, m/s and m/s^2.
+        Limits of the tool's centre point, m/s and m/s^2.
 
     Returns
     -------
