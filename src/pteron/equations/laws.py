@@ -1,6 +1,7 @@
 """Laws of control: the forces of the drives at one sample, and what is remembered of it.
 
-What they are given and what e, e' and the middle of the period are: `control`.
+`equations.control` says what a law is given, and what the errors e and e' and the middle of the
+period are.
 """
 
 from __future__ import annotations

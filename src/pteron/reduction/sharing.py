@@ -1,6 +1,6 @@
-"""The regressor's columns, one a parameter or for the like ones of several legs, and their order.
+"""The regressor's columns where legs share parameters, and the order in which they are preferred.
 
-For legs that share parameters, as equal legs do, their columns add up.
+Legs share parameters as equal legs do: the columns of their like parameters add up to one.
 """
 
 from __future__ import annotations

@@ -11,6 +11,8 @@ the mechanism can make:
 - a slider's mass is a cube's at its joint;
 - what the platform carries without a mass of its own, a hinged bar or a geared part, takes a share
   of the platform's mass, and the platform's own first moment and inertia lose what that share has.
+
+A body that turns about any axis keeps its own tensor, but for a trace where that is singular.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Links and shapes for URDF and SDF: a link for each joint, frames by roll, pitch and yaw."""
+"""Links, drives and shapes for URDF and SDF: a link a joint, frames by roll, pitch and yaw."""
 
 from __future__ import annotations
 
