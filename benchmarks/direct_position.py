@@ -1,16 +1,19 @@
-"""Hexapods have all their poses: as many as a dense search finds, in under 10 ms a machine.
+"""Platforms that tilt have all their poses: as many as other solvers and dense searches find.
 
-1000 random machines of 6 U-P-S legs with joint coordinates that a pose has: general ones, with
-base and platform plane, with platform points that coincide in pairs (6-3), and turned as a whole;
-besides, Dietmaier's machine with its 40 real poses. The dense search, Newton's steps from 4000
-poses, goes over 20 of each. Times are those of one machine at a time, and of a batch of joint
-coordinates. `--quick` takes 4 machines of each, and searches for one.
+Dietmaier's machine with its 40 real poses; then 1000 random machines of 6 U-P-S legs with joint
+coordinates that a pose has, of which `direct_position_counts.txt` has the number of real poses by
+other solvers: general ones, with the base or both figures in a plane, with platform points that
+coincide in pairs (6-3), every third of them turned as a whole. On 50 of them, and on wrists, ankles
+and tripods, Newton's steps from many poses look for what is missing. Times are of one machine a
+call, and of a batch. `--quick` takes fewer.
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 from measuring import quick
@@ -21,6 +24,10 @@ from pteron.kernels import Array, numeric
 from pteron.legs import UPS
 from pteron.platforms import Platform
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
+import tilting
+
 _BASE = """
 0 0 0, 1.107915 0 0, 0.549094 0.756063 0, 0.735077 -0.223935 0.525991,
 0.514188 -0.526063 -0.368418, 0.590473 0.094733 -0.205018"""
@@ -28,7 +35,9 @@ _TOP = """
 0 0 0, 0.542805 0 0, 0.956919 -0.528915 0, 0.665885 -0.353482 1.402538,
 0.478359 1.158742 0.107672, -0.137087 -0.235121 0.353913"""
 _LENGTHS = [1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071]
-_STARTS = 4000
+_COUNTS = Path(__file__).with_name("direct_position_counts.txt")
+_KINDS = (*5 * ("general",), *2 * ("base plane",), "plane", "6-3", "6-3 plane")
+_STARTS = 20_000
 _SAME = 1e-6
 
 
@@ -43,33 +52,36 @@ def hexapod(base: Array, top: Array) -> pteron.Manipulator:
     return pteron.Manipulator("hexapod", Platform("3T3R", body), legs, (0.0, 0.0, -9.81))
 
 
-def drawn(kind: str, rng: np.random.Generator) -> tuple[pteron.Manipulator, Array]:
-    """Return a random machine and a pose of it."""
+def drawn(seed: int) -> tuple[pteron.Manipulator, Array]:
+    """Return a random machine and joint coordinates that a pose of it has."""
+    rng, kind = np.random.default_rng([7, seed]), _KINDS[seed % len(_KINDS)]
     base, top = rng.normal(size=(6, 3)), 0.6 * rng.normal(size=(6, 3))
-    if kind == "plane":
-        base[:, 2] = top[:, 2] = 0.0
-    if kind == "6-3":
+    if "plane" in kind:
+        base[:, 2] = 0.0
+    if kind.endswith("plane") and kind != "base plane":
+        top[:, 2] = 0.0
+    if "6-3" in kind:
         top[1::2] = top[::2]
     pose = np.concatenate([rng.normal(size=3), rng.uniform(-1.0, 1.0, 3)])
     robot = hexapod(base, top)
-    if kind == "turned":
-        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        robot = pteron.turned(robot, turn * np.linalg.det(turn))
-    return robot, pose
+    joints: Array = pteron.inverse_kinematics(robot, pose)
+    if seed % 3 == 0:
+        robot = pteron.turned(robot, tilting.rotation(rng))
+    return robot, joints
 
 
-def searched(robot: pteron.Manipulator, joints: Array, rng: np.random.Generator) -> int:
+def searched(robot: pteron.Manipulator, joints: Array) -> int:
     """Return how many poses Newton's steps find from many."""
-    step = numeric(robot, "newton_step")
-    at = np.concatenate(
-        [1.5 * rng.normal(size=(_STARTS, 3)), rng.uniform(-np.pi, np.pi, (_STARTS, 3))], axis=-1
-    )
+    step, platform = numeric(robot, "newton_step"), robot.platform
+    rng = np.random.default_rng(0)
+    at = rng.uniform(-np.pi, np.pi, (2000 if quick() else _STARTS, robot.freedom))
+    at[:, ~platform.angular] = 1.5 * rng.normal(size=at[:, ~platform.angular].shape)
     with np.errstate(all="ignore"):
         for _ in range(60):
             at = step(joints, at)[0]
         at = at[np.isfinite(at).all(axis=-1)]
         at = at[step(joints, at)[1] < 1e-13]
-    place, axes = robot.platform.at(at)
+    place, axes = platform.at(at)
     known = np.concatenate([place, axes.reshape(-1, 9)], axis=-1)
     count = 0
     while len(known):
@@ -78,42 +90,72 @@ def searched(robot: pteron.Manipulator, joints: Array, rng: np.random.Generator)
     return count
 
 
+def real(poses: Array) -> int:
+    """Return how many rows are no NaN."""
+    return int(np.isfinite(poses[..., 0]).sum())
+
+
 def main() -> None:
     """Print counts and times."""
-    most, looked = (4, 1) if quick() else (1000, 20)
-    rng = np.random.default_rng(0)
+    most, looked = (20, 4) if quick() else (1000, 50)
     robot = hexapod(
         *(np.fromstring(part.replace(",", " "), sep=" ").reshape(6, 3) for part in (_BASE, _TOP))
     )
     poses = pteron.direct_kinematics(robot, _LENGTHS)
     back = np.abs(pteron.inverse_kinematics(robot, poses) - _LENGTHS).max()
     print(f"Dietmaier's machine: {len(poses)} of 40 poses, lengths back to {back:.0e} m")
-    print("machines   kind       ms each   real poses: machines, worst error, search agrees")
-    for kind in ("general", "plane", "6-3", "turned"):
-        counts: Counter[int] = Counter()
-        spent, worst, agree = 0.0, 0.0, 0
-        for k in range(most):
-            robot, pose = drawn(kind, rng)
-            joints = pteron.inverse_kinematics(robot, pose)
-            poses = pteron.direct_kinematics(robot, joints)  # its programs are built
-            begin = time.process_time()
-            poses = pteron.direct_kinematics(robot, joints)
-            spent += time.process_time() - begin
-            poses = poses[np.isfinite(poses[:, 0])]
-            counts[len(poses)] += 1
-            worst = max(worst, np.abs(poses - pose).max(axis=-1).min(initial=np.inf))
-            if k < looked:
-                agree += searched(robot, joints, rng) == len(poses)
-        told = " ".join(f"{n}:{counts[n]}" for n in sorted(counts))
-        each = 1e3 * spent / most
-        print(f"{most:8d}   {kind:8s} {each:9.2f}   {told}; {worst:.0e}; {agree}/{looked}")
-    robot, pose = drawn("general", rng)
-    states = pose + 0.3 * rng.normal(size=(16 if quick() else 512, 6))
+    given = np.loadtxt(_COUNTS, dtype=int).ravel()
+    times: dict[str, list[float]] = {}
+    counts: dict[str, Counter[int]] = {}
+    other, sought = [], []
+    for seed in range(most):
+        kind = _KINDS[seed % len(_KINDS)]
+        robot, joints = drawn(seed)
+        pteron.direct_kinematics(robot, joints)  # its programs are built
+        begin = time.process_time()
+        count = real(pteron.direct_kinematics(robot, joints))
+        times.setdefault(kind, []).append(1e3 * (time.process_time() - begin))
+        counts.setdefault(kind, Counter())[count] += 1
+        if count != given[seed]:
+            other.append((seed, count, int(given[seed])))
+        if seed < looked and (found := searched(robot, joints)) != count:
+            sought.append((seed, count, found))
+    print("machines   kind         ms each: median, 95 %   real poses: machines")
+    for kind, each in times.items():
+        told = " ".join(f"{n}:{counts[kind][n]}" for n in sorted(counts[kind]))
+        middle, high = np.quantile(each, [0.5, 0.95])
+        print(f"{len(each):8d}   {kind:11s} {middle:14.2f} {high:8.2f}   {told}")
+    print(f"other numbers than the other solvers': {other or 'none'} (machine, ours, theirs)")
+    print(f"than dense searches of {looked}: {sought or 'none'} (machine, ours, found)")
+    for motion, kinds in tilting.LEGS.items():
+        others(motion, kinds)
+    robot, joints = drawn(0)
+    states = pteron.direct_kinematics(robot, joints)[0]
+    rng = np.random.default_rng(0)
+    states = states + 0.3 * rng.normal(size=(16 if quick() else 512, 6))
     joints = pteron.inverse_kinematics(robot, states)
     begin = time.process_time()
-    poses = pteron.direct_kinematics(robot, joints)
+    pteron.direct_kinematics(robot, joints)
     spent = time.process_time() - begin
     print(f"in a batch of {len(joints)}: {1e3 * spent / len(joints):.2f} ms each")
+
+
+def others(motion: str, kinds: tuple[str, ...]) -> None:
+    """Print how often dense searches agree on machines of a motion, with each kind of leg."""
+    alike, all_counts, worse = 0, Counter[int](), []
+    for kind in kinds:
+        for seed in range(1 if quick() else 10):
+            robot, home = tilting.machine(motion, (kind,), seed)
+            pose = tilting.states(robot, home, 1, seed)[0][0]
+            joints = pteron.inverse_kinematics(robot, pose)
+            count = real(pteron.direct_kinematics(robot, joints, all_branches=True))
+            found = searched(robot, joints)
+            all_counts[count] += 1
+            alike += found == count
+            if found != count:
+                worse.append((kind, seed, count, found))
+    told = " ".join(f"{n}:{all_counts[n]}" for n in sorted(all_counts))
+    print(f"{motion}: {alike} of {sum(all_counts.values())} dense searches agree, {told} {worse or ''}")
 
 
 if __name__ == "__main__":
