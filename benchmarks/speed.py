@@ -3,6 +3,7 @@
 Three contests each: one state a call from Python; one state a call in C, each waiting for the last;
 and a batch. The contestants of a contest take turns, round by round, and ratios are of the same
 round. Each has to give the right forces first. Times are of this machine; ratios carry further.
+Names of machines take the place of those below.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from pteron.export import Real
 from pteron.kernels import Kernel
 from pteron.kernels.c import compiler
 
-_MACHINES = ("quadrupteron", "delta", "linear-delta", "par4", "five-bar")
+_MACHINES = ("quadrupteron", "delta", "linear-delta", "par4", "five-bar", "stewart")
 _SHORT = ("quadrupteron", "five-bar")
 """Those of a short run."""
 
@@ -46,6 +47,7 @@ _PART = 500
 """States of a batch that a peer is timed on at a time."""
 
 _CPP = "Pinocchio, C++, usual flags"
+_CPP_PLAIN = "Pinocchio, C++, -O3"
 _CPP_TUNED = "Pinocchio, C++, tuned"
 _PYTHON = "Pinocchio, Python, usual calls"
 _PYTHON_TUNED = "Pinocchio, Python, tuned"
@@ -62,7 +64,8 @@ def main() -> None:
     """Run the three contests of each machine."""
     if compiler() is None:
         print("target c and the exported C: left out, no C compiler")
-    for name in _SHORT if quick() else _MACHINES:
+    named = [word for word in sys.argv[1:] if not word.startswith("--")]
+    for name in named or (_SHORT if quick() else _MACHINES):
         robot = pteron.load(name)
         print(f"\nInverse dynamics of the {name}")
         others = peers(robot, quick=quick())
@@ -144,8 +147,8 @@ def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
             contestants.append(Contestant(peer.name, partial(_in_parts, peer, states), error))
     title = f"Batches of {len(expected)} states"
     times = run(title, contestants, rounds=3 if quick() else 25)
-    for slow in (_CPP, _CPP_TUNED, _MUJOCO_C, _MUJOCO_CLOSED):
-        if not (quick() and slow in (_CPP, _CPP_TUNED)):
+    for slow in (_CPP_PLAIN, _CPP, _CPP_TUNED, _MUJOCO_C, _MUJOCO_CLOSED):
+        if not (quick() and slow.startswith("Pinocchio")):
             for fast in ("pteron c", "pteron c, base"):
                 print_ratio(times, slow, fast)
     print_ratio(times, _PUBLIC, _UNDER_IT)

@@ -3,7 +3,8 @@
 Each cuts the loops, runs its Newton-Euler algorithm on the tree, and projects the joint forces
 through the closure; what is not the engine's is done in closed form. Tuned peers have the best
 flags, buffers, stages and trees that we found; the others are what a good user writes first. For
-machines with four P-R-R-R legs, and those of legs R-S-S, P-S-S and R-R-R.
+machines with four P-R-R-R legs, those of legs R-S-S, P-S-S and R-R-R, and, in Pinocchio, hexapods of
+legs U-P-S, P-S-S and R-S-S.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ class Peer:
 _BUILDERS: dict[str, Callable[[pteron.Manipulator], Calls | Sweep]] = {
     "Pinocchio, C++, tuned": pinocchio_peers.cpp_tuned,
     "Pinocchio, C++, usual flags": pinocchio_peers.cpp_usual,
+    "Pinocchio, C++, -O3": pinocchio_peers.cpp_plain,
     "Pinocchio, Python, tuned": pinocchio_peers.python_tuned,
     "Pinocchio, Python, usual calls": pinocchio_peers.python_usual,
     "MuJoCo, C, tuned": mujoco_peers.c_tuned,
@@ -61,7 +63,7 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
     Parameters
     ----------
     robot : Manipulator
-        A 3T1R machine of P-R-R-R legs, or any of R-S-S, P-S-S and R-R-R legs.
+        A 3T1R machine of P-R-R-R legs, any of R-S-S, P-S-S and R-R-R legs, or a hexapod.
     quick : bool
         Whether to leave out Pinocchio in C++, which may take most of a minute to compile.
 
@@ -75,7 +77,8 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
         If the machine is neither.
     """
     kinds = {leg.type for leg in robot.legs}
-    if not ((kinds == {"PRRR"} and robot.platform.turns) or kinds <= {"RSS", "PSS", "RRR"}):
+    known = {"RSS", "PSS", "UPS"} if robot.platform.tilts else {"RSS", "PSS", "RRR"}
+    if not ((kinds == {"PRRR"} and robot.platform.turns) or kinds <= known):
         raise ValueError(f"{robot.name}: the peers are not written for its legs")
     found = []
     for name, build in _BUILDERS.items():

@@ -14,6 +14,7 @@ import pteron
 from peers.closure import Array, Closure
 from peers.leg_closure import LegClosure
 from peers.library import Missing
+from peers.tilting_closure import TiltingClosure
 from pteron.kernels import TARGETS, Port
 from pteron.kernels.c import compiler
 
@@ -30,6 +31,8 @@ ClosedForm = Closure | LegClosure
 
 def closed_form(robot: pteron.Manipulator, carried: bool = True) -> ClosedForm:
     """Return the closed form of a machine, for a tree with or without its platform."""
+    if robot.platform.tilts:
+        return TiltingClosure.of(robot)
     prrr = all(leg.type == "PRRR" for leg in robot.legs)
     return Closure.of(robot) if prrr else LegClosure.of(robot, carried)
 

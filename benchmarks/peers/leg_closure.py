@@ -1,6 +1,6 @@
 """The closed form that the peers need around their engine, leg by leg, in CasADi.
 
-For machines with legs R-S-S, P-S-S and R-R-R under any platform. It takes a pose to the joints of
+For machines with legs R-S-S, P-S-S, R-R-R and U-P-S; `tilting_closure` has platforms that tilt. It takes a pose to the joints of
 the tree in `tree.py`, and the tree's joint forces to actuator forces. As in `closure.py`, no
 equation is shared with `pteron.equations`. For C and C++ it is printed as a header.
 """
@@ -20,7 +20,7 @@ import pteron
 from peers.closure import Array, Expression, frame_of
 from pteron.kernels.passes import optimised
 
-__all__ = ["LegClosure"]
+__all__ = ["KINDS", "LegClosure", "sparse"]
 
 _INTERFACE = """
 #include <stddef.h>
@@ -114,11 +114,14 @@ class Leg(ABC):
         s = leg.platform_point
         still = k * s[2] + np.array(leg.fixed_offset) - np.array(leg.guide_point)
         turning = x * s[0] + y * s[1], y * s[0] - x * s[1]
-        if not platform.turns:
+        if platform.tilts:
+            still, turning = still - k * s[2], (np.zeros(3), np.zeros(3))
+        elif not platform.turns:
             still, turning = still + turning[0], (np.zeros(3), np.zeros(3))
         a, b, rest = (_clean(frame.T @ v) for v in (*turning, still))
         crank = getattr(leg, "upper_length", 0.0)
-        return cls(_clean(frame), (a, b, rest), crank, leg.lower_length, float(leg.elbow))
+        rod = getattr(leg, "lower_length", 0.0)
+        return cls(_clean(frame), (a, b, rest), crank, rod, float(leg.elbow))
 
     @abstractmethod
     def joints(self, point: Point) -> Joints:
@@ -216,7 +219,41 @@ class RRR(Leg):
         return Pull(crank - turn * share, force, area, ca.vertcat(bx, by, 0))
 
 
-_KINDS: dict[str, type[Leg]] = {"RSS": RSS, "PSS": PSS, "RRR": RRR}
+class UPS(Leg):
+    """A cylinder on a universal joint that turns about z, then about y, and a piston along x."""
+
+    sizes = 3, 6
+
+    def joints(self, point: Point) -> Joints:
+        (x, y, z), (vx, vy, vz), (ax, ay, az) = (ca.vertsplit(v) for v in point)
+        h2, flat = x * x + y * y, x * vx + y * vy
+        h, square = ca.sqrt(h2), h2 + z * z
+        length = ca.sqrt(square)
+        per_h, per = 1.0 / h, 1.0 / length
+        per_h2, per2 = per_h * per_h, per * per
+        turn, dh = (x * vy - y * vx) * per_h2, flat * per_h
+        tilt, rate = (z * dh - h * vz) * per2, (flat + z * vz) * per
+        ddh = (x * ax + y * ay) * per_h + h * turn * turn
+        d_turn = ((x * ay - y * ax) - 2.0 * turn * flat) * per_h2
+        d_tilt = (z * ddh - h * az - 2.0 * length * rate * tilt) * per2
+        speed = vx * vx + vy * vy + vz * vz - rate * rate
+        return Joints(
+            [x * per_h, y * per_h, h * per, -z * per, length],
+            [turn, tilt, rate],
+            [d_turn, d_tilt, (x * ax + y * ay + z * az + speed) * per],
+            [x, y, z, per_h, per2, length],
+        )
+
+    def pull(self, tau: Expression, rows: Expression) -> Pull:
+        x, y, z, per_h, per2, length = ca.vertsplit(rows)
+        turn, tilt, slide = ca.vertsplit(tau)
+        about, across = turn * per_h * per_h, tilt * per2
+        out = across * z * per_h
+        force = ca.vertcat(out * x - about * y, out * y + about * x, -across / per_h)
+        return Pull(slide, force, length, ca.vertcat(x, y, z))
+
+
+KINDS: dict[str, type[Leg]] = {"RSS": RSS, "PSS": PSS, "RRR": RRR, "UPS": UPS}
 
 
 @dataclass(frozen=True)
@@ -244,7 +281,7 @@ class LegClosure:
     def of(cls, robot: pteron.Manipulator, carried: bool = True) -> LegClosure:
         """Return the closure of one machine."""
         platform = robot.platform
-        legs = tuple(_KINDS[leg.type].of(leg, platform) for leg in robot.legs)
+        legs = tuple(KINDS[leg.type].of(leg, platform) for leg in robot.legs)
         return cls(legs, _clean(platform.directions.T), platform.turns, carried)
 
     def joints(self, unbounded: bool) -> ca.Function:
@@ -291,10 +328,10 @@ class LegClosure:
         self, leg: Leg, motion: list[Expression], cosine: Expression, sine: Expression
     ) -> Point:
         """Return the motion of a leg's platform point in the leg's frame."""
-        into = _sparse(leg.frame.T @ self.axes)
+        into = sparse(leg.frame.T @ self.axes)
         lengths = self.axes.shape[1]
         w, dw, ddw = (ca.mtimes(into, v[:lengths]) for v in motion)
-        a, b, still = (_sparse(v) for v in leg.out)
+        a, b, still = (sparse(v) for v in leg.out)
         if self.turns:
             rate, acceleration = motion[1][-1], motion[2][-1]
             turned, lever = a * cosine + b * sine, b * cosine - a * sine
@@ -315,9 +352,9 @@ class LegClosure:
         for i, leg in enumerate(self.legs):
             own = tau[sum(joints[:i]) : sum(joints[: i + 1])]
             pull = leg.pull(own, rows[sum(sizes[:i]) : sum(sizes[: i + 1])])
-            matrix = _sparse(self.axes.T @ leg.frame)
+            matrix = sparse(self.axes.T @ leg.frame)
             if self.turns:
-                lever = _sparse(leg.out[1]) * cosine - _sparse(leg.out[0]) * sine
+                lever = sparse(leg.out[1]) * cosine - sparse(leg.out[0]) * sine
                 matrix = ca.vertcat(matrix, lever.T)
             load = load + ca.mtimes(matrix, pull.force)
             pulls.append(pull)
@@ -405,5 +442,5 @@ def _clean(array: Array) -> Array:
     return np.where(np.abs(array) < 1e-15, 0.0, array)
 
 
-def _sparse(array: Array) -> Expression:
+def sparse(array: Array) -> Expression:
     return ca.SX(ca.sparsify(ca.DM(_clean(array))))

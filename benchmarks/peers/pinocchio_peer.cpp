@@ -18,7 +18,7 @@ namespace {
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-enum Kind { slide = 0, turn = 1, translation = 2, turn_y = 3 };
+enum Kind { slide = 0, turn = 1, translation = 2, turn_y = 3, loose = 4 };
 
 // One joint as tree.py's `table` writes it.
 struct Joint {
@@ -61,6 +61,8 @@ pinocchio::Model built(const Joint *joints, int count, const double *gravity) {
             kind = pinocchio::JointModelRUBY();
         else if (joint.kind == translation)
             kind = pinocchio::JointModelTranslation();
+        else if (joint.kind == loose)
+            kind = pinocchio::JointModelFreeFlyer();
         else if (axis == Vector3::UnitX())
             kind = pinocchio::JointModelPX();
         else if (axis == Vector3::UnitY())

@@ -18,7 +18,7 @@ from peers.compiled_closure import closed_form
 from peers.library import Missing, Sweep, compiled
 from peers.tree import Body, tree
 
-__all__ = ["cpp_tuned", "cpp_usual", "python_tuned", "python_usual"]
+__all__ = ["cpp_plain", "cpp_tuned", "cpp_usual", "python_tuned", "python_usual"]
 
 _BOOST = (
     "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
@@ -70,7 +70,8 @@ def python_usual(robot: pteron.Manipulator) -> Calls:
     data = model.createData()
     joints = compiled_closure.joints_and_rates(closed_form(robot), unbounded=True)
     first = 2 if robot.platform.planar else 3
-    actuated = slice(0, first * len(robot.legs), first)
+    driven = 2 if robot.legs[0].type == "UPS" else 0
+    actuated = slice(driven, first * len(robot.legs), first)
 
     def call(pose: Array, velocity: Array, acceleration: Array) -> Array:
         q, v, a, rates = joints(pose, velocity, acceleration)
@@ -89,6 +90,7 @@ def _model(robot: pteron.Manipulator, carried: bool = True) -> tuple[Any, Any]:
     model = pin.Model()
     model.gravity.linear = np.array(robot.gravity)
     ids: list[int] = []
+    turns = {"z": pin.JointModelRUBZ, "y": pin.JointModelRUBY, "free": pin.JointModelFreeFlyer}
     for n, body in enumerate(tree(robot, carried)):
         joint = 0 if body.parent < 0 else ids[body.parent]
         place = pin.SE3(body.rotation, body.offset)
@@ -104,9 +106,8 @@ def _model(robot: pteron.Manipulator, carried: bool = True) -> tuple[Any, Any]:
             kind = aligned[0] if aligned else pin.JointModelPrismaticUnaligned(axis)
             joint = model.addJoint(joint, kind, place, f"p{len(model.names)}")
             place = pin.SE3.Identity()
-        for letter in body.hinges:
-            kind = pin.JointModelRUBZ() if letter == "z" else pin.JointModelRUBY()
-            joint = model.addJoint(joint, kind, place, f"{letter}{n}")
+        for letter in _hinges(body):
+            joint = model.addJoint(joint, turns[letter](), place, f"{letter}{n}")
             place = pin.SE3.Identity()
         inertia = pin.Inertia(body.mass, body.center, np.diag(body.inertia))
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
@@ -124,6 +125,11 @@ def cpp_usual(robot: pteron.Manipulator) -> Sweep:
     return _cpp(robot, (), carried=True)
 
 
+def cpp_plain(robot: pteron.Manipulator) -> Sweep:
+    """Return the peer that calls `pinocchio::rnea` in C++, with -O3 -DNDEBUG for any processor."""
+    return _cpp(robot, ("-march=x86-64", "-mtune=generic"), carried=True)
+
+
 def _cpp(robot: pteron.Manipulator, flags: tuple[str, ...], carried: bool) -> Sweep:
     joints = _table(tree(robot, carried))
     gravity = np.array(robot.gravity)
@@ -137,6 +143,10 @@ def _cpp(robot: pteron.Manipulator, flags: tuple[str, ...], carried: bool) -> Sw
         c_void_p(gravity.ctypes.data),
         c_void_p(numbers.ctypes.data),
     )
+
+
+def _hinges(body: Body) -> list[str]:
+    return ["free"] if body.hinges == "free" else list(body.hinges)
 
 
 def _includes() -> list[str]:
@@ -161,7 +171,7 @@ def _includes() -> list[str]:
 
 def _table(bodies: list[Body]) -> Array:
     """Return the joints, one a row, as `Joint` in pinocchio_peer.cpp has them."""
-    slide, translation, turn = 0.0, 2.0, {"z": 1.0, "y": 3.0}
+    slide, translation, turn = 0.0, 2.0, {"z": 1.0, "y": 3.0, "free": 4.0}
     nothing, identity = np.zeros(7), np.eye(3).ravel()
     table: list[Array] = []
     ids: list[float] = []
@@ -176,7 +186,7 @@ def _table(bodies: list[Body]) -> Array:
         for axis in slides:
             table.append(np.array([slide, parent, *place, *axis, *nothing]))
             parent, place = float(len(table)), resting
-        for letter in body.hinges:
+        for letter in _hinges(body):
             table.append(np.array([turn[letter], parent, *place, 0.0, 0.0, 1.0, *nothing]))
             parent, place = float(len(table)), resting
         table[-1][-7:] = [body.mass, *body.center, *body.inertia]

@@ -31,7 +31,7 @@ class Body:
     slides : tuple of array, shape (3,)
         The axes it slides along, in its own frame.
     hinges : str
-        The axes of its frame that it turns about, one after the other.
+        The axes of its frame that it turns about, one after the other; "free" is a free body.
     mass : float
         kg.
     center, inertia : array, shape (3,)
@@ -42,7 +42,7 @@ class Body:
     rotation: Array
     offset: Array
     slides: tuple[Array, ...]
-    hinges: Literal["", "z", "zy"]
+    hinges: Literal["", "z", "zy", "free"]
     mass: float
     center: Array
     inertia: Array
@@ -59,6 +59,8 @@ def tree(robot: pteron.Manipulator, carried: bool = True) -> list[Body]:
     for leg in legs:
         bodies += _LEGS[leg.type](leg, len(bodies))
     platform = robot.platform
+    if platform.tilts:
+        return [*bodies, Body(-1, np.eye(3), np.zeros(3), (), "free", *_spatial(platform.inertia))]
     if not carried:
         end = np.array([legs[0].lower_length, 0.0, 0.0])
         bodies[1] = _with_mass(bodies[1], platform.joined.mass, end)
@@ -110,7 +112,19 @@ def _rrr(leg: Any, count: int) -> list[Body]:
     return [_crank(leg), Body(count, np.eye(3), elbow, (), "z", *lower)]
 
 
-_LEGS = {"PRRR": _prrr, "PSS": _pss, "RSS": _rss, "RRR": _rrr}
+def _ups(leg: Any, count: int) -> list[Body]:
+    cylinder, piston = (
+        (rod.mass, np.array([rod.center_of_mass[0], 0.0, 0.0]), _of_rod(rod))
+        for rod in (leg.upper, leg.lower)
+    )
+    along, nowhere = (np.array([1.0, 0.0, 0.0]),), np.zeros(3)
+    return [
+        Body(-1, frame_of(leg), np.array(leg.guide_point), (), "zy", *cylinder),
+        Body(count, np.eye(3), nowhere, along, "", *piston),
+    ]
+
+
+_LEGS = {"PRRR": _prrr, "PSS": _pss, "RSS": _rss, "RRR": _rrr, "UPS": _ups}
 
 
 def _crank(leg: Any) -> Body:
@@ -119,12 +133,25 @@ def _crank(leg: Any) -> Body:
 
 def _rod(leg: Any, count: int, tip: Array) -> Body:
     rod = leg.lower
-    (x,) = rod.center_of_mass
-    about_center = rod.inertia - rod.mass * x**2
+    center = np.array([leg.lower_length + rod.center_of_mass[0], 0.0, 0.0])
+    return Body(count, np.eye(3), tip, (), "zy", rod.mass, center, _of_rod(rod))
+
+
+def _of_rod(rod: Any) -> Array:
+    """Return the moments of a rod along x about its centre."""
+    about_center = rod.inertia - rod.mass * rod.center_of_mass[0] ** 2
     # A rod's spin has no inertia; MuJoCo wants some, and this much is lost in rounding.
-    inertia = np.array([2e-15, about_center, about_center])
-    center = np.array([leg.lower_length + x, 0.0, 0.0])
-    return Body(count, np.eye(3), tip, (), "zy", rod.mass, center, inertia)
+    return np.array([2e-15, about_center, about_center])
+
+
+def _spatial(body: Any) -> tuple[float, Array, Array]:
+    """Return mass, centre and moments of a body whose axes are its principal ones."""
+    center, (xx, xy, xz, yy, yz, zz) = np.array(body.center_of_mass), body.inertia
+    about_point = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    inertia = about_point - body.mass * (center @ center * np.eye(3) - np.outer(center, center))
+    if np.abs(inertia - np.diag(np.diag(inertia))).max() > 1e-12 * inertia.max():
+        raise ValueError("the peers have platforms whose axes are principal ones")
+    return body.mass, center, np.diag(inertia).copy()
 
 
 def _planar(body: Any, reach: float = 0.0) -> tuple[float, Array, Array]:
