@@ -48,6 +48,7 @@ _PART = 500
 
 _CPP = "Pinocchio, C++, usual flags"
 _CPP_PLAIN = "Pinocchio, C++, -O3"
+_GENERATED = "Pinocchio, C, CasADi's code"
 _CPP_TUNED = "Pinocchio, C++, tuned"
 _PYTHON = "Pinocchio, Python, usual calls"
 _PYTHON_TUNED = "Pinocchio, Python, tuned"
@@ -147,7 +148,7 @@ def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
             contestants.append(Contestant(peer.name, partial(_in_parts, peer, states), error))
     title = f"Batches of {len(expected)} states"
     times = run(title, contestants, rounds=3 if quick() else 25)
-    for slow in (_CPP_PLAIN, _CPP, _CPP_TUNED, _MUJOCO_C, _MUJOCO_CLOSED):
+    for slow in (_CPP_PLAIN, _CPP, _CPP_TUNED, _GENERATED, _MUJOCO_C, _MUJOCO_CLOSED):
         if not (quick() and slow.startswith("Pinocchio")):
             for fast in ("pteron c", "pteron c, base"):
                 print_ratio(times, slow, fast)

@@ -49,6 +49,7 @@ _BUILDERS: dict[str, Callable[[pteron.Manipulator], Calls | Sweep]] = {
     "Pinocchio, C++, tuned": pinocchio_peers.cpp_tuned,
     "Pinocchio, C++, usual flags": pinocchio_peers.cpp_usual,
     "Pinocchio, C++, -O3": pinocchio_peers.cpp_plain,
+    "Pinocchio, C, CasADi's code": pinocchio_peers.c_generated,
     "Pinocchio, Python, tuned": pinocchio_peers.python_tuned,
     "Pinocchio, Python, usual calls": pinocchio_peers.python_usual,
     "MuJoCo, C, tuned": mujoco_peers.c_tuned,
@@ -82,7 +83,7 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
         raise ValueError(f"{robot.name}: the peers are not written for its legs")
     found = []
     for name, build in _BUILDERS.items():
-        if quick and name.startswith("Pinocchio, C++"):
+        if quick and name.startswith("Pinocchio, C"):
             continue
         try:
             peer = build(robot)

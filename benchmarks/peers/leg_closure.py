@@ -20,7 +20,7 @@ import pteron
 from peers.closure import Array, Expression, frame_of
 from pteron.kernels.passes import optimised
 
-__all__ = ["KINDS", "LegClosure", "sparse"]
+__all__ = ["KINDS", "LegClosure", "printed", "sparse"]
 
 _INTERFACE = """
 #include <stddef.h>
@@ -368,16 +368,22 @@ class LegClosure:
         """Return a header with both functions, and the numbers that it does not hold: none."""
         joints, forces = self.joints(unbounded), self.forces()
         q, v, _, rows = (joints.size1_out(i) for i in range(4))
-        with tempfile.TemporaryDirectory() as folder:
-            generator = ca.CodeGenerator("closed_form.h", {"with_export": False})
-            generator.add(joints)
-            generator.add(forces)
-            text = Path(generator.generate(f"{folder}/")).read_text(encoding="utf-8")
-        # CasADi prints functions that -fPIC keeps from being inlined.
-        for function in ("casadi_real casadi_sq(", "int joints(", "int forces("):
-            text = text.replace(f"\n{function}", f"\nstatic inline {function}")
+        text = printed([joints, forces])
         sizes = f"M = {len(self.legs)}, NQ = {q}, NV = {v}, ROWS = {rows}"
         return text + _INTERFACE.replace("SIZES", sizes), np.zeros(1)
+
+
+def printed(functions: list[ca.Function]) -> str:
+    """Return C functions that CasADi prints."""
+    with tempfile.TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator("closed_form.h", {"with_export": False})
+        for function in functions:
+            generator.add(function)
+        text = Path(generator.generate(f"{folder}/")).read_text(encoding="utf-8")
+    # CasADi prints functions that -fPIC keeps from being inlined.
+    for name in ("casadi_real casadi_sq(", *(f"int {function.name()}(" for function in functions)):
+        text = text.replace(f"\n{name}", f"\nstatic inline {name}")
+    return text
 
 
 class _Rod:

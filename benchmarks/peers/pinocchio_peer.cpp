@@ -1,4 +1,5 @@
-// The tree in Pinocchio, between the closed form before it and after it.
+// The tree in Pinocchio, between the closed form before it and after it; or, SYMBOLIC, its algorithm
+// as a CasADi function.
 
 #include <chrono>
 #include <cstdint>
@@ -6,6 +7,9 @@
 #include <exception>
 #include <string>
 
+#ifdef SYMBOLIC
+#include <pinocchio/autodiff/casadi.hpp>
+#endif
 #include <pinocchio/algorithm/rnea.hpp>
 #include <pinocchio/multibody.hpp>
 
@@ -95,6 +99,30 @@ Peer *create(const double *joints, int count, const double *gravity, const doubl
         return nullptr;
     }
 }
+
+#ifdef SYMBOLIC
+// Write the function from (q, v, a) to tau to a file.
+int save(const double *joints, int count, const double *gravity, const char *path) {
+    using casadi::SX;
+    using Vector = Eigen::Matrix<SX, Eigen::Dynamic, 1>;
+    try {
+        const auto tree = built(reinterpret_cast<const Joint *>(joints), count, gravity);
+        const pinocchio::ModelTpl<SX> model = tree.cast<SX>();
+        pinocchio::DataTpl<SX> data(model);
+        const SX q = SX::sym("q", model.nq), v = SX::sym("v", model.nv), a = SX::sym("a", model.nv);
+        Vector at(model.nq), rate(model.nv), acceleration(model.nv);
+        pinocchio::casadi::copy(q, at);
+        pinocchio::casadi::copy(v, rate);
+        pinocchio::casadi::copy(a, acceleration);
+        SX tau(model.nv, 1);
+        pinocchio::casadi::copy(pinocchio::rnea(model, data, at, rate, acceleration), tau);
+        casadi::Function("rnea", {q, v, a}, {tau}).save(path);
+        return 0;
+    } catch (const std::exception &) {
+        return 1;
+    }
+}
+#endif
 
 // Fill the forces of a batch and return the seconds that it took.
 double sweep(Peer *peer, std::int64_t count, const double *pose, const double *velocity,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from ctypes import c_int, c_void_p
+import tempfile
+from ctypes import c_char_p, c_int, c_void_p
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 import pteron
@@ -15,10 +17,12 @@ from peers import compiled_closure
 from peers.calls import Calls
 from peers.closure import Array
 from peers.compiled_closure import closed_form
+from peers.leg_closure import printed
 from peers.library import Missing, Sweep, compiled
 from peers.tree import Body, tree
+from pteron.kernels.passes import optimised
 
-__all__ = ["cpp_plain", "cpp_tuned", "cpp_usual", "python_tuned", "python_usual"]
+__all__ = ["c_generated", "cpp_plain", "cpp_tuned", "cpp_usual", "python_tuned", "python_usual"]
 
 _BOOST = (
     "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
@@ -128,6 +132,34 @@ def cpp_usual(robot: pteron.Manipulator) -> Sweep:
 def cpp_plain(robot: pteron.Manipulator) -> Sweep:
     """Return the peer that calls `pinocchio::rnea` in C++, with -O3 -DNDEBUG for any processor."""
     return _cpp(robot, ("-march=x86-64", "-mtune=generic"), carried=True)
+
+
+def c_generated(robot: pteron.Manipulator) -> Sweep:
+    """Return the peer that is C code, which CasADi prints of `pinocchio::rnea` and what is around it.
+
+    Pteron's passes simplify the whole, as they do its own.
+    """
+    if find_spec("casadi") is None or find_spec("pinocchio") is None:
+        raise Missing("the package casadi or pin is not installed")
+    folder = Path(ca.__file__).parent
+    closure = closed_form(robot, robot.platform.turns)
+    header, numbers = closure.in_c(unbounded=True)
+    options = ["-std=c++17", "-O1", "-DSYMBOLIC", *_BOOST, *_includes()]
+    options += ["-I", str(folder / "include"), f"-L{folder}", "-lcasadi", f"-Wl,-rpath,{folder}"]
+    library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"), header)
+    joints, gravity = _table(tree(robot, robot.platform.turns)), np.array(robot.gravity)
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "rnea.casadi"
+        pointers = c_void_p(joints.ctypes.data), c_int(len(joints)), c_void_p(gravity.ctypes.data)
+        if library.save(*pointers, c_char_p(bytes(path))):
+            raise Missing("Pinocchio does not take the tree with CasADi's numbers")
+        rnea = ca.Function.load(str(path))
+    motion = closure.joints(unbounded=True).sx_in()
+    *moved, rows = closure.joints(unbounded=True).call(motion)
+    found = closure.forces().call([rnea(*moved), rows])
+    whole = optimised(ca.Function("inverse", motion, ca.cse(found)))
+    text = printed([whole]) + f"\nenum {{ M = {len(robot.legs)} }};\n"
+    return Sweep(compiled("gcc", "generated_peer.c", ["-lm"], version("casadi"), text))
 
 
 def _cpp(robot: pteron.Manipulator, flags: tuple[str, ...], carried: bool) -> Sweep:

@@ -15,6 +15,7 @@ from scipy.linalg import lu
 import pteron
 from peers.closure import Array, Expression
 from peers.leg_closure import KINDS, LegClosure, sparse
+from peers.library import Missing
 from pteron.kernels.passes import optimised
 
 __all__ = ["TiltingClosure"]
@@ -48,7 +49,7 @@ class TiltingClosure(LegClosure):
 
     def joints(self, unbounded: bool) -> ca.Function:
         if not unbounded:
-            raise ValueError("a platform that tilts is for engines that take quaternions")
+            raise Missing("its peer is not written for platforms that tilt")
         motion = [ca.SX.sym(name, 6) for name in ("x", "dx", "ddx")]
         rotation, quaternion = _turned(motion[0][3:])
         (roll, pitch, _), (da, db, dc) = (ca.vertsplit(v[3:]) for v in motion[:2])
