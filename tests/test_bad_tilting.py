@@ -1,6 +1,7 @@
 """Bad input to machines whose platforms tilt: one clear line each, in Python and commands."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -32,13 +33,41 @@ def test_similar_hexagons_are_refused_with_the_reason(tmp_path):
     for leg in robot.legs:
         legs.append(replace(leg, platform_point=tuple(0.4 * np.array(leg.guide_point))))
     alike = replace(robot, legs=tuple(legs))
-    words = "guide points and the platform points are similar figures, the latter 0.4 times"
+    words = "guide points and the platform points are similar figures on a conic, the latter"
     assert words in pteron.architecture(alike).reason
     with pytest.raises(SingularPose, match=words):
         pteron.random_poses(alike, 1)
     done = run(f"check {pteron.save(alike, tmp_path / 'alike.toml')}")
     assert done.exit_code == 2
     assert words in done.stderr
+
+
+CIRCLE = np.array([[-0.6, -0.8], [-0.8, -0.6], [0, 1], [0.8, 0.6], [1, 0], [0.8, -0.6]])
+PARABOLA = 0.5 * np.array([[-3, 9], [-2, 4], [0, 0], [0.5, 0.25], [1, 1], [2, 4]])
+SIDES = np.array([[0, 0], [2, 0], [4, 0], [2.5, 1.5], [1, 3], [0.5, 1.5]])
+
+
+@pytest.mark.parametrize(
+    ("base", "top", "reason"),
+    [
+        (CIRCLE, PARABOLA, "lie on conics, the one a projective image of the other"),
+        (SIDES, 0.6 * np.roll(SIDES, -1, axis=0), r"rams that push with \(-1, 1, -1, 1, -1, 1\)"),
+        (np.outer(CIRCLE[:, 0], [1, 2]), SIDES, "all guide points lie on one line"),
+        (SIDES, 0.6 * SIDES, ""),
+    ],
+)
+def test_figures_of_rams_that_balance_at_every_pose(base, top, reason):
+    robot = TILTED["stewart"]
+    flat = [np.column_stack([figure, np.zeros(6)]).tolist() for figure in (base, top)]
+    free = {"limits": (0.1, 20.0), "base_cone": None, "platform_cone": None}
+    legs = [
+        replace(leg, guide_point=tuple(r), platform_point=tuple(s), **free)
+        for leg, r, s in zip(robot.legs, *flat, strict=True)
+    ]
+    found = pteron.architecture(replace(robot, legs=tuple(legs)))
+    assert re.search(reason, found.reason)
+    assert found.proof == ("exact arithmetic" if reason else "one pose")
+    assert (found.type_ii < 1e-12) == bool(reason)
 
 
 @NIGHTLY

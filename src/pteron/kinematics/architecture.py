@@ -18,6 +18,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, NoSquareRoot, PrimeField, evaluate, general_program, numeric
 from pteron.kinematics.modular_geometry import modular_geometry
+from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.sampling import drawn_poses
 from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -29,7 +30,10 @@ _SAMPLES = 64
 """Random poses in reach at which det J is looked at."""
 
 
-_PRIMES = (2305843009213690799, 2305843009213689479, 2305843009213688159, 2305843009213684559)
+_PRIMES = (
+    *(2305843009213690799, 2305843009213690511, 2305843009213689479, 2305843009213688159),
+    *(2305843009213687871, 2305843009213686431, 2305843009213685831, 2305843009213684559),
+)
 """Primes modulo which 2, 3 and 5 are squares, and -1 is none."""
 
 _ATTEMPTS = 400
@@ -56,7 +60,7 @@ class Architecture:
     proof : {"one pose", "exact arithmetic", "closed form", "numerical"}
         The kind of proof. "one pose": it is not singular, as one pose shows. "exact arithmetic":
         det J is zero in exact numbers, at random states modulo primes. "closed form": the
-        coefficients of det J vanish but for rounding. "numerical": det J does at many poses.
+        coefficients of det J vanish but for rounding, or forces that balance at every pose are known. "numerical": det J does at many poses.
     type_ii : float
         The largest type-II measure, in size, of the poses that were looked at.
     holds : bool or None
@@ -118,7 +122,8 @@ def _architecture(robot: Manipulator) -> Architecture:
                 subject=robot.name,
             )
         return Architecture(False, "", "one pose", most, holds, constraint)
-    proof: Proof = "numerical" if closure_of(robot).vanishes() is None else "closed form"
+    told = closure_of(robot).vanishes() or balance_of_rams(robot)
+    proof: Proof = "closed form" if told else "numerical"
     if _vanishes_exactly(robot):
         proof = "exact arithmetic"
     return Architecture(True, _reason(robot), proof, most, holds, constraint)
@@ -153,7 +158,7 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
     known = closure_of(robot).vanishes()
     if known is not None:
         return known
-    if _points_are_in_line(robot):
+    if _points_are_in_line(robot) or balance_of_rams(robot):
         return True
     poses = _poses(robot)
     if not len(poses):
@@ -215,11 +220,8 @@ def _reason(robot: Manipulator) -> str:
         where = " through P" if robot.platform.center else ""
         where = where if robot.platform.tilts else " along the platform's axis"
         return f"all platform points lie on one line{where}, about which no force then has a moment"
-    if (factor := _alike(robot)) is not None:
-        return (
-            "the guide points and the platform points are similar figures, the latter "
-            f"{factor:.4g} times the former"
-        )
+    if told := balance_of_rams(robot):
+        return told
     if closure_of(robot).orientation is not None and _has_fourfold_symmetry(robot, forces[0]):
         return (
             "the layout has fourfold symmetry about the platform's axis, for which A = B = 0 in "
@@ -251,24 +253,6 @@ def _points_are_in_line(robot: Manipulator) -> bool:
         beside = points if platform.center else points - points.mean(axis=0)
         return bool(np.linalg.svd(beside, compute_uv=False)[1] <= 1e-9 * size)
     return bool(np.ptp(points[:, :2], axis=0).max() <= 1e-9 * size)
-
-
-def _alike(robot: Manipulator) -> float | None:
-    """Return how large the platform's figure is beside the base's, if they are similar.
-
-    Where rams join similar figures, the lengths of all six leave the platform free to move.
-    """
-    if len(robot.platform.angles) < 3 or not robot.platform.lengths:
-        return None
-    base = np.array([leg.guide_point for leg in robot.legs])
-    points = np.array([leg.platform_point for leg in robot.legs])
-    base, points = (figure - figure.mean(axis=0) for figure in (base, points))
-    left, _, right = np.linalg.svd(base.T @ points)
-    turned = base @ left @ right
-    size = float((turned * turned).sum())
-    factor = float((turned * points).sum()) / size if size > 0.0 else 0.0
-    off = np.linalg.norm(points - factor * turned)
-    return factor if off <= 1e-9 * factor * np.sqrt(size) else None
 
 
 def _always_free(rows: Array) -> Array | None:

@@ -1,0 +1,86 @@
+"""Figures of six rams' ends that make a hexapod singular at every pose, and why they do.
+
+Against a twist at the base's origin a ram from a to p + R b has the row (d, a x d), d = p + R b - a,
+times 1 over its length. It is linear in the products of (1, a) with (1, b). So where these 16
+numbers of six rams depend on each other, so do the rows, in the same shares at every pose: as where
+both figures lie on conics of a plane, of which a projective map takes one to the other (Roeschel
+and Mick, Characterisation of architecturally shaky platforms, 1998; Karger, 2003).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.kernels.path_programs import spheres_kernel
+from pteron.manipulator import Manipulator
+
+_ROUNDING = 1e-10
+"""Singular values over the largest below this are rounding."""
+
+
+def balance_of_rams(robot: Manipulator) -> str:
+    """Return why a hexapod of rams is singular at every pose, or nothing where its figures are not.
+
+    It is proved up to rounding of the points.
+    """
+    if len(robot.platform.angles) < 3 or not robot.platform.lengths:
+        return ""
+    joints = np.array([[1.0], [2.0]]) * np.ones(robot.joint_count)
+    base, other = spheres_kernel(robot)(joints)[0]
+    if not np.array_equal(base, other):
+        return ""  # joints move the near ends too: no rams
+    top = np.array([leg.platform_point for leg in robot.legs])
+    base, top = (figure - figure.mean(axis=0) for figure in (base, top))
+    if not (base.any() and top.any()):
+        return ""
+    if _vanishes(base, 1):
+        return "all guide points lie on one line, about which no ram then has a moment"
+    near, far = (_with_one(figure / np.abs(figure).max()) for figure in (base, top))
+    products = (near[:, :, None] * far[:, None, :]).reshape(len(base), -1)
+    if not _vanishes(products, 5):
+        return ""
+    shares = np.linalg.svd(products)[0][:, -1]
+    told = ", ".join(f"{v:.4g}" for v in shares / shares[np.abs(shares).argmax()] + 0.0)
+    return (
+        f"{_alike(base, top) or _on_conics(base, top)}rams that push with ({told}) times their "
+        "lengths leave the platform in balance at every pose"
+    )
+
+
+def _vanishes(rows: Array, rank: int) -> bool:
+    values = np.linalg.svd(rows, compute_uv=False)
+    return bool(values[rank] <= _ROUNDING * values[0])
+
+
+def _with_one(figure: Array) -> Array:
+    return np.hstack([np.ones((len(figure), 1)), figure])
+
+
+def _alike(base: Array, top: Array) -> str:
+    """Say how large the platform's figure is beside the base's, if they are similar."""
+    left, _, right = np.linalg.svd(base.T @ top)
+    turned = base @ left @ right
+    factor = float((turned * top).sum() / (turned * turned).sum())
+    if np.linalg.norm(top - factor * turned) > _ROUNDING * np.linalg.norm(top):
+        return ""
+    where = " on a conic" if _on_conics(base) else ""
+    return (
+        f"the guide points and the platform points are similar figures{where}, the latter "
+        f"{factor:.4g} times the former; "
+    )
+
+
+def _on_conics(*figures: Array) -> str:
+    """Say so if each figure lies in a plane, on a conic."""
+    for figure in figures:
+        if not _vanishes(figure, 2):
+            return ""
+        plane = figure @ np.linalg.svd(figure)[2][:2].T
+        homogeneous = _with_one(plane / np.abs(plane).max())
+        squares = homogeneous[:, :, None] * homogeneous[:, None, :]
+        if not _vanishes(squares.reshape(len(plane), -1), 5):
+            return ""
+    return (
+        "guide points and platform points lie on conics, the one a projective image of the other; "
+    )
