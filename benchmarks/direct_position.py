@@ -155,9 +155,8 @@ def others(motion: str, kinds: tuple[str, ...]) -> None:
             if found != count:
                 worse.append((kind, seed, count, found))
     told = " ".join(f"{n}:{all_counts[n]}" for n in sorted(all_counts))
-    print(
-        f"{motion}: {alike} of {sum(all_counts.values())} dense searches agree, {told} {worse or ''}"
-    )
+    searches = sum(all_counts.values())
+    print(f"{motion}: {alike} of {searches} dense searches agree, {told} {worse or ''}")
 
 
 if __name__ == "__main__":

@@ -3,8 +3,8 @@
 Each cuts the loops, runs its Newton-Euler algorithm on the tree, and projects the joint forces
 through the closure; what is not the engine's is done in closed form. Tuned peers have the best
 flags, buffers, stages and trees that we found; the others are what a good user writes first. For
-machines with four P-R-R-R legs, those of legs R-S-S, P-S-S and R-R-R, and, in Pinocchio, hexapods of
-legs U-P-S, P-S-S and R-S-S.
+machines with four P-R-R-R legs, those of legs R-S-S, P-S-S and R-R-R, and, in Pinocchio, hexapods
+of legs U-P-S, P-S-S and R-S-S.
 """
 
 from __future__ import annotations

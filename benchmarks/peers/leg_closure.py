@@ -1,8 +1,9 @@
 """The closed form that the peers need around their engine, leg by leg, in CasADi.
 
-For machines with legs R-S-S, P-S-S, R-R-R and U-P-S; `tilting_closure` has platforms that tilt. It takes a pose to the joints of
-the tree in `tree.py`, and the tree's joint forces to actuator forces. As in `closure.py`, no
-equation is shared with `pteron.equations`. For C and C++ it is printed as a header.
+For machines with legs R-S-S, P-S-S, R-R-R and U-P-S; `tilting_closure` has platforms that tilt. It
+takes a pose to the joints of the tree in `tree.py`, and the tree's joint forces to actuator forces.
+As in `closure.py`, no equation is shared with `pteron.equations`. For C and C++ it is printed as a
+header.
 """
 
 from __future__ import annotations
@@ -449,4 +450,5 @@ def _clean(array: Array) -> Array:
 
 
 def sparse(array: Array) -> Expression:
+    """Return numbers as an expression that knows its zeros."""
     return ca.SX(ca.sparsify(ca.DM(_clean(array))))

@@ -135,7 +135,7 @@ def cpp_plain(robot: pteron.Manipulator) -> Sweep:
 
 
 def c_generated(robot: pteron.Manipulator) -> Sweep:
-    """Return the peer that is C code, which CasADi prints of `pinocchio::rnea` and what is around it.
+    """Return the peer that is C code, printed by CasADi of `pinocchio::rnea` and what is around it.
 
     Pteron's passes simplify the whole, as they do its own.
     """
@@ -143,7 +143,7 @@ def c_generated(robot: pteron.Manipulator) -> Sweep:
         raise Missing("the package casadi or pin is not installed")
     folder = Path(ca.__file__).parent
     closure = closed_form(robot, robot.platform.turns)
-    header, numbers = closure.in_c(unbounded=True)
+    header, _ = closure.in_c(unbounded=True)
     options = ["-std=c++17", "-O1", "-DSYMBOLIC", *_BOOST, *_includes()]
     options += ["-I", str(folder / "include"), f"-L{folder}", "-lcasadi", f"-Wl,-rpath,{folder}"]
     library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"), header)

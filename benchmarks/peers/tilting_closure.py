@@ -38,6 +38,7 @@ class TiltingClosure(LegClosure):
 
     @classmethod
     def of(cls, robot: pteron.Manipulator, carried: bool = True) -> TiltingClosure:
+        """Return the closure of one hexapod."""
         platform = robot.platform
         if platform.angle_order != "rpy" or not np.array_equal(platform.frame, np.eye(3)):
             raise ValueError(f"{robot.name}: the peers have roll, pitch, yaw in the base's frame")
@@ -48,6 +49,7 @@ class TiltingClosure(LegClosure):
         return cls(legs, np.eye(3), True, carried, points, order)
 
     def joints(self, unbounded: bool) -> ca.Function:
+        """Return the function from (pose, velocity, acceleration) to (q, v, a, rows)."""
         if not unbounded:
             raise Missing("its peer is not written for platforms that tilt")
         motion = [ca.SX.sym(name, 6) for name in ("x", "dx", "ddx")]
@@ -87,6 +89,7 @@ class TiltingClosure(LegClosure):
         return optimised(ca.Function("joints", motion, ca.cse(outputs)))
 
     def forces(self) -> ca.Function:
+        """Return the function from (tau, rows) to the actuator forces."""
         joints, sizes = ([leg.sizes[k] for leg in self.legs] for k in (0, 1))
         tau = ca.SX.sym("tau", sum(joints) + 6)
         rows = ca.SX.sym("rows", sum(sizes) + 27)

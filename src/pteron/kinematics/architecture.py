@@ -60,7 +60,8 @@ class Architecture:
     proof : {"one pose", "exact arithmetic", "closed form", "numerical"}
         The kind of proof. "one pose": it is not singular, as one pose shows. "exact arithmetic":
         det J is zero in exact numbers, at random states modulo primes. "closed form": the
-        coefficients of det J vanish but for rounding, or forces that balance at every pose are known. "numerical": det J does at many poses.
+        coefficients of det J vanish but for rounding, or rams of a hexapod balance at every pose.
+        "numerical": det J does at many poses.
     type_ii : float
         The largest type-II measure, in size, of the poses that were looked at.
     holds : bool or None
