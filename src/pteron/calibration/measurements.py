@@ -1,7 +1,7 @@
 """Measurements of a machine at many poses: the joints' readings, and what an instrument saw there.
 
-A row is a pose. Any of pose columns, a height and a distance may be measured in it, the others are
-NaN; `Setup` says of what: marks on the platform, planes, anchors and the instrument's frame.
+A row is a pose. Any of a position, angles, a height and a distance may be measured in it, the others
+are NaN; `Setup` says of what: marks on the platform, planes, anchors and the instrument's frame.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pteron.bodies.vectors import Vector
+from pteron.manipulator import Manipulator
 
 TOOL = ""
 """The name of the mark, plane or anchor of a row that names none: the tool, the only plane."""
@@ -62,8 +63,9 @@ class Setup:
     Parameters
     ----------
     noise : mapping
-        Standard deviation by column (a pose's, `height`, `distance`), m or rad; under "readings"
-        that of the joints' readings. A column that is missing has its noise found.
+        Standard deviation of a `position`'s coordinates, of an `angle`, a `height`, a `distance`
+        and of the joints' `readings`, m or rad. What is missing has its noise found from the
+        residuals; the readings' counts as none.
     marks, planes, anchors : mapping
         By name. The tool is the mark `TOOL`; the plane `TOOL` is z = 0 unless it is given.
     frame_known : bool
@@ -77,6 +79,11 @@ class Setup:
     frame_known: bool = True
 
 
+def length_columns(robot: Manipulator) -> list[int]:
+    """Return which of x, y and z the pose's lengths are."""
+    return ["xyz".index(name) for name in robot.coordinates if name in "xyz"]
+
+
 @dataclass(frozen=True)
 class Measurements:
     """N rows of measurements.
@@ -85,9 +92,12 @@ class Measurements:
     ----------
     readings : array, shape (N, n)
         What the joints read, m or rad.
-    poses : array, shape (N, m)
-        The pose's coordinates as measured, in the instrument's frame; its lengths are those of the
-        row's mark. NaN where not measured.
+    positions : array, shape (N, 3)
+        x, y and z of the row's mark in the instrument's frame, m; NaN where not measured. Of a
+        machine with one or two of them as coordinates they are along its platform's frame at
+        angles zero, else along the base frame.
+    angles : array, shape (N, k)
+        The pose's angles, as many as it has, rad; NaN where not measured.
     heights : array, shape (N,)
         Of the row's mark over the row's plane, along its normal, m; NaN where not measured.
     distances : array, shape (N,)
@@ -105,7 +115,8 @@ class Measurements:
     """
 
     readings: Array
-    poses: Array
+    positions: Array
+    angles: Array
     heights: Array
     distances: Array
     origins: NDArray[np.int64]
@@ -119,29 +130,52 @@ class Measurements:
     @classmethod
     def of(
         cls,
-        readings: Array,
+        robot: Manipulator,
+        readings: ArrayLike,
         *,
-        poses: Array | None = None,
-        heights: Array | None = None,
-        setup: Setup = Setup(),  # noqa: B008 - frozen
+        poses: ArrayLike | None = None,
+        positions: ArrayLike | None = None,
+        heights: ArrayLike | None = None,
+        setup: Setup | None = None,
     ) -> Measurements:
-        """Return measurements of the tool: whole or partial poses, heights, or both."""
-        readings = np.asarray(readings, dtype=float)
-        n = len(readings)
-        none = np.full(n, np.nan)
+        """Return measurements of the tool: poses of P where the tool is there, else of the tool.
+
+        Parameters
+        ----------
+        robot : Manipulator
+            The machine.
+        readings : array, shape (N, n)
+            What the joints read, m or rad.
+        poses : array, shape (N, m), optional
+            Coordinates as measured: lengths of the tool, and angles; NaN where not.
+        positions : array, shape (N, 3), optional
+            Of the tool, m, in place of the poses' lengths.
+        heights : array, shape (N,), optional
+            Of the tool over the plane, m.
+        setup : Setup, optional
+            What they refer to; by default the base frame and the plane z = 0.
+        """
+        read = np.asarray(readings, dtype=float)
+        n, angular = len(read), robot.platform.angular
+        given = np.full((n, robot.freedom), np.nan) if poses is None else np.asarray(poses, float)
+        at = np.full((n, 3), np.nan)
+        at[:, length_columns(robot)] = given[:, ~angular]
+        if positions is not None:
+            at = np.asarray(positions, dtype=float)
         unnamed = (TOOL,) * n
         return cls(
-            readings,
-            np.full(readings.shape, np.nan) if poses is None else np.asarray(poses, dtype=float),
-            none if heights is None else np.asarray(heights, dtype=float),
-            none,
+            read,
+            at,
+            given[:, angular],
+            np.full(n, np.nan) if heights is None else np.asarray(heights, dtype=float),
+            np.full(n, np.nan),
             np.full(n, -1),
             unnamed,
             unnamed,
             unnamed,
             tuple(f"row {i + 1}" for i in range(n)),
             None,
-            setup,
+            setup or Setup(),
         )
 
     def __len__(self) -> int:
@@ -163,7 +197,8 @@ class Measurements:
 
         return Measurements(
             self.readings[kept],
-            measured(self.poses),
+            measured(self.positions),
+            measured(self.angles),
             measured(self.heights),
             measured(self.distances),
             origins,

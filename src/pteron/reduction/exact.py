@@ -81,7 +81,7 @@ def exact_grouping(
     geometry = exact_geometry(robot)
     topology, n = bare(robot), robot.freedom
     rng = random.Random(seed)
-    primes = _primes(geometry, rng)
+    primes = primes_of(geometry, rng)
     states = -(-len(order) // n) + _SPARE_STATES
 
     found: dict[int, tuple[list[int], Relations]] = {}
@@ -218,7 +218,7 @@ def _unexplained(
     return [dropped[i - len(by_mass)] for i in kept if i >= len(by_mass)]
 
 
-def _primes(geometry: ExactGeometry, rng: random.Random) -> Iterator[int]:
+def primes_of(geometry: ExactGeometry, rng: random.Random) -> Iterator[int]:
     """Yield primes p = 3 (mod 4) in which the geometry's roots exist."""
     factors = {prime for s in geometry.radicands for prime in factorint(s)}
     while True:

@@ -1,0 +1,286 @@
+"""The most probable values of what a calibration seeks: Gauss and Newton's steps with priors.
+
+Rows whose residuals are too large for their noise count less (Huber) and, far beyond, not at all.
+Noise that nobody gave is found from the residuals, by kind of measurement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.stats import chi2
+
+from pteron.calibration.guess import Block, Guess
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.residuals import MachineSlopes, Rows
+from pteron.errors import DataError
+
+Array = NDArray[np.float64]
+
+KINDS = ("position", "angle", "height", "distance")
+"""Kinds of measurements, each with a noise of its own."""
+
+_START = {"position": 1e-4, "angle": 1e-4, "height": 1e-4, "distance": 1e-4}
+"""Noise that is assumed before any is found, m and rad."""
+
+_FLOOR = 1e-12
+"""Least noise: measurements without any still have rounding."""
+
+_CHUNK = 4096
+"""Rows at a time."""
+
+_STEPS = 30
+_SETTLED = 1e-7
+"""Share of an interval within which a step of all unknowns ends the search."""
+
+_DOUBTED = 0.99
+"""Quantile of a row's squared residuals beyond which it counts less."""
+
+_OUTLYING = 1e-5
+"""Probability of a faultless row, over their number, below which it is left out."""
+
+_ROUNDS = 12
+"""Searches for noise and outlying rows; two or three do."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was found.
+
+    Attributes
+    ----------
+    guess : Guess
+        The values.
+    total : array, shape (p,)
+        All steps from the drawing.
+    covariance : array, shape (p, p)
+        Of all unknowns, from data and tolerances.
+    information : array, shape (p, p)
+        What the data alone say: J' W J.
+    noise : dict
+        Standard deviation by kind of measurement.
+    poses : array, shape (N, m)
+        Of all rows.
+    residuals, measured : array, shape (N, K)
+        Of all rows, computed minus measured, m and rad; and which of them count.
+    distances : array, shape (N,)
+        Of each row's residuals from zero, in standard deviations (Mahalanobis); and
+    kept : array of bool, shape (N,)
+        the rows that are no outliers.
+    steps : int
+        Gauss and Newton's steps in all.
+    """
+
+    guess: Guess
+    total: Array
+    covariance: Array
+    information: Array
+    noise: dict[str, float]
+    poses: Array
+    residuals: Array
+    measured: NDArray[np.bool_]
+    distances: Array
+    kept: NDArray[np.bool_]
+    steps: int
+
+
+@dataclass
+class _Sums:
+    """The normal equations of a guess."""
+
+    matrix: Array
+    right: Array
+    cost: float
+    poses: Array
+    residuals: Array
+    measured: NDArray[np.bool_]
+    distances: Array
+
+
+class Fitter:
+    """A search for the most probable values.
+
+    Parameters
+    ----------
+    given : Measurements
+        What was measured.
+    blocks : tuple of Block
+        What is sought.
+    guess : Guess
+        Where to begin.
+    poses : array, shape (N, m)
+        Near the rows' poses.
+    """
+
+    def __init__(
+        self, given: Measurements, blocks: tuple[Block, ...], guess: Guess, poses: Array
+    ) -> None:
+        self.given, self.blocks, self.begin = given, blocks, guess
+        self.slopes = MachineSlopes(guess.robot, blocks)
+        tolerances = [u.tolerance for block in blocks for u in block.unknowns]
+        with np.errstate(divide="ignore"):
+            self.prior = 1.0 / np.array(tolerances) ** 2
+        self.begin_poses = poses
+        k = given.angles.shape[1]
+        self.kind_of = np.array([*["position"] * 3, *["angle"] * k, "height", "distance"])
+        self.readings_noise = given.setup.noise.get("readings", 0.0)
+
+    def run(self) -> Fit:
+        """Return what is found.
+
+        Raises
+        ------
+        DataError
+            If it does not settle, or the measurements leave something without a tolerance open.
+        """
+        setup = self.given.setup.noise
+        noise = {kind: max(setup.get(kind, _START[kind]), _FLOOR) for kind in KINDS}
+        sought = [kind for kind in KINDS if kind not in setup]
+        kept = np.ones(len(self.given), dtype=bool)
+        guess, poses = self.begin, self.begin_poses
+        total = np.zeros(len(self.prior))
+        steps = 0
+        for _ in range(_ROUNDS):
+            guess, total, sums, taken = self._settled(guess, total, poses, noise, kept)
+            poses, steps = sums.poses, steps + taken
+            covariance = self._covariance(sums.matrix)
+            found = {**noise, **self._noise(sums, kept, covariance, guess, noise, sought)}
+            scaled = sums.distances * (noise[sought[0]] / found[sought[0]] if sought else 1.0)
+            limits = chi2.isf(_OUTLYING / len(kept), np.maximum(sums.measured.sum(axis=1), 1))
+            fine = scaled**2 <= limits
+            alike = all(abs(found[k] / noise[k] - 1.0) < 0.01 for k in sought)
+            if alike and (fine == kept).all():
+                break
+            noise, kept = found, fine
+        return Fit(guess, total, covariance, sums.matrix, noise, sums.poses, sums.residuals,
+                   sums.measured, sums.distances, kept, steps)
+
+    def _settled(
+        self, guess: Guess, total: Array, poses: Array, noise: dict[str, float], kept: Array
+    ) -> tuple[Guess, Array, _Sums, int]:
+        sums = self._sums(guess, total, poses, noise, kept)
+        for taken in range(1, _STEPS + 1):
+            covariance = self._covariance(sums.matrix)
+            step = -covariance @ (sums.right + self.prior * total)
+            small = np.abs(step) / np.sqrt(np.diag(covariance))
+            share = 1.0
+            while True:
+                try:
+                    moved = guess.moved(self.blocks, share * step)
+                    after = self._sums(moved, total + share * step, sums.poses, noise, kept)
+                    fell = after.cost <= sums.cost * (1.0 + 1e-9) + 1e-12
+                except ValueError:  # no such machine, or out of its reach
+                    fell = False
+                if fell:
+                    break
+                share *= 0.5
+                if share < 1e-3:
+                    if small.max() < 1e-2:
+                        return guess, total, sums, taken
+                    raise DataError(
+                        "the search for the geometry does not settle: the measurements contradict "
+                        "the machine as drawn; check units, the order of the joints, and the frame"
+                    )
+            guess, total, sums = moved, total + share * step, after
+            if share == 1.0 and small.max() < _SETTLED:
+                break
+        return guess, total, sums, taken
+
+    def cost(self, guess: Guess, total: Array, fit: Fit) -> float:
+        """Return the squared residuals, in variances, and tolerances of a guess."""
+        return self._sums(guess, total, fit.poses, fit.noise, fit.kept).cost
+
+    def _covariance(self, information: Array) -> Array:
+        matrix = information + np.diag(self.prior)
+        size = np.sqrt(np.diag(matrix))
+        size[size == 0.0] = 1.0
+        try:
+            factor = cho_factor(matrix / np.outer(size, size))
+        except np.linalg.LinAlgError:
+            raise DataError(
+                "the measurements leave open what has no tolerance: free less, or give `prior` "
+                "finite standard deviations"
+            ) from None
+        return np.asarray(cho_solve(factor, np.eye(len(size)))) / np.outer(size, size)
+
+    def _sums(
+        self, guess: Guess, total: Array, poses: Array, noise: dict[str, float], kept: Array
+    ) -> _Sums:
+        count, rows = len(self.prior), len(self.given)
+        width = len(self.kind_of)
+        matrix, right, cost = np.zeros((count, count)), np.zeros(count), 0.0
+        joints = guess.joints(self.given.readings)
+        found = self.slopes.poses(guess, joints, poses)
+        if np.isnan(found[kept]).any():
+            raise ValueError
+        residuals = np.zeros((rows, width))
+        measured = np.zeros((rows, width), dtype=bool)
+        distances = np.zeros(rows)
+        for start in range(0, rows, _CHUNK):
+            chosen = np.arange(start, min(start + _CHUNK, rows))
+            at = self.slopes.rows(guess, self.given, found, chosen)
+            residuals[chosen], measured[chosen] = at.residuals, at.measured
+            r, slopes = self._whitened(at, guess, noise)
+            squares = np.einsum("nk,nk->n", r, r)
+            distances[chosen] = np.sqrt(squares)
+            limit = np.sqrt(chi2.ppf(_DOUBTED, np.maximum(at.measured.sum(axis=1), 1)))
+            far = np.maximum(distances[chosen], limit)
+            weights = np.where(kept[chosen], limit / far, 0.0)
+            cost += float((kept[chosen] * np.where(far > limit, 2 * limit * far - limit**2,
+                                                   squares)).sum())
+            flat = slopes.reshape(-1, count)
+            heavy = np.repeat(weights, width)
+            matrix += (flat * heavy[:, None]).T @ flat
+            right += flat.T @ (heavy * r.reshape(-1))
+        cost += float(self.prior @ total**2)
+        if not np.isfinite(cost):
+            raise ValueError
+        return _Sums(matrix, right, cost, found, residuals, measured, distances)
+
+    def _whitened(self, at: Rows, guess: Guess, noise: dict[str, float]) -> tuple[Array, Array]:
+        """Return residuals and slopes in standard deviations, independent within a row."""
+        sizes = np.array([noise[kind] for kind in self.kind_of])
+        if not self.readings_noise:
+            return at.residuals / sizes, at.slopes / sizes[:, None]
+        pushed = at.by_reading * (self.readings_noise * guess.scales)
+        covariance = pushed @ np.swapaxes(pushed, -1, -2) + np.diag(sizes**2)
+        root = np.linalg.cholesky(covariance)
+        both = np.concatenate([at.residuals[..., None], at.slopes], axis=-1)
+        white = np.linalg.solve(root, both)
+        return white[..., 0], white[..., 1:]
+
+    def _noise(
+        self,
+        sums: _Sums,
+        kept: Array,
+        covariance: Array,
+        guess: Guess,
+        noise: dict[str, float],
+        sought: list[str],
+    ) -> dict[str, float]:
+        """Return the noise by kind that the residuals show, less what the unknowns took of it."""
+        if not sought:
+            return {}
+        taken = dict.fromkeys(KINDS, 0.0)
+        for start in range(0, len(kept), _CHUNK):
+            chosen = np.arange(start, min(start + _CHUNK, len(kept)))
+            at = self.slopes.rows(guess, self.given, sums.poses, chosen[kept[chosen]])
+            for kind in sought:
+                part = at.slopes[:, self.kind_of == kind].reshape(-1, len(covariance))
+                taken[kind] += float(np.einsum("ij,jk,ik->", part, covariance, part, optimize=True))
+        found = {}
+        for kind in sought:
+            own = (self.kind_of == kind) & sums.measured & kept[:, None]
+            count = int(own.sum())
+            if not count:
+                continue
+            left = count - taken[kind] / noise[kind] ** 2
+            # Half the middle of their sizes serves where a few rows are far off.
+            values = np.abs(sums.residuals[own])
+            rms = float(np.sqrt((values**2).sum() / max(left, 1.0)))
+            middle = float(np.median(values)) / 0.6745 * np.sqrt(count / max(left, 1.0))
+            found[kind] = max(middle if rms > 2.0 * middle and count > 20 else rms, _FLOOR)
+        return found

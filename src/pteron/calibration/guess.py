@@ -1,0 +1,139 @@
+"""All that a calibration seeks, as values: the machine, its readings, and what the instrument saw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pteron.calibration.measurements import TOOL, Measurements, Place, Plane
+from pteron.calibration.variations import Variation, varied
+from pteron.manipulator import Manipulator
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that is sought.
+
+    Attributes
+    ----------
+    name : str
+        "legs[2].lower_length", "zeros[1]", "planes.bed.offset", "instrument about z".
+    group : str
+        What a user frees and gives a tolerance as one, or "setup" for what measurements refer to.
+    unit : str
+        "m", "rad" or "".
+    tolerance : float
+        Standard deviation about the drawing, before anything is measured; inf: none.
+    """
+
+    name: str
+    group: str
+    unit: str
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Values of all that is sought.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine; its joint coordinates are q = zeros + scales * readings.
+    zeros, scales : array, shape (n,)
+        m or rad, and 1.
+    marks, anchors : mapping
+        Points (3,), m: on the platform, in its frame, and in the base frame.
+    planes : mapping
+        Normal and offset, (4,).
+    turn, shift : array, shapes (3, 3) and (3,)
+        A point y of the instrument's frame is at turn y + shift in the base frame, m.
+    """
+
+    robot: Manipulator
+    zeros: Array
+    scales: Array
+    marks: Mapping[str, Array]
+    anchors: Mapping[str, Array] = field(default_factory=dict)
+    planes: Mapping[str, Array] = field(default_factory=dict)
+    turn: Array = field(default_factory=lambda: np.eye(3))
+    shift: Array = field(default_factory=lambda: np.zeros(3))
+
+    @classmethod
+    def drawn(cls, robot: Manipulator, measured: Measurements) -> Guess:
+        """Return the machine as drawn, and its surroundings as described."""
+        setup = measured.setup
+        marks = {TOOL: Place(robot.platform.tool or (0.0, 0.0, 0.0))} | dict(setup.marks)
+        planes = {TOOL: Plane()} | dict(setup.planes)
+        return cls(
+            robot,
+            np.array([_reading(leg)[0] for leg in robot.legs]),
+            np.array([_reading(leg)[1] for leg in robot.legs]),
+            {name: np.array(mark.at) for name, mark in marks.items()},
+            {name: np.array(place.at) for name, place in setup.anchors.items()},
+            {name: np.array([*plane.normal, plane.offset]) for name, plane in planes.items()},
+        )
+
+    def joints(self, readings: Array) -> Array:
+        """Return the joint coordinates (N, n) of readings."""
+        return self.zeros + self.scales * readings
+
+    def moved(self, blocks: Sequence[Block], step: Array) -> Guess:
+        """Return the guess after a step in all unknowns."""
+        guess = self
+        for block in blocks:
+            guess = block.move(guess, step[block.where])
+        return guess
+
+
+@dataclass(frozen=True)
+class Block:
+    """Unknowns that belong together, and where they stand among all of them."""
+
+    kind: str
+    """"geometry", "zeros", "scales", "mark", "plane", "anchor" or "frame"."""
+    name: str
+    where: slice
+    unknowns: tuple[Unknown, ...]
+    changes: tuple[Variation, ...] = ()
+    legs: tuple[int, ...] = ()
+
+    def move(self, guess: Guess, step: Array) -> Guess:
+        """Return a guess whose unknowns of this block are moved by a step."""
+        if self.kind == "geometry":
+            return replace(guess, robot=varied(guess.robot, self.changes, step))
+        if self.kind in ("zeros", "scales"):
+            values = getattr(guess, self.kind).copy()
+            values[list(self.legs)] += step
+            return replace(guess, **{self.kind: values})
+        if self.kind == "mark":
+            return replace(guess, marks={**guess.marks, self.name: guess.marks[self.name] + step})
+        if self.kind == "anchor":
+            at = guess.anchors[self.name] + step
+            return replace(guess, anchors={**guess.anchors, self.name: at})
+        if self.kind == "plane":
+            normal, offset = guess.planes[self.name][:3], guess.planes[self.name][3]
+            tilted = normal + across(normal) @ step[:2]
+            plane = np.append(tilted / np.linalg.norm(tilted), offset + step[2])
+            return replace(guess, planes={**guess.planes, self.name: plane})
+        turn = Rotation.from_rotvec(step[3:]).as_matrix() @ guess.turn
+        return replace(guess, turn=turn, shift=guess.shift + step[:3])
+
+
+def across(normal: Array) -> Array:
+    """Return two unit vectors (3, 2) at right angles to a normal, nearest to the base's axes."""
+    least = np.argsort(np.abs(normal), kind="stable")[:2]
+    first = np.eye(3)[min(least)] - normal[min(least)] * normal
+    first = first / np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)], axis=-1)
+
+
+def _reading(leg):
+    found = getattr(leg, "reading", None)
+    return (found.zero, found.scale) if found else (0.0, 1.0)

@@ -1,0 +1,145 @@
+"""What measurements can show of a machine's geometry: an exact rank, and in words what they cannot.
+
+The rank of the residuals' slopes at random poses is found modulo primes, on the machine's geometry
+in exact numbers, as that of base parameters is; singular values at the measured poses confirm it,
+and tell what is weak.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.calibration.guess import Block, Guess
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.exact_rank import RowKind, exact_rank
+from pteron.calibration.unseen import told, unseen_combinations
+
+Array = NDArray[np.float64]
+
+_ROUNDING = 1e-9
+"""Singular value, relative to the greatest, up to which a direction counts as unseen."""
+
+_NAMED = 6
+"""Most weak combinations that are told."""
+
+
+@dataclass(frozen=True)
+class Observability:
+    """What measurements can show.
+
+    Attributes
+    ----------
+    rank : int
+        How many combinations of the values they show.
+    columns : int
+        How many values there are.
+    primes : tuple of int
+        Those modulo which the rank is found; none where a row's kind has no exact form.
+    rows : int
+        Random rows modulo each of them.
+    at_poses : int
+        The rank at the measured poses, by singular values.
+    smallest_kept, largest_dropped : float
+        Singular values next to it, relative to the greatest.
+    unseen : tuple of str
+        Combinations that they do not show, in words.
+    weak : tuple of str
+        Combinations of which they say less than ordinary tolerances do, in words.
+    """
+
+    rank: int
+    columns: int
+    primes: tuple[int, ...]
+    rows: int
+    at_poses: int
+    smallest_kept: float
+    largest_dropped: float
+    unseen: tuple[str, ...]
+    weak: tuple[str, ...]
+
+    def summary(self) -> str:
+        """Return the grounds of the rank in a few sentences."""
+        exact = (
+            f"Exact rank {self.rank} of {self.columns} values: a minor of that size at "
+            f"{self.rows} random rows is not zero modulo "
+            f"{' nor modulo '.join(map(str, self.primes))}, and no greater one was found."
+        )
+        here = (
+            f"At the measured poses {self.at_poses} (smallest singular value kept "
+            f"{self.smallest_kept:.1e}, largest dropped {self.largest_dropped:.1e})."
+        )
+        if self.at_poses < self.rank:
+            here += " More, or other, poses would show more."
+        return f"{exact} {here}"
+
+
+def observability_of(
+    start: Guess, given: Measurements, blocks: Sequence[Block], slopes: Array, seed: int = 0
+) -> Observability:
+    """Return what measurements show.
+
+    Parameters
+    ----------
+    start : Guess
+        The machine.
+    given : Measurements
+        What was measured, and at which readings.
+    blocks : sequence of Block
+        What is sought.
+    slopes : array, shape (R, p)
+        Of the residuals at the measured poses, in standard deviations of their noise and of the
+        tolerances: a singular value below 1 is a combination of which the tolerance says more.
+    seed : int
+        Of the random poses.
+    """
+    count = blocks[-1].where.stop
+    sizes, axes = _spectrum(slopes, count)
+    relative = sizes / max(float(sizes[0]), 1e-300)
+    here = int((relative > _ROUNDING).sum())
+    kinds = tuple(sorted({_kind(given, i) for i in range(len(given))}, key=repr))
+    rank, primes, rows = exact_rank(start, blocks, kinds, seed)
+    unknowns = [unknown for block in blocks for unknown in block.unknowns]
+    tolerances = np.array([u.tolerance if np.isfinite(u.tolerance) else 1.0 for u in unknowns])
+    names = [unknown.name for unknown in unknowns]
+    weak = [
+        f"{told(axes[k] * tolerances, names)} (the tolerance says {1.0 / sizes[k]:.2g} times more)"
+        for k in reversed(range(here))
+        if sizes[k] < 1.0
+    ]
+    return Observability(
+        here if rank is None else rank,
+        count,
+        primes,
+        rows,
+        here,
+        float(relative[here - 1]) if here else 0.0,
+        float(relative[here]) if here < count else 0.0,
+        unseen_combinations(start, blocks, axes[here:], tolerances),
+        tuple(weak[:_NAMED]),
+    )
+
+
+def _spectrum(slopes: Array, count: int) -> tuple[Array, Array]:
+    """Return all singular values and right singular vectors of slopes (R, p)."""
+    small = np.linalg.qr(slopes, mode="r") if len(slopes) > count else slopes
+    padded = np.zeros((max(count, len(small)), count))
+    padded[: len(small)] = small
+    _, sizes, axes = np.linalg.svd(padded)
+    return sizes, axes
+
+
+def _kind(given: Measurements, i: int) -> RowKind:
+    return RowKind(
+        tuple((~np.isnan(given.positions[i])).tolist()),
+        tuple((~np.isnan(given.angles[i])).tolist()),
+        bool(~np.isnan(given.heights[i])),
+        bool(~np.isnan(given.distances[i])),
+        given.marks[i],
+        given.planes[i] if ~np.isnan(given.heights[i]) else "",
+        given.anchors[i] if given.origins[i] < 0 else None,
+        given.marks[given.origins[i]] if given.origins[i] >= 0 else "",
+    )

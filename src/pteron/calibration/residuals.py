@@ -1,0 +1,332 @@
+"""What measurements miss the machine by, with slopes against all that is sought.
+
+The pose of a row is the one that its readings lead to, so that x' = -J^-1 (dq/dtheta theta'): every
+measurement, of whatever kind, is a function of that pose and of a mark on the platform.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pteron.calibration.guess import Block, Guess, across
+from pteron.calibration.measurements import Measurements, length_columns
+from pteron.calibration.variations import slope_matrix, slope_terms
+from pteron.equations.machine import numbers
+from pteron.kernels.geometry_slopes import slope_columns, slopes_kernel
+from pteron.manipulator import Manipulator
+
+Array = NDArray[np.float64]
+
+_STEPS = 12
+"""Newton's steps to a pose; from a measured or an earlier one two or three do."""
+
+_CLOSED = 1e-12
+"""Share of the machine's size that a step of Newton's is below when the pose is found."""
+
+
+class Rows(NamedTuple):
+    """Residuals (N, K) of N rows: three of position, k of angles, one of height, one of distance.
+
+    What was not measured has a residual and slopes of zero.
+    """
+
+    residuals: Array
+    """Computed minus measured."""
+    slopes: Array
+    """(N, K, p), against all unknowns."""
+    by_reading: Array
+    """(N, K, n), against the joint coordinates."""
+    measured: NDArray[np.bool_]
+    """(N, K)."""
+
+
+class MachineSlopes:
+    """Joint coordinates, poses and their slopes, for machines of one topology.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        One of them.
+    blocks : sequence of Block
+        What is sought.
+    """
+
+    def __init__(self, robot: Manipulator, blocks: Sequence[Block]) -> None:
+        self.blocks = blocks
+        self.count = blocks[-1].where.stop if blocks else 0
+        self._kernel = slopes_kernel(robot)
+        self._columns = np.array([list(part) for part in slope_columns(robot)])
+        self._round = np.array([leg.goes_round for leg in robot.legs])
+        self._changes = next((b.changes for b in blocks if b.kind == "geometry"), ())
+        self._terms = slope_terms(robot, self._changes)
+        self._owner = np.array([change.leg for change in self._changes], dtype=int)
+        platform = robot.platform
+        self.size = max(leg.size for leg in robot.legs) or 1.0
+        self._angular = np.flatnonzero(platform.angular)
+        self._lengths = length_columns(robot)
+        self._axes = np.eye(3) if len(self._lengths) in (0, 3) else np.array(platform.frame)
+
+    def poses(self, guess: Guess, joints: Array, start: Array) -> Array:
+        """Return the poses (N, m) of joint coordinates by Newton's steps; NaN where they fail."""
+        geometry, poses = np.array(numbers(guess.robot)), np.array(start)
+        left = np.arange(len(poses))
+        for _ in range(_STEPS):
+            found, jacobian, *_ = self._kernel(geometry, poses[left])
+            missed = self._wrapped(joints[left] - found)
+            step = _solved(jacobian, missed[..., None])[..., 0]
+            poses[left] += step
+            going = np.abs(step).max(axis=-1, initial=0.0) > _CLOSED * max(self.size, 1.0)
+            left = left[going | np.isnan(step).any(axis=-1)]
+            if not len(left) or np.isnan(poses[left]).any(axis=-1).all():
+                break
+        poses[left] = np.nan
+        return poses
+
+    def joints(self, guess: Guess, poses: Array) -> Array:
+        """Return the joint coordinates (N, n) at poses."""
+        return np.asarray(self._kernel(np.array(numbers(guess.robot)), poses)[0])
+
+    def jacobian(self, guess: Guess, poses: Array) -> Array:
+        """Return the joints' slopes (N, n, m) against the pose."""
+        return np.asarray(self._kernel(np.array(numbers(guess.robot)), poses)[1])
+
+    def pose_slopes(self, guess: Guess, given: Measurements, poses: Array) -> tuple[Array, Array]:
+        """Return the slopes of poses at given joints (N, m, p), and of their marks (N, 3, p)."""
+        chosen = np.arange(len(poses))
+        place, turned, slopes, by_joint = self._platform(guess, given, poses, chosen)
+        twist = slopes[:, :6], by_joint[:, :6]
+        point, moved, _ = self._marks(guess, given, chosen, place, turned, *twist)
+        lengths = np.eye(3) if len(self._lengths) == 3 else self._axes[self._lengths]
+        return np.concatenate([lengths @ slopes[:, :3], slopes[:, 6:]], axis=1), moved
+
+    def _wrapped(self, missed: Array) -> Array:
+        turned = (missed + np.pi) % (2.0 * np.pi) - np.pi
+        return np.where(self._round, turned, missed)
+
+    def rows(self, guess: Guess, given: Measurements, poses: Array, chosen: Array) -> Rows:
+        """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
+        robot, setup = guess.robot, given.setup
+        place, turned, slopes, by_joint = self._platform(guess, given, poses, chosen)
+        twist, by_twist = slopes[:, :6], by_joint[:, :6]
+        angular = self._angular
+        n, k = len(chosen), len(angular)
+        residuals = np.zeros((n, 5 + k))
+        measured = np.zeros((n, 5 + k), dtype=bool)
+        rows = np.zeros((n, 5 + k, self.count))
+        pushed = np.zeros((n, 5 + k, len(robot.legs)))
+        point, moved, by = self._marks(guess, given, chosen, place, turned, twist, by_twist)
+
+        seen = ~np.isnan(given.positions[chosen])
+        if seen.any():
+            full = np.where(seen, given.positions[chosen], 0.0) @ self._axes
+            if not setup.frame_known:
+                # In the instrument's frame: turn' (p - shift).
+                local = (point - guess.shift) @ guess.turn
+                residuals[:, :3] = (local - full) @ self._axes.T
+                moved_here = np.einsum("ji,njk->nik", guess.turn, moved)
+                frame = next(b for b in self.blocks if b.kind == "frame").where
+                moved_here[:, :, frame.start : frame.start + 3] -= guess.turn.T
+                arms = point - guess.shift
+                moved_here[:, :, frame.start + 3 : frame.stop] += guess.turn.T @ _skew(arms)
+                rows[:, :3] = np.einsum("ij,njk->nik", self._axes, moved_here)
+                pushed[:, :3] = self._axes @ (guess.turn.T @ by)
+            else:
+                residuals[:, :3] = (point - full) @ self._axes.T
+                rows[:, :3] = self._axes @ moved
+                pushed[:, :3] = self._axes @ by
+            measured[:, :3] = seen
+        if k and not np.isnan(given.angles[chosen]).all():
+            rows[:, 3 : 3 + k], pushed[:, 3 : 3 + k] = slopes[:, 6:], by_joint[:, 6:]
+            self._angles(guess, given, poses, chosen, (residuals, rows, measured))
+        over = ~np.isnan(given.heights[chosen])
+        if over.any():
+            at = 3 + k
+            planes = np.stack([guess.planes[given.planes[i]] for i in chosen])
+            normals = planes[:, :3]
+            residuals[:, at] = _dot(normals, point) - planes[:, 3] - given.heights[chosen]
+            rows[:, at] = np.einsum("ni,nik->nk", normals, moved)
+            pushed[:, at] = np.einsum("ni,nik->nk", normals, by)
+            for block in self.blocks:
+                if block.kind == "plane":
+                    here = np.array([given.planes[i] == block.name for i in chosen])
+                    tilt = across(guess.planes[block.name][:3])
+                    rows[here, at, block.where] += np.column_stack(
+                        [point[here] @ tilt, -np.ones(here.sum())]
+                    )
+            measured[:, at] = over
+        apart = ~np.isnan(given.distances[chosen])
+        if apart.any():
+            self._distances(guess, given, poses, chosen, (point, moved, by),
+                            (residuals, rows, pushed, measured))
+        for part in (residuals, rows, pushed):
+            part[~measured] = 0.0
+        return Rows(residuals, rows, pushed, measured)
+
+    def _platform(
+        self, guess: Guess, given: Measurements, poses: Array, chosen: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return P, its axes' matrix, and slopes (N, 6 + k, p) and (N, 6 + k, n).
+
+        They are those of the platform's twist and of the pose's angles.
+        """
+        robot = guess.robot
+        geometry = np.array(numbers(robot))
+        at = poses[chosen]
+        _, jacobian, raw, twists, place, turned, *shifts = self._kernel(geometry, at)
+        if not robot.platform.tilts:
+            twists = np.zeros_like(twists)
+            lengths = robot.platform.directions
+            twists[:, :3, : len(lengths)] = lengths.T
+            if robot.platform.turns:
+                twists[:, 3:, -1] = robot.platform.axis
+            place, axes = robot.platform.at(at)
+            turned = np.swapaxes(axes, -1, -2)
+        rates = np.eye(len(robot.coordinates))[self._angular]
+        moves = np.concatenate(
+            [twists, np.broadcast_to(rates, (len(at), *rates.shape))], axis=1
+        )
+        by_joint = np.swapaxes(
+            _solved(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
+        )
+        slopes = np.zeros((len(at), len(moves[0]) if len(moves) else 0, self.count))
+        matrix = slope_matrix(self._terms, geometry, len(self._changes))
+        for block in self.blocks:
+            if block.kind == "geometry":
+                if shifts:
+                    against = raw @ matrix[self._columns[0]]
+                    found = -by_joint @ against
+                    found[:, :6] += shifts[0] @ matrix[self._columns[0]]
+                else:
+                    own = matrix[self._columns[self._owner], np.arange(len(self._owner))[:, None]]
+                    against = np.einsum("nvc,vc->nv", raw[:, self._owner], own)
+                    found = -by_joint[:, :, self._owner] * against[:, None, :]
+                slopes[:, :, block.where] = found
+            elif block.kind in ("zeros", "scales"):
+                found = by_joint[:, :, list(block.legs)]
+                if block.kind == "scales":
+                    found = found * given.readings[chosen][:, None, list(block.legs)]
+                slopes[:, :, block.where] = found
+        return place, turned, slopes, by_joint
+
+    def _marks(
+        self,
+        guess: Guess,
+        given: Measurements,
+        chosen: Array,
+        place: Array,
+        turned: Array,
+        slopes: Array,
+        by_joint: Array,
+    ) -> tuple[Array, Array, Array]:
+        """Return the rows' marks (N, 3) in the base frame and their slopes."""
+        own = np.stack([guess.marks[given.marks[i]] for i in chosen])
+        arms = np.einsum("nij,nj->ni", turned, own)
+        cross = _skew(arms)
+        moved = slopes[:, :3] - cross @ slopes[:, 3:]
+        for block in self.blocks:
+            if block.kind == "mark":
+                here = np.array([given.marks[i] == block.name for i in chosen])
+                moved[here, :, block.where] += turned[here]
+        return place + arms, moved, by_joint[:, :3] - cross @ by_joint[:, 3:]
+
+    def _angles(
+        self,
+        guess: Guess,
+        given: Measurements,
+        poses: Array,
+        chosen: Array,
+        out: tuple[Array, Array, Array],
+    ) -> None:
+        """Fill in the residuals of angles, and their slopes against an unknown frame."""
+        residuals, rows, measured = out
+        angular, at = self._angular, poses[chosen]
+        seen = ~np.isnan(given.angles[chosen])
+        read = np.where(seen, given.angles[chosen], at[:, angular])
+        part = slice(3, 3 + len(angular))
+        measured[:, part] = seen
+        if given.setup.frame_known:
+            missed = at[:, angular] - read
+            residuals[:, part] = (missed + np.pi) % (2.0 * np.pi) - np.pi
+            return
+        platform, whole = guess.robot.platform, at.copy()
+        whole[:, angular] = read
+        told, now = (np.swapaxes(platform.at(x)[1], -1, -2) for x in (whole, at))
+        off = Rotation.from_matrix(now @ np.swapaxes(guess.turn @ told, -1, -2)).as_rotvec()
+        rates = self._rates(guess, at)
+        residuals[:, part] = np.einsum("nij,nj->ni", rates, off)
+        frame = next(b for b in self.blocks if b.kind == "frame").where
+        rows[:, part, frame.start + 3 : frame.stop] -= rates
+
+    def _rates(self, guess: Guess, poses: Array) -> Array:
+        """Return the matrix (N, k, 3) that takes an angular velocity to the angles' rates."""
+        platform = guess.robot.platform
+        if not platform.tilts:
+            return np.broadcast_to(np.array(platform.axis), (len(poses), 1, 3))
+        twists = self._kernel(np.array(numbers(guess.robot)), poses)[3]
+        return np.asarray(np.linalg.pinv(twists[:, 3:, self._angular]))
+
+    def _distances(
+        self,
+        guess: Guess,
+        given: Measurements,
+        poses: Array,
+        chosen: Array,
+        here: tuple[Array, Array, Array],
+        out: tuple[Array, ...],
+    ) -> None:
+        """Fill in the residuals of distances, to anchors or between rows."""
+        residuals, rows, pushed, measured = out
+        point, moved, by = (part.copy() for part in here)
+        at = residuals.shape[1] - 1
+        apart = ~np.isnan(given.distances[chosen])
+        origins = given.origins[chosen]
+        between = apart & (origins >= 0)
+        if between.any():
+            others = origins[between]
+            place, turned, slopes, by_joint = self._platform(guess, given, poses, others)
+            twist = slopes[:, :6], by_joint[:, :6]
+            end = self._marks(guess, given, others, place, turned, *twist)
+            point[between] -= end[0]
+            moved[between] -= end[1]  # of its readings' noise only this row's counts
+        for i in np.flatnonzero(apart & ~between):
+            name = given.anchors[chosen[i]]
+            point[i] -= guess.anchors[name]
+            for block in self.blocks:
+                if block.kind == "anchor" and block.name == name:
+                    moved[i, :, block.where] -= np.eye(3)
+        length = np.linalg.norm(point, axis=-1)
+        along = point / np.where(length > 0.0, length, 1.0)[:, None]
+        residuals[:, at] = length - given.distances[chosen]
+        rows[:, at] = np.einsum("ni,nik->nk", along, moved)
+        pushed[:, at] = np.einsum("ni,nik->nk", along, by)
+        measured[:, at] = apart
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Return matrix^-1 right of a stack; NaN where a matrix is singular."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        found = np.full(np.broadcast_shapes(right.shape), np.nan)
+        for i in range(len(matrix)):
+            try:
+                found[i] = np.linalg.solve(matrix[i], right[i])
+            except np.linalg.LinAlgError:
+                continue
+        return found
+
+
+def _skew(v: Array) -> Array:
+    """Return the matrices (N, 3, 3) of v x."""
+    zero = np.zeros(len(v))
+    x, y, z = v.T
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("ni,ni->n", a, b))

@@ -1,0 +1,273 @@
+"""What a calibration found: the machine, each value with its interval, and what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import norm
+
+from pteron.calibration.fit import Fit
+from pteron.calibration.guess import Block, Guess, Unknown
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.observability import Observability
+from pteron.calibration.residuals import MachineSlopes
+from pteron.legs import Reading
+from pteron.manipulator import Manipulator
+
+Array = NDArray[np.float64]
+
+Origin = Literal["data", "both", "tolerance"]
+"""What made a value: the measurements, its ordinary tolerance, or both."""
+
+Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
+
+_BY_DATA = 0.3
+"""Share of the tolerance up to which what is left of it counts as made by data."""
+
+_BY_TOLERANCE = 0.9
+"""The share from which on the tolerance made the value."""
+
+_QUANTILE = float(norm.ppf(0.975))
+
+
+@dataclass(frozen=True)
+class Value:
+    """One value of a calibration.
+
+    Attributes
+    ----------
+    name, group, unit : str
+        As in `Unknown`.
+    drawn, found : float
+        In SI units; of a direction what it turned about an axis, rad.
+    deviation : float
+        Standard deviation.
+    origin : {"data", "both", "tolerance"}
+        What made it.
+    """
+
+    name: str
+    group: str
+    unit: str
+    drawn: float
+    found: float
+    deviation: float
+    origin: Origin
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Where it is with 95 %."""
+        half = _QUANTILE * self.deviation
+        return self.found - half, self.found + half
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the geometry can be trusted, with reasons and advice."""
+
+    grade: Grade
+    reasons: tuple[str, ...]
+    next_steps: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Root mean square errors at rows that the fit did not see, by kind, before and after; SI."""
+
+    rows: int
+    before: dict[str, float]
+    after: dict[str, float]
+    expected: dict[str, float]
+    """After, from the noise and the intervals."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A fault that the measurements show: a kind, where, and a sentence."""
+
+    kind: str
+    text: str
+    improvement: float = 0.0
+    """By how much the squared residuals fall with it, in variances."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A machine's geometry from measurements.
+
+    Attributes
+    ----------
+    drawn : Manipulator
+        The machine as it was given.
+    robot : Manipulator
+        The machine as it was found; its legs hold the readings' zeros and scales.
+    values : tuple of Value
+    noise : dict
+        Standard deviation by kind of measurement, given or found.
+    observability : Observability
+        What the measurements can show.
+    held_out : HeldOut or None
+        Errors at rows that were not fitted.
+    findings : tuple of Finding
+        Faults that the residuals show.
+    verdict : Verdict
+    measurements : Measurements
+    fit : Fit
+        Of all rows.
+    blocks : tuple of Block
+        What was sought, in the order of `values`.
+    start : Guess
+        The machine as drawn, with its surroundings as described.
+    """
+
+    drawn: Manipulator
+    robot: Manipulator
+    values: tuple[Value, ...]
+    noise: dict[str, float]
+    observability: Observability
+    held_out: HeldOut | None
+    findings: tuple[Finding, ...]
+    verdict: Verdict
+    measurements: Measurements
+    fit: Fit
+    blocks: tuple[Block, ...]
+    start: Guess
+
+    def errors(self, poses: ArrayLike) -> tuple[Array, Array]:
+        """Return where the tool goes wrong at poses: by how much as drawn, and what stays open.
+
+        Parameters
+        ----------
+        poses : array, shape (N, m)
+            Poses that are asked for, m and rad.
+
+        Returns
+        -------
+        before : array, shape (N, 3)
+            From where the tool is asked to be to where the found machine takes it when it is driven
+            as drawn, in the base frame, m; NaN where it cannot go.
+        after : array, shape (N,)
+            Standard deviation of the tool's place when driven as found, m.
+        """
+        asked = np.atleast_2d(np.asarray(poses, dtype=float))
+        slopes = MachineSlopes(self.drawn, self.blocks)
+        rest = Measurements.of(self.drawn, np.zeros((len(asked), len(self.drawn.legs))))
+        joints = slopes.joints(self.start, asked)
+        readings = (joints - self.start.zeros) / self.start.scales
+        rest = replace(rest, readings=readings)
+        found = self.fit.guess
+        gone = slopes.poses(found, found.joints(readings), asked)
+        before = self._tool(found, gone) - self._tool(self.start, asked)
+        moved = slopes.pose_slopes(found, rest, np.where(np.isfinite(gone), gone, asked))[1]
+        covariance = np.einsum("nip,pq,niq->n", moved, self.fit.covariance, moved, optimize=True)
+        return before, np.sqrt(np.maximum(covariance, 0.0))
+
+    def _tool(self, guess: Guess, poses: Array) -> Array:
+        place, axes = guess.robot.platform.at(poses)
+        return np.asarray(place + np.einsum("nij,i->nj", axes, guess.marks[""]))
+
+    def misfit(self, other: Guess | Sequence[float]) -> float:
+        """Return by how much the squared residuals and tolerances grow from here to other values.
+
+        Below the chi-squared quantile of as many degrees as there are values, the other values are
+        in the joint region of that probability. Steps from the drawing are given in the order of
+        `values`.
+        """
+        from pteron.calibration.fit import Fitter
+
+        steps = np.asarray(other, dtype=float)
+        fitter = Fitter(self.measurements, self.blocks, self.start, self.fit.poses)
+        there = self.start.moved(self.blocks, steps)
+        return fitter.cost(there, steps, self.fit) - fitter.cost(
+            self.fit.guess, self.fit.total, self.fit
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the calibration as plain data, as `calibration.json` has it."""
+        return {
+            "name": self.drawn.name,
+            "values": [
+                {**asdict(value), "interval": list(value.interval)} for value in self.values
+            ],
+            "zeros": self.fit.guess.zeros.tolist(),
+            "scales": self.fit.guess.scales.tolist(),
+            "noise": self.noise,
+            "rank": self.observability.rank,
+            "columns": self.observability.columns,
+            "certificate": self.observability.summary(),
+            "unseen": list(self.observability.unseen),
+            "weak": list(self.observability.weak),
+            "held_out": None if self.held_out is None else asdict(self.held_out),
+            "findings": [asdict(finding) for finding in self.findings],
+            "verdict": asdict(self.verdict),
+            "outliers": [
+                self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)
+            ],
+        }
+
+
+def values_of(start: Guess, fit: Fit, blocks: Sequence[Block]) -> tuple[Value, ...]:
+    """Return all values of a fit."""
+    found: list[Value] = []
+    deviations = np.sqrt(np.diag(fit.covariance))
+    for block in blocks:
+        for k, unknown in enumerate(block.unknowns):
+            at = block.where.start + k
+            drawn = _drawn(start, block, k)
+            now = drawn + float(fit.total[at])
+            left = deviations[at] / unknown.tolerance if np.isfinite(unknown.tolerance) else 0.0
+            found.append(
+                Value(
+                    unknown.name, unknown.group, unknown.unit, drawn, now,
+                    float(deviations[at]), _origin(left, unknown),
+                )
+            )
+    return tuple(found)
+
+
+def _origin(left: float, unknown: Unknown) -> Origin:
+    if left <= _BY_DATA or unknown.group == "setup":
+        return "data"
+    return "tolerance" if left >= _BY_TOLERANCE else "both"
+
+
+def _drawn(start: Guess, block: Block, k: int) -> float:
+    if block.kind in ("zeros", "scales"):
+        return float(getattr(start, block.kind)[block.legs[k]])
+    if block.kind == "mark":
+        return float(start.marks[block.name][k])
+    if block.kind == "anchor":
+        return float(start.anchors[block.name][k])
+    if block.kind == "plane":
+        return float(start.planes[block.name][3]) if k == 2 else 0.0
+    if block.kind == "frame":
+        return float(start.shift[k]) if k < 3 else 0.0
+    change = block.changes[k]
+    if change.group not in ("points", "lengths"):
+        return 0.0
+    value = getattr(start.robot.legs[change.leg], change.key)
+    return float(value if change.axis is None else value[change.axis])
+
+
+def calibrated(guess: Guess) -> Manipulator:
+    """Return the machine of a guess; its geometry takes the zeros that it can."""
+    legs = []
+    for leg, zero, scale in zip(
+        guess.robot.legs, guess.zeros.tolist(), guess.scales.tolist(), strict=True
+    ):
+        taken = leg.with_zero(zero) if scale == 1.0 else None
+        if taken is not None:
+            legs.append(replace(taken, reading=None))
+        elif zero == 0.0 and scale == 1.0:
+            legs.append(replace(leg, reading=None))
+        else:
+            legs.append(replace(leg, reading=Reading(zero, scale)))
+    robot = replace(guess.robot, legs=tuple(legs))
+    tool = tuple(guess.marks[""].tolist())
+    if any(tool) or robot.platform.tool:
+        robot = replace(robot, platform=replace(robot.platform, tool=tool))
+    return robot

@@ -1,0 +1,102 @@
+"""Where a calibration begins: poses that the readings lead to on the machine as drawn, and frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pteron.calibration.guess import Guess
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.residuals import MachineSlopes
+from pteron.errors import DataError
+from pteron.kinematics import direct_kinematics
+from pteron.workspace.home import home_pose
+
+Array = NDArray[np.float64]
+
+_FEW = 3
+"""Positions that fix a frame, unless they are in line."""
+
+_PLANE = 3
+"""Marks of heights that fix a plane."""
+
+
+def starting_poses(guess: Guess, given: Measurements) -> Array:
+    """Return the pose (N, m) of each row on the machine as drawn.
+
+    It is the one that Newton's method finds from the measured pose, or from the home pose, if no
+    singularity lies between; else the nearest to home of all that the joints allow.
+
+    Raises
+    ------
+    DataError
+        If a row's readings lead to no pose.
+    """
+    robot, joints = guess.robot, guess.joints(given.readings)
+    home = home_pose(robot)
+    slopes = MachineSlopes(robot, ())
+    side = np.sign(np.linalg.det(slopes.jacobian(guess, home[None])))
+    begin = np.tile(home, (len(given), 1))
+    seen = ~np.isnan(given.angles)
+    begin[:, robot.platform.angular] = np.where(
+        seen, given.angles, begin[:, robot.platform.angular]
+    )
+    lengths = ["xyz".index(name) for name in robot.coordinates if name in "xyz"]
+    places = given.positions[:, lengths]
+    if given.setup.frame_known:
+        at = np.flatnonzero(~robot.platform.angular)
+        begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
+    poses = slopes.poses(guess, joints, begin)
+    other = np.isnan(poses).any(axis=-1)
+    other |= np.sign(np.linalg.det(slopes.jacobian(guess, poses))) != side
+    other |= np.abs(poses - begin)[:, ~robot.platform.angular].max(axis=-1, initial=0) > slopes.size
+    for i in np.flatnonzero(other):
+        modes = direct_kinematics(robot, joints[i])
+        modes = modes[~np.isnan(modes).any(axis=-1)]
+        if not len(modes):
+            raise DataError(
+                f"{given.places[i]}: the readings {np.round(given.readings[i], 6).tolist()} lead "
+                f"to no pose of {robot.name} as drawn; check their units, zeros and order"
+            )
+        same = np.sign(np.linalg.det(slopes.jacobian(guess, modes))) == side
+        modes = modes[same] if same.any() else modes
+        poses[i] = modes[np.abs(modes - begin[i]).max(axis=-1).argmin()]
+    return poses
+
+
+def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
+    """Return the guess with frames and planes that are not known where the drawing puts them."""
+    robot = guess.robot
+    place, axes = robot.platform.at(poses)
+    own = np.stack([guess.marks[name] for name in given.marks])
+    points = place + np.einsum("nij,ni->nj", axes, own)
+    seen = ~np.isnan(given.positions).any(axis=-1)
+    if not given.setup.frame_known and seen.sum() >= _FEW:
+        fixed = np.array([_is_known(given, name) for name in given.marks])[seen]
+        used = np.flatnonzero(seen)[fixed] if fixed.sum() >= _FEW else np.flatnonzero(seen)
+        p, y = points[used], given.positions[used]
+        turn, _ = Rotation.align_vectors(p - p.mean(axis=0), y - y.mean(axis=0))
+        matrix = turn.as_matrix()
+        guess = replace(guess, turn=matrix, shift=p.mean(axis=0) - matrix @ y.mean(axis=0))
+    planes = dict(guess.planes)
+    over = ~np.isnan(given.heights)
+    for name, plane in given.setup.planes.items():
+        here = over & np.array([which == name for which in given.planes])
+        if plane.known or not here.any():
+            continue
+        # n . p - d = h, as near to the described normal as three heights allow.
+        normal = np.array(plane.normal)
+        rows = np.column_stack([points[here], -np.ones(here.sum())])
+        if here.sum() >= _PLANE and np.linalg.matrix_rank(rows - rows.mean(axis=0), 1e-3) >= 2:
+            step = np.linalg.lstsq(rows, given.heights[here] - points[here] @ normal, rcond=1e-3)
+            normal = normal + step[0][:3]
+            normal = normal / np.linalg.norm(normal)
+        planes[name] = np.append(normal, np.median(points[here] @ normal - given.heights[here]))
+    return replace(guess, planes=planes)
+
+
+def _is_known(given: Measurements, name: str) -> bool:
+    return name not in given.setup.marks or given.setup.marks[name].known

@@ -1,0 +1,191 @@
+"""Combinations of values that measurements do not show, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.calibration.guess import Block, Guess
+
+Array = NDArray[np.float64]
+
+_PART = 0.02
+"""Share of a combination's greatest part from which a part is named."""
+
+_NAMED = 6
+"""Most values that are named of a combination."""
+
+_INSIDE = 1e-5
+"""Share of a combination outside the unseen ones up to which it is one of them."""
+
+
+def unseen_combinations(
+    start: Guess, blocks: Sequence[Block], axes: Array, tolerances: Array
+) -> tuple[str, ...]:
+    """Return the combinations that rows of `axes` span, in words, and how many each line stands for.
+
+    Parameters
+    ----------
+    start : Guess
+        The machine.
+    blocks : sequence of Block
+        What is sought.
+    axes : array, shape (u, p)
+        Orthonormal, in units of the tolerances.
+    tolerances : array, shape (p,)
+        Those units.
+    """
+    lines: dict[str, list[str]] = {}
+    left = axes
+    for text, whose, vector in _known(start, blocks):
+        scaled = vector / tolerances
+        size = np.linalg.norm(scaled)
+        if not len(left) or not size > 0.0:
+            continue
+        scaled = scaled / size
+        if np.linalg.norm(scaled - axes.T @ (axes @ scaled)) > _INSIDE:
+            continue
+        # What is left is at right angles to what was named.
+        along = left @ scaled
+        if np.linalg.norm(along) < _INSIDE:
+            continue
+        _, _, rest = np.linalg.svd(along[None])
+        left = rest[1:] @ left
+        lines.setdefault(text, []).append(whose)
+    told_lines = []
+    for text, whose in lines.items():
+        owners = list(dict.fromkeys(filter(None, whose)))
+        of = f", of {', '.join(owners)}" if owners else ""
+        told_lines.append(f"{text}{of} ({len(whose)})")
+    names = [unknown.name for block in blocks for unknown in block.unknowns]
+    return (*told_lines, *(told(row * tolerances, names) for row in _sparse(left)))
+
+
+def told(vector: Array, names: Sequence[str]) -> str:
+    """Return a combination in words: its greatest parts, for a greatest one of 1."""
+    parts = vector / vector[np.abs(vector).argmax()]
+    order = np.argsort(-np.abs(parts), kind="stable")
+    named = [k for k in order if abs(parts[k]) >= _PART]
+    text = " ".join(
+        f"{'-' if parts[k] < 0 else '+'} {'' if abs(parts[k]) > 0.9995 else f'{abs(parts[k]):.2g} '}"
+        f"{names[k]}"
+        for k in named[:_NAMED]
+    ).removeprefix("+ ")
+    more = len(named) - _NAMED
+    return text + (f" and {more} more" if more > 0 else "")
+
+
+def _known(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Array]]:
+    """Yield combinations that have a name: text, whose, and the vector (p,)."""
+    robot = start.robot
+    names = [unknown.name for block in blocks for unknown in block.unknowns]
+    place = {name: k for k, name in enumerate(names)}
+
+    def vector(**parts: float) -> Array:
+        found = np.zeros(len(names))
+        for name, value in parts.items():
+            if value:
+                found[place[name]] = value
+        return found
+
+    for name, k in place.items():
+        yield "never shows", name, np.eye(len(names))[k]
+    frame = np.array(robot.platform.frame)
+    for i, leg in enumerate(robot.legs, start=1):
+        base, own = f"legs[{i}].guide_point", f"legs[{i}].platform_point"
+        if not all(f"{key}.{a}" in place for key in (base, own) for a in "xyz"):
+            continue
+        for axis in range(3):
+            turned = frame[:, axis] if robot.platform.angles or robot.platform.tilts else frame[:, axis]
+            parts = {f"{base}.{'xyz'[axis]}": 1.0}
+            parts |= {f"{own}.{a}": float(v) for a, v in zip("xyz", turned, strict=True)}
+            yield (
+                "guide_point and platform_point show as their difference only",
+                f"leg {i}",
+                vector(**parts),
+            )
+        zero = f"zeros[{i}]"
+        if leg.joint.unit == "m" and leg.joint_axis is not None and zero in place:
+            parts = {f"{base}.{a}": -v for a, v in zip("xyz", leg.joint_axis, strict=True)}
+            yield (
+                "a zero and the guide point's place along its slider are one",
+                f"leg {i}",
+                vector(**parts, **{zero: 1.0}),
+            )
+    for block in blocks:
+        if block.kind == "frame":
+            yield from _rigid(start, blocks, names)
+    yield "the size of all: a measured length gives it", "", _size(start, blocks)
+
+
+def _rigid(start: Guess, blocks: Sequence[Block], names: Sequence[str]) -> Iterator[tuple[str, str, Array]]:
+    """Yield motions of the whole machine against an instrument whose frame is not known."""
+    text = "where the machine's own frame stands in the base"
+    for turn, axis in ((turn, axis) for turn in (False, True) for axis in range(3)):
+        along = np.eye(3)[axis]
+        found = np.zeros(len(names))
+        for block in blocks:
+            part = found[block.where]
+            if block.kind == "geometry":
+                for k, change in enumerate(block.changes):
+                    leg = start.robot.legs[change.leg]
+                    if change.key == "guide_point":
+                        moved = np.cross(along, leg.guide_point) if turn else along
+                        part[k] = moved[change.axis or 0]
+                    elif change.group == "directions" and turn:
+                        part[k] = np.array(start.robot.platform.frame)[change.axis or 0][axis]
+            elif block.kind == "frame":
+                moved = np.cross(along, start.shift) if turn else along
+                part[:3] = moved
+                part[3:] = along if turn else 0.0
+        yield text, "", found
+
+
+def _size(start: Guess, blocks: Sequence[Block]) -> Array:
+    """Return all lengths growing alike."""
+    found = []
+    for block in blocks:
+        for k, unknown in enumerate(block.unknowns):
+            value = 0.0
+            if block.kind == "geometry":
+                change = block.changes[k]
+                held = getattr(start.robot.legs[change.leg], change.key)
+                if unknown.unit == "m":
+                    value = held if change.axis is None else held[change.axis]
+            elif unknown.unit == "m":
+                kinds = {"zeros": start.zeros, "mark": None, "plane": None}
+                if block.kind in kinds:
+                    value = _length(start, block, k)
+            elif block.kind == "scales" and start.robot.legs[block.legs[k]].joint.unit == "m":
+                value = start.scales[block.legs[k]]
+            found.append(float(value))
+    return np.array(found)
+
+
+def _length(start: Guess, block: Block, k: int) -> float:
+    if block.kind == "zeros":
+        return float(start.zeros[block.legs[k]])
+    if block.kind == "mark":
+        return float(start.marks[block.name][k])
+    return float(start.planes[block.name][3])
+
+
+def _sparse(rows: Array) -> Array:
+    """Return rows that span the same with as few parts as elimination leaves."""
+    work, top = rows.copy(), 0
+    for column in np.argsort(-np.abs(work).max(axis=0, initial=0.0), kind="stable"):
+        if top == len(work):
+            break
+        pivot = top + int(np.abs(work[top:, column]).argmax())
+        if abs(work[pivot, column]) < 1e-6:
+            continue
+        work[[top, pivot]] = work[[pivot, top]]
+        work[top] /= work[top, column]
+        for i in range(len(work)):
+            if i != top:
+                work[i] -= work[i, column] * work[top]
+        top += 1
+    work[np.abs(work) < 1e-6 * np.abs(work).max(axis=1, initial=1e-300, keepdims=True)] = 0.0
+    return work[:top]

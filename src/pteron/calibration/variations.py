@@ -1,0 +1,208 @@
+"""The ways in which a machine's geometry may differ from its drawing, and machines that differ so.
+
+Points, lengths and directions of every leg vary, as `LegKind.quantities` names them; a direction
+turns, and takes with it what is perpendicular to it by definition. What the machine's kind does not
+allow, as a planar leg's axis to leave its plane's normal, does not vary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pteron.errors import ModelError
+from pteron.legs import LegKind
+from pteron.manipulator import Manipulator
+
+Array = NDArray[np.float64]
+
+Group = Literal["zeros", "scales", "lengths", "points", "directions", "tool"]
+"""What a user frees, and gives a tolerance, as one."""
+
+_TRIED = 1e-3
+"""m or rad by which each variation is tried: a machine that this makes impossible keeps to it."""
+
+_ALONG = 1e-9
+"""An axis whose cosine with a direction is within this of 1 is along it."""
+
+_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One way in which one leg's geometry may differ.
+
+    Attributes
+    ----------
+    leg : int
+        From 0.
+    key : str
+        The key of the robot's file that changes.
+    axis : int or None
+        Which component of a point; about which axis of the platform's frame a direction turns; None
+        for a length.
+    group : str
+        "points", "lengths" or "directions".
+    """
+
+    leg: int
+    key: str
+    axis: int | None
+    group: Group
+
+    @property
+    def name(self) -> str:
+        """Its name: "legs[2].guide_point.x", "legs[2].direction about z"."""
+        place = f"legs[{self.leg + 1}].{self.key}"
+        if self.axis is None:
+            return place
+        return f"{place}{' about ' if self.group == 'directions' else '.'}{_AXES[self.axis]}"
+
+    @property
+    def unit(self) -> str:
+        """Its unit, "m" or "rad"."""
+        return "rad" if self.group == "directions" else "m"
+
+
+@lru_cache(maxsize=32)
+def variations(robot: Manipulator) -> tuple[Variation, ...]:
+    """Return the ways in which a machine's geometry may differ, leg by leg."""
+    found: list[Variation] = []
+    for i, leg in enumerate(robot.legs):
+        for quantity in leg.quantities:
+            role, key = quantity.role, quantity.name
+            if role == "length":
+                found.append(Variation(i, key, None, "lengths"))
+            elif role == "point":
+                found += [Variation(i, key, axis, "points") for axis in range(3)]
+            elif role == "direction" and getattr(leg, key, None) is not None:
+                # A turn about itself changes nothing.
+                along = np.abs(np.array(robot.platform.frame) @ quantity.value)
+                axes = [axis for axis in range(3) if _turns(robot, i, key, axis, along[axis])]
+                if len(axes) == 3:
+                    axes.remove(int(along.argmax()))
+                found += [Variation(i, key, axis, "directions") for axis in axes]
+        found += [Variation(i, "platform_point", axis, "points") for axis in range(3)]
+    return tuple(v for v in found if v.group != "points" or _possible(robot, v))
+
+
+def _turns(robot: Manipulator, leg: int, key: str, axis: int, along: float) -> bool:
+    return along < 1.0 - _ALONG and _possible(robot, Variation(leg, key, axis, "directions"))
+
+
+def _possible(robot: Manipulator, variation: Variation) -> bool:
+    try:
+        varied(robot, (variation,), np.array([_TRIED]))
+    except ModelError:
+        return False
+    return True
+
+
+def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> Manipulator:
+    """Return a machine whose geometry differs by the given amounts, m and rad.
+
+    Raises
+    ------
+    ModelError
+        If there is no such machine.
+    """
+    frame = np.array(robot.platform.frame)
+    new: list[dict[str, Any]] = [{} for _ in robot.legs]
+    turns: dict[tuple[int, str], Array] = {}
+    for change, amount in zip(changes, amounts.tolist(), strict=True):
+        leg, fields = robot.legs[change.leg], new[change.leg]
+        if change.group == "directions":
+            turn = turns.setdefault((change.leg, change.key), np.zeros(3))
+            turn += amount * frame[change.axis or 0]
+        elif change.axis is None:
+            fields[change.key] = getattr(leg, change.key) + amount
+        else:
+            point = list(fields.get(change.key, getattr(leg, change.key)))
+            point[change.axis] += amount
+            fields[change.key] = tuple(point)
+    for (i, key), turn in turns.items():
+        matrix = Rotation.from_rotvec(turn).as_matrix()
+        for name in turning_with(robot.legs[i], key):
+            vector = np.array(new[i].get(name, getattr(robot.legs[i], name)))
+            new[i][name] = tuple((matrix @ vector).tolist())
+    legs = tuple(replace(leg, **fields) for leg, fields in zip(robot.legs, new, strict=True))
+    return replace(robot, legs=legs)
+
+
+def turning_with(leg: LegKind, key: str) -> list[str]:
+    """Return the fields of a leg that turn with one of its directions: first that itself."""
+    keys, roles = leg.every_key(), {q.name: q.role for q in leg.quantities}
+    first = next(name for name, role in roles.items() if role == "direction")
+    followers = [
+        name
+        for name, held in keys.items()
+        if held.role == "direction"
+        and name != key
+        and getattr(leg, name) is not None
+        and (held.across == key or (key == first and roles.get(name) == "normal"))
+    ]
+    return [key, *followers]
+
+
+@dataclass(frozen=True)
+class Term:
+    """An entry of d(geometry)/d(variation): a product of numbers of the geometry, or 1.
+
+    The geometry is the vector of `equations.machine.numbers`; so the slopes are known in any field.
+    """
+
+    row: int
+    variation: int
+    factors: tuple[int, ...]
+    sign: int
+
+
+def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
+    """Return the slopes of a machine's geometry against its variations."""
+    places: list[dict[str, int]] = []
+    start = 0
+    for leg in robot.legs:
+        places.append({})
+        for q in leg.quantities:
+            places[-1][q.name] = start
+            start += len(q.value)
+        places[-1]["platform_point"] = start
+        start += 6
+    found: list[Term] = []
+    for k, change in enumerate(changes):
+        leg, at = robot.legs[change.leg], places[change.leg]
+        if change.group != "directions":
+            found.append(Term(at[change.key] + (change.axis or 0), k, (), 1))
+            continue
+        axis = start + 3 * (change.axis or 0)
+        names = [key for key in turning_with(leg, change.key) if key in at]
+        if change.key == _first_direction(leg):  # so do axes that are derived from it
+            derived = ("direction", "normal")
+            names += [
+                q.name
+                for q in leg.quantities
+                if q.role in derived and q.name not in names and not getattr(leg, q.name, None)
+            ]
+        for name in names:
+            for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                found.append(Term(at[name] + a, k, (axis + b, at[name] + c), 1))
+                found.append(Term(at[name] + a, k, (axis + c, at[name] + b), -1))
+    return found
+
+
+def _first_direction(leg: LegKind) -> str:
+    return next(q.name for q in leg.quantities if q.role == "direction")
+
+
+def slope_matrix(terms: Sequence[Term], geometry: Array, count: int) -> Array:
+    """Return d(geometry)/d(variations) (g, count) in floating point."""
+    matrix = np.zeros((len(geometry), count))
+    for term in terms:
+        matrix[term.row, term.variation] += term.sign * np.prod(geometry[list(term.factors)])
+    return matrix

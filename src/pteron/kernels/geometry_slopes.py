@@ -1,0 +1,91 @@
+"""Joint coordinates with their slopes against the pose and against the machine's geometry.
+
+The geometry, as `equations.machine.numbers` has it, is an input: calibration moves it, and exact
+arithmetic tells what of it measurements show.
+"""
+
+from __future__ import annotations
+
+from itertools import accumulate
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.equations.machine import Machine
+from pteron.kernels.choice import Adaptive, adaptive
+from pteron.kernels.kept import Program, kept
+from pteron.kernels.kernel import Port
+from pteron.kernels.programs import bare
+from pteron.manipulator import Manipulator, RobotLike
+
+
+def slopes_program(robot: RobotLike) -> Program:
+    """Return the function of `geometry` and `pose` for the machines of a robot's topology.
+
+    Its outputs: `joints` (n,); `jacobian` (n, m), their slopes against the pose; `slopes` (n, k),
+    each leg's against those numbers of the geometry that `slope_columns` names; `twists` (6, m),
+    the platform's twist against the pose's rates; `place` (3,) of P and `axes` (3, 3), the columns
+    of its rotation. Where planes hold the platform also `shifts` (6, k): its twist, at a given
+    pose, against the geometry.
+    """
+    layout = bare(robot)
+    return kept(_key(layout), lambda: _built(layout))
+
+
+def slopes_kernel(robot: RobotLike) -> Adaptive:
+    """Return the kernel of that function."""
+    layout = bare(robot)
+    return adaptive(_key(layout), lambda: _built(layout))
+
+
+def slope_columns(robot: Manipulator) -> list[range]:
+    """Return, for each leg, the numbers of the geometry that its slopes are against.
+
+    All legs have as many: those of a shorter leg include some of its neighbour's, whose slopes are
+    zero. Where planes hold the platform every leg's coordinate hangs on all legs.
+    """
+    sizes = [sum(len(q.value) for q in leg.quantities) + 6 for leg in robot.legs]
+    total, most = sum(sizes), max(sizes)
+    if robot.platform.planes:
+        return [range(total)] * len(sizes)
+    starts = (min(start, total - most) for start in accumulate(sizes[:-1], initial=0))
+    return [range(start, start + most) for start in starts]
+
+
+def _key(layout: Manipulator) -> tuple[str, Manipulator]:
+    return "geometry_slopes", layout
+
+
+def _built(layout: Manipulator) -> Program:
+    machine, geometry = Machine.symbols(layout)
+    pose = ca.SX.sym("pose", layout.freedom)
+    state = machine.state(pose)
+    joints = ca.vertcat(*(leg.coordinate for leg in state.legs))
+    slopes = ca.jacobian(joints, geometry)
+    parts = [slopes[i, list(part)] for i, part in enumerate(slope_columns(layout))]
+    found: dict[str, Expression] = {
+        "joints": joints,
+        "jacobian": ca.jacobian(joints, pose),
+        "slopes": ca.vertcat(*parts),
+        "twists": state.platform.twist_rows,
+        "place": state.platform.body.position,
+        "axes": state.platform.axes,
+    }
+    if layout.platform.planes:
+        axes = ca.horzsplit(state.platform.axes)
+        count = slope_columns(layout)[0].stop
+        moved = ca.jacobian(state.platform.body.position, geometry)[:, :count]
+        turned = [ca.jacobian(axis, geometry)[:, :count] for axis in axes]
+        pairs = zip(axes, turned, strict=True)
+        found["shifts"] = ca.vertcat(moved, sum(ca.mtimes(ca.skew(a), da) for a, da in pairs) / 2)
+    given = {"geometry": geometry, "pose": pose}
+    outputs = [ca.densify(value).T for value in found.values()]
+    function = ca.Function(
+        "geometry_slopes", list(given.values()), ca.cse(outputs), list(given), list(found)
+    )
+    inputs = Port("geometry", geometry.shape[:1], shared=True), Port("pose", pose.shape[:1])
+    ports = tuple(
+        Port(name, value.shape if value.shape[1] > 1 else value.shape[:1])
+        for name, value in found.items()
+    )
+    return Program("geometry_slopes", function, inputs, ports)
