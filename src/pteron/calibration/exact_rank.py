@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -11,9 +11,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.axial import AXIAL
 from pteron.calibration.guess import Block, Guess, across
-from pteron.calibration.variations import slope_terms
+from pteron.calibration.variations import AXIAL, slope_terms
 from pteron.kernels import NoSquareRoot, PrimeField, evaluate, general_program
 from pteron.kernels.geometry_slopes import slope_columns, slopes_program
 from pteron.kernels.programs import bare
@@ -55,7 +54,7 @@ class RowKind(NamedTuple):
 def exact_rank(
     start: Guess, blocks: Sequence[Block], kinds: Sequence[RowKind], seed: int
 ) -> tuple[int | None, tuple[int, ...], int]:
-    """Return the rank, the primes and the number of rows; None where something has no exact form."""
+    """Return rank, primes and number of rows; None for a rank where something has no exact form."""
     free = [c for block in blocks for c in block.changes]
     if any(change.group in AXIAL for change in free):
         return None, (), 0
@@ -109,8 +108,10 @@ class _Drawn:
         self.angular = [leg.joint.unit == "rad" for leg in robot.legs]
         symbols = whole.sx_in()
         outputs = whole.call(symbols)
-        joints = [ca.SX(0) if round_ else q for q, round_ in zip(
-            ca.horzsplit(outputs[0]), self.angular, strict=True)]
+        joints = [
+            ca.SX(0) if round_ else q
+            for q, round_ in zip(ca.horzsplit(outputs[0]), self.angular, strict=True)
+        ]
         self.program = ca.Function("slopes", symbols, [ca.horzcat(*joints), *outputs[1:]])
         self.columns = slope_columns(self.layout)
         self.changes = next((b.changes for b in blocks if b.kind == "geometry"), ())
@@ -147,13 +148,17 @@ class _Drawn:
                 for k, row in enumerate(_skew(point)):
                     for j, value in enumerate(row):
                         rows[k][frame.start + 3 + j] += value
-            found += [self._along(axis, rows) for axis, seen in zip(
-                base @ own.T, kind.positions, strict=True) if seen]
+            found += [
+                self._along(axis, rows)
+                for axis, seen in zip(base @ own.T, kind.positions, strict=True)
+                if seen
+            ]
         if any(kind.angles):
             angular = np.flatnonzero(robot.platform.angular).tolist()
             if frame is None:
-                found += [state.poses[k] for k, seen in zip(angular, kind.angles, strict=True)
-                          if seen]
+                found += [
+                    state.poses[k] for k, seen in zip(angular, kind.angles, strict=True) if seen
+                ]
             else:
                 turning = [list(row) for row in state.slopes[3:]]
                 for k in range(3):
@@ -169,7 +174,8 @@ class _Drawn:
                     for k, tilt in enumerate(across(plane[:3]).T):
                         weights = self._numbers(own @ tilt)
                         row[block.where.start + k] = sum(
-                            a * b for a, b in zip(weights, point, strict=True))
+                            a * b for a, b in zip(weights, point, strict=True)
+                        )
                     row[block.where.start + 2] = -1
             found.append(row)
         if kind.distance:
@@ -190,8 +196,9 @@ class _Drawn:
                         for j, value in enumerate(self._numbers(row)):
                             shifted[k][block.where.start + j] = value
         weights = [a - b for a, b in zip(point, other, strict=True)]
-        apart = [[a - b for a, b in zip(x, y, strict=True)]
-                 for x, y in zip(moved, shifted, strict=True)]
+        apart = [
+            [a - b for a, b in zip(x, y, strict=True)] for x, y in zip(moved, shifted, strict=True)
+        ]
         return _combined(weights, apart)
 
     def _state(self) -> _State:
@@ -241,8 +248,11 @@ class _Drawn:
             for k in range(6):
                 for j, step in enumerate(self.steps):
                     at = j + next(b.where.start for b in self.blocks if b.kind == "geometry")
-                    moved[k][at] += sum(value * shifts[0][k * width + row]
-                                        for row, value in step.items() if row < width)
+                    moved[k][at] += sum(
+                        value * shifts[0][k * width + row]
+                        for row, value in step.items()
+                        if row < width
+                    )
         return _State(place, turned, rows, poses, [[v % p for v in row] for row in moved])
 
     def _turning(self, pose: list[int]) -> tuple[Matrix, Matrix, list[int]]:
@@ -255,12 +265,14 @@ class _Drawn:
         if len(names) < 3:
             lengths = [along[name] for name in names]
         rows = [[axis[i] for axis in lengths] for i in range(3)] + [[0] * len(lengths)] * 3
-        place = [sum(c * axis[i] for c, axis in zip(pose, lengths, strict=False)) % p
-                 for i in range(3)]
+        place = [
+            sum(c * axis[i] for c, axis in zip(pose, lengths, strict=False)) % p for i in range(3)
+        ]
         cos, sin = 1, 0
         if robot.platform.turns:
-            rows = [[*row, 0] for row in rows[:3]] + [[*row, value] for row, value in zip(
-                rows[3:], k, strict=True)]
+            rows = [[*row, 0] for row in rows[:3]] + [
+                [*row, value] for row, value in zip(rows[3:], k, strict=True)
+            ]
             t = pose[-1]
             over = pow(1 + t * t, -1, p)
             cos, sin = (1 - t * t) * over % p, 2 * t * over % p
@@ -292,8 +304,9 @@ class _Drawn:
 
 
 def _combined(weights: Sequence[int], rows: Matrix) -> list[int]:
-    return [sum(w * row[k] for w, row in zip(weights, rows, strict=True))
-            for k in range(len(rows[0]))]
+    return [
+        sum(w * row[k] for w, row in zip(weights, rows, strict=True)) for k in range(len(rows[0]))
+    ]
 
 
 def _skew(v: Sequence[int]) -> Matrix:

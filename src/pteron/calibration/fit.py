@@ -155,8 +155,19 @@ class Fitter:
             if alike and (fine == kept).all():
                 break
             noise, kept = found, fine
-        return Fit(guess, total, covariance, sums.matrix, noise, sums.poses, sums.residuals,
-                   sums.measured, sums.distances, kept, steps)
+        return Fit(
+            guess,
+            total,
+            covariance,
+            sums.matrix,
+            noise,
+            sums.poses,
+            sums.residuals,
+            sums.measured,
+            sums.distances,
+            kept,
+            steps,
+        )
 
     def _settled(
         self, guess: Guess, total: Array, poses: Array, noise: dict[str, float], kept: Array
@@ -229,8 +240,9 @@ class Fitter:
             limit = np.sqrt(chi2.ppf(_DOUBTED, np.maximum(at.measured.sum(axis=1), 1)))
             far = np.maximum(distances[chosen], limit)
             weights = np.where(kept[chosen], limit / far, 0.0)
-            cost += float((kept[chosen] * np.where(far > limit, 2 * limit * far - limit**2,
-                                                   squares)).sum())
+            cost += float(
+                (kept[chosen] * np.where(far > limit, 2 * limit * far - limit**2, squares)).sum()
+            )
             flat = slopes.reshape(-1, count)
             heavy = np.repeat(weights, width)
             matrix += (flat * heavy[:, None]).T @ flat

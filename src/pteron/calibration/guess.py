@@ -1,4 +1,4 @@
-"""All that a calibration seeks, as values: the machine, its readings, and what the instrument saw."""
+"""All that a calibration seeks, as values: machine, zeros, scales, marks, planes and frames."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ class Guess:
         planes = {TOOL: Plane()} | dict(setup.planes)
         return cls(
             robot,
-            np.array([_reading(leg)[0] for leg in robot.legs]),
-            np.array([_reading(leg)[1] for leg in robot.legs]),
+            np.array([leg.reading.zero if leg.reading else 0.0 for leg in robot.legs]),
+            np.array([leg.reading.scale if leg.reading else 1.0 for leg in robot.legs]),
             {name: np.array(mark.at) for name, mark in marks.items()},
             {name: np.array(place.at) for name, place in setup.anchors.items()},
             {name: np.array([*plane.normal, plane.offset]) for name, plane in planes.items()},
@@ -132,8 +132,3 @@ def across(normal: Array) -> Array:
     first = np.eye(3)[min(least)] - normal[min(least)] * normal
     first = first / np.linalg.norm(first)
     return np.stack([first, np.cross(normal, first)], axis=-1)
-
-
-def _reading(leg):
-    found = getattr(leg, "reading", None)
-    return (found.zero, found.scale) if found else (0.0, 1.0)

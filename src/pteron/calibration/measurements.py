@@ -1,7 +1,7 @@
 """Measurements of a machine at many poses: the joints' readings, and what an instrument saw there.
 
-A row is a pose. Any of a position, angles, a height and a distance may be measured in it, the others
-are NaN; `Setup` says of what: marks on the platform, planes, anchors and the instrument's frame.
+A row is a pose. Any of a position, angles, a height and a distance may be measured in it, the
+others are NaN. `Setup` says what they refer to: marks on the platform, planes, anchors, a frame.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ class Measurements:
         return len(self.readings)
 
     def rows(self, chosen: NDArray[np.bool_]) -> Measurements:
-        """Return some of the rows, chosen by a mask; a row takes those it is measured from along."""
+        """Return rows chosen by a mask, and those that a distance of theirs is measured from."""
         kept = chosen.copy()
         kept[self.origins[chosen & (self.origins >= 0)]] = True
         number = np.cumsum(kept) - 1

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.calibration.exact_rank import RowKind, exact_rank
 from pteron.calibration.guess import Block, Guess
 from pteron.calibration.measurements import Measurements
-from pteron.calibration.exact_rank import RowKind, exact_rank
 from pteron.calibration.unseen import told, unseen_combinations
 
 Array = NDArray[np.float64]

@@ -100,7 +100,7 @@ class MachineSlopes:
         chosen = np.arange(len(poses))
         place, turned, slopes, by_joint = self._platform(guess, given, poses, chosen)
         twist = slopes[:, :6], by_joint[:, :6]
-        point, moved, _ = self._marks(guess, given, chosen, place, turned, *twist)
+        _, moved, _ = self._marks(guess, given, chosen, place, turned, *twist)
         lengths = np.eye(3) if len(self._lengths) == 3 else self._axes[self._lengths]
         return np.concatenate([lengths @ slopes[:, :3], slopes[:, 6:]], axis=1), moved
 
@@ -161,8 +161,9 @@ class MachineSlopes:
             measured[:, at] = over
         apart = ~np.isnan(given.distances[chosen])
         if apart.any():
-            self._distances(guess, given, poses, chosen, (point, moved, by),
-                            (residuals, rows, pushed, measured))
+            self._distances(
+                guess, given, poses, chosen, (point, moved, by), (residuals, rows, pushed, measured)
+            )
         for part in (residuals, rows, pushed):
             part[~measured] = 0.0
         return Rows(residuals, rows, pushed, measured)
@@ -187,20 +188,21 @@ class MachineSlopes:
             place, axes = robot.platform.at(at)
             turned = np.swapaxes(axes, -1, -2)
         rates = np.eye(len(robot.coordinates))[self._angular]
-        moves = np.concatenate(
-            [twists, np.broadcast_to(rates, (len(at), *rates.shape))], axis=1
-        )
+        moves = np.concatenate([twists, np.broadcast_to(rates, (len(at), *rates.shape))], axis=1)
         by_joint = np.swapaxes(
             _solved(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
         )
         slopes = np.zeros((len(at), len(moves[0]) if len(moves) else 0, self.count))
-        matrix = slope_matrix(self._terms, geometry, len(self._changes))
+        matrix = slope_matrix(robot, self._changes, self._terms, geometry)
         for block in self.blocks:
             if block.kind == "geometry":
-                if shifts:
-                    against = raw @ matrix[self._columns[0]]
+                if shifts or (self._owner < 0).any():
+                    against = np.stack(
+                        [raw[:, i] @ matrix[part] for i, part in enumerate(self._columns)], axis=1
+                    )
                     found = -by_joint @ against
-                    found[:, :6] += shifts[0] @ matrix[self._columns[0]]
+                    for shift in shifts:
+                        found[:, :6] += shift @ matrix[self._columns[0]]
                 else:
                     own = matrix[self._columns[self._owner], np.arange(len(self._owner))[:, None]]
                     against = np.einsum("nvc,vc->nv", raw[:, self._owner], own)

@@ -204,9 +204,7 @@ class Calibration:
             "held_out": None if self.held_out is None else asdict(self.held_out),
             "findings": [asdict(finding) for finding in self.findings],
             "verdict": asdict(self.verdict),
-            "outliers": [
-                self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)
-            ],
+            "outliers": [self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)],
         }
 
 
@@ -222,8 +220,13 @@ def values_of(start: Guess, fit: Fit, blocks: Sequence[Block]) -> tuple[Value, .
             left = deviations[at] / unknown.tolerance if np.isfinite(unknown.tolerance) else 0.0
             found.append(
                 Value(
-                    unknown.name, unknown.group, unknown.unit, drawn, now,
-                    float(deviations[at]), _origin(left, unknown),
+                    unknown.name,
+                    unknown.group,
+                    unknown.unit,
+                    drawn,
+                    now,
+                    float(deviations[at]),
+                    _origin(left, unknown),
                 )
             )
     return tuple(found)
@@ -261,7 +264,7 @@ def calibrated(guess: Guess) -> Manipulator:
     ):
         taken = leg.with_zero(zero) if scale == 1.0 else None
         if taken is not None:
-            legs.append(replace(taken, reading=None))
+            legs.append(replace(taken, reading=None, limits=leg.limits))
         elif zero == 0.0 and scale == 1.0:
             legs.append(replace(leg, reading=None))
         else:

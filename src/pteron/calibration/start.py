@@ -1,4 +1,4 @@
-"""Where a calibration begins: poses that the readings lead to on the machine as drawn, and frames."""
+"""Where a calibration begins: the poses of readings on the machine as drawn, frames and planes."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 
 _FEW = 3
 """Positions that fix a frame, unless they are in line."""
+
+_TURNED = 0.5
+"""rad between a measured pose and the one that readings lead to from where they are not alike."""
 
 _PLANE = 3
 """Marks of heights that fix a plane."""
@@ -50,9 +53,11 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
         at = np.flatnonzero(~robot.platform.angular)
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
     poses = slopes.poses(guess, joints, begin)
+    told = seen.all(axis=-1) & given.setup.frame_known & ~np.isnan(places).any(axis=-1)
+    sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
+    far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
     other = np.isnan(poses).any(axis=-1)
-    other |= np.sign(np.linalg.det(slopes.jacobian(guess, poses))) != side
-    other |= np.abs(poses - begin)[:, ~robot.platform.angular].max(axis=-1, initial=0) > slopes.size
+    other |= np.where(told, far.any(axis=-1), sides != side)
     for i in np.flatnonzero(other):
         modes = direct_kinematics(robot, joints[i])
         modes = modes[~np.isnan(modes).any(axis=-1)]
@@ -62,7 +67,7 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
                 f"to no pose of {robot.name} as drawn; check their units, zeros and order"
             )
         same = np.sign(np.linalg.det(slopes.jacobian(guess, modes))) == side
-        modes = modes[same] if same.any() else modes
+        modes = modes[same] if same.any() and not told[i] else modes
         poses[i] = modes[np.abs(modes - begin[i]).max(axis=-1).argmin()]
     return poses
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import get_args
 
 import numpy as np
 
-from pteron.calibration.axial import AXIAL, axial_variations
 from pteron.calibration.guess import Block, Unknown
 from pteron.calibration.measurements import TOOL, Measurements
-from pteron.calibration.variations import Group, Variation, variations
+from pteron.calibration.variations import AXIAL, Group, Variation, axial_variations, variations
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator
 
-GROUPS: tuple[str, ...] = get_args(Group)
+GROUPS: tuple[str, ...] = tuple(group for group in get_args(Group) if group not in AXIAL)
 """What may be freed as one."""
 
 TOLERANCES: dict[str, float] = {
@@ -64,8 +62,9 @@ def blocks_of(
     asked = list(free) if free is not None else _default(measured)
     own = variations(robot)
     n = len(robot.legs)
-    joint = [Unknown(f"zeros[{i + 1}]", "zeros", leg.joint.unit, 0.0)
-             for i, leg in enumerate(robot.legs)]
+    joint = [
+        Unknown(f"zeros[{i + 1}]", "zeros", leg.joint.unit, 0.0) for i, leg in enumerate(robot.legs)
+    ]
     scale = [Unknown(f"scales[{i + 1}]", "scales", "", 0.0) for i in range(n)]
     axial = axial_variations(robot)
     names = {v.name for v in (*own, *axial)} | {u.name for u in (*joint, *scale)}
@@ -83,19 +82,28 @@ def blocks_of(
     chosen = tuple(v for v in own if v.group in asked or v.name in asked)
     chosen += tuple(v for v in axial if v.group in asked or v.name in asked)
     if chosen:
-        unknowns = [Unknown(v.name, v.group, v.unit, _tolerance(v.name, v.group, v.unit, given))
-                    for v in chosen]
+        unknowns = [
+            Unknown(v.name, v.group, v.unit, _tolerance(v.name, v.group, v.unit, given))
+            for v in chosen
+        ]
         found.append(("geometry", "", unknowns, chosen, ()))
     for kind, all_of in (("zeros", joint), ("scales", scale)):
         legs = tuple(i for i, u in enumerate(all_of) if kind in asked or u.name in asked)
         if legs:
-            unknowns = [Unknown(all_of[i].name, kind, all_of[i].unit,
-                                _tolerance(all_of[i].name, kind, all_of[i].unit, given))
-                        for i in legs]
+            unknowns = [
+                Unknown(
+                    all_of[i].name,
+                    kind,
+                    all_of[i].unit,
+                    _tolerance(all_of[i].name, kind, all_of[i].unit, given),
+                )
+                for i in legs
+            ]
             found.append((kind, "", unknowns, (), legs))
     if "tool" in asked and TOOL in measured.marks:
-        found.append(("mark", TOOL, _three("tool", _tolerance("tool", "tool", "m", given), "tool"),
-                      (), ()))
+        found.append(
+            ("mark", TOOL, _three("tool", _tolerance("tool", "tool", "m", given), "tool"), (), ())
+        )
     found += [(*part, (), ()) for part in _surroundings(measured)]
     blocks, start = [], 0
     for kind, name, unknowns, changes, legs in found:
@@ -108,8 +116,13 @@ def blocks_of(
 
 
 def _default(measured: Measurements) -> list[str]:
-    return [group for group in GROUPS if group != "tool" or not np.isnan(measured.positions).all()
-            or not np.isnan(measured.heights).all()]
+    return [
+        group
+        for group in GROUPS
+        if group != "tool"
+        or not np.isnan(measured.positions).all()
+        or not np.isnan(measured.heights).all()
+    ]
 
 
 def _tolerance(name: str, group: str, unit: str, given: Mapping[str, float]) -> float:

@@ -17,6 +17,9 @@ _PART = 0.02
 _NAMED = 6
 """Most values that are named of a combination."""
 
+_WHOLE = 0.9995
+"""A part from which on it counts as the greatest one, 1."""
+
 _INSIDE = 1e-5
 """Share of a combination outside the unseen ones up to which it is one of them."""
 
@@ -24,7 +27,7 @@ _INSIDE = 1e-5
 def unseen_combinations(
     start: Guess, blocks: Sequence[Block], axes: Array, tolerances: Array
 ) -> tuple[str, ...]:
-    """Return the combinations that rows of `axes` span, in words, and how many each line stands for.
+    """Return the combinations that the rows of `axes` span, in words; how many a line stands for.
 
     Parameters
     ----------
@@ -68,10 +71,10 @@ def told(vector: Array, names: Sequence[str]) -> str:
     parts = vector / vector[np.abs(vector).argmax()]
     order = np.argsort(-np.abs(parts), kind="stable")
     named = [k for k in order if abs(parts[k]) >= _PART]
+    signs = ["-" if parts[k] < 0.0 else "+" for k in named[:_NAMED]]
+    sizes = ["" if abs(parts[k]) > _WHOLE else f"{abs(parts[k]):.2g} " for k in named[:_NAMED]]
     text = " ".join(
-        f"{'-' if parts[k] < 0 else '+'} {'' if abs(parts[k]) > 0.9995 else f'{abs(parts[k]):.2g} '}"
-        f"{names[k]}"
-        for k in named[:_NAMED]
+        f"{sign} {size}{names[k]}" for sign, size, k in zip(signs, sizes, named, strict=False)
     ).removeprefix("+ ")
     more = len(named) - _NAMED
     return text + (f" and {more} more" if more > 0 else "")
@@ -98,9 +101,8 @@ def _known(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Ar
         if not all(f"{key}.{a}" in place for key in (base, own) for a in "xyz"):
             continue
         for axis in range(3):
-            turned = frame[:, axis] if robot.platform.angles or robot.platform.tilts else frame[:, axis]
             parts = {f"{base}.{'xyz'[axis]}": 1.0}
-            parts |= {f"{own}.{a}": float(v) for a, v in zip("xyz", turned, strict=True)}
+            parts |= {f"{own}.{a}": float(v) for a, v in zip("xyz", frame[:, axis], strict=True)}
             yield (
                 "guide_point and platform_point show as their difference only",
                 f"leg {i}",
@@ -114,13 +116,25 @@ def _known(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Ar
                 f"leg {i}",
                 vector(**parts, **{zero: 1.0}),
             )
+    for axis in "xyz":
+        parts = {f"legs[{i + 1}].platform_point.{axis}": 1.0 for i in range(len(robot.legs))}
+        parts |= {name: 1.0 for name in place if name.endswith(f".{axis}") and _on_platform(name)}
+        if all(name in place for name in parts):
+            text = "tool and platform points show against each other only, as P is none of them"
+            yield text, "", vector(**parts)
     for block in blocks:
         if block.kind == "frame":
             yield from _rigid(start, blocks, names)
     yield "the size of all: a measured length gives it", "", _size(start, blocks)
 
 
-def _rigid(start: Guess, blocks: Sequence[Block], names: Sequence[str]) -> Iterator[tuple[str, str, Array]]:
+def _on_platform(name: str) -> bool:
+    return name.startswith(("tool.", "marks."))
+
+
+def _rigid(
+    start: Guess, blocks: Sequence[Block], names: Sequence[str]
+) -> Iterator[tuple[str, str, Array]]:
     """Yield motions of the whole machine against an instrument whose frame is not known."""
     text = "where the machine's own frame stands in the base"
     for turn, axis in ((turn, axis) for turn in (False, True) for axis in range(3)):

@@ -22,8 +22,11 @@ from pteron.manipulator import Manipulator
 
 Array = NDArray[np.float64]
 
-Group = Literal["zeros", "scales", "lengths", "points", "directions", "tool"]
+Group = Literal["zeros", "scales", "lengths", "points", "directions", "tool", "radius", "angles"]
 """What a user frees, and gives a tolerance, as one."""
+
+AXIAL = ("radius", "angles")
+"""Groups of guide points about the platform's axis."""
 
 _TRIED = 1e-3
 """m or rad by which each variation is tried: a machine that this makes impossible keeps to it."""
@@ -41,14 +44,15 @@ class Variation:
     Attributes
     ----------
     leg : int
-        From 0.
+        From 0; -1 for all legs.
     key : str
         The key of the robot's file that changes.
     axis : int or None
         Which component of a point; about which axis of the platform's frame a direction turns; None
         for a length.
     group : str
-        "points", "lengths" or "directions".
+        "points", "lengths" or "directions"; or, of guide points about the platform's axis through
+        the origin, as a printer's firmware counts them, the "radius" of all and the "angles".
     """
 
     leg: int
@@ -59,7 +63,9 @@ class Variation:
     @property
     def name(self) -> str:
         """Its name: "legs[2].guide_point.x", "legs[2].direction about z"."""
-        place = f"legs[{self.leg + 1}].{self.key}"
+        if self.leg < 0:
+            return self.group
+        place = f"legs[{self.leg + 1}].{'angle' if self.group == 'angles' else self.key}"
         if self.axis is None:
             return place
         return f"{place}{' about ' if self.group == 'directions' else '.'}{_AXES[self.axis]}"
@@ -67,7 +73,7 @@ class Variation:
     @property
     def unit(self) -> str:
         """Its unit, "m" or "rad"."""
-        return "rad" if self.group == "directions" else "m"
+        return "rad" if self.group in ("directions", "angles") else "m"
 
 
 @lru_cache(maxsize=32)
@@ -90,6 +96,12 @@ def variations(robot: Manipulator) -> tuple[Variation, ...]:
                 found += [Variation(i, key, axis, "directions") for axis in axes]
         found += [Variation(i, "platform_point", axis, "points") for axis in range(3)]
     return tuple(v for v in found if v.group != "points" or _possible(robot, v))
+
+
+def axial_variations(robot: Manipulator) -> tuple[Variation, ...]:
+    """Return the radius of all guide points about the platform's axis, and their angles."""
+    angles = (Variation(i, "guide_point", None, "angles") for i in range(len(robot.legs)))
+    return Variation(-1, "guide_point", None, "radius"), *angles
 
 
 def _turns(robot: Manipulator, leg: int, key: str, axis: int, along: float) -> bool:
@@ -116,6 +128,17 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
     new: list[dict[str, Any]] = [{} for _ in robot.legs]
     turns: dict[tuple[int, str], Array] = {}
     for change, amount in zip(changes, amounts.tolist(), strict=True):
+        if change.group in AXIAL:
+            for i in range(len(robot.legs)) if change.leg < 0 else (change.leg,):
+                point = np.array(new[i].get("guide_point", robot.legs[i].guide_point))
+                outward, around = _about(frame[2], point)
+                if change.group == "radius":
+                    moved = point + amount * outward
+                else:
+                    cos, sin = np.cos(amount) - 1.0, np.sin(amount)
+                    moved = point + np.linalg.norm(around) * cos * outward + sin * around
+                new[i]["guide_point"] = tuple(moved.tolist())
+            continue
         leg, fields = robot.legs[change.leg], new[change.leg]
         if change.group == "directions":
             turn = turns.setdefault((change.leg, change.key), np.zeros(3))
@@ -150,6 +173,12 @@ def turning_with(leg: LegKind, key: str) -> list[str]:
     return [key, *followers]
 
 
+def _about(axis: Array, point: Array) -> tuple[Array, Array]:
+    """Return the unit vector from an axis through the origin to a point, and axis x point."""
+    outward = point - (point @ axis) * axis
+    return outward / np.linalg.norm(outward), np.cross(axis, point)
+
+
 @dataclass(frozen=True)
 class Term:
     """An entry of d(geometry)/d(variation): a product of numbers of the geometry, or 1.
@@ -164,18 +193,12 @@ class Term:
 
 
 def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
-    """Return the slopes of a machine's geometry against its variations."""
-    places: list[dict[str, int]] = []
-    start = 0
-    for leg in robot.legs:
-        places.append({})
-        for q in leg.quantities:
-            places[-1][q.name] = start
-            start += len(q.value)
-        places[-1]["platform_point"] = start
-        start += 6
+    """Return the slopes of a machine's geometry against its variations, but for axial ones."""
+    places, start = _places(robot)
     found: list[Term] = []
     for k, change in enumerate(changes):
+        if change.group in AXIAL:
+            continue
         leg, at = robot.legs[change.leg], places[change.leg]
         if change.group != "directions":
             found.append(Term(at[change.key] + (change.axis or 0), k, (), 1))
@@ -196,13 +219,36 @@ def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
     return found
 
 
+def _places(robot: Manipulator) -> tuple[list[dict[str, int]], int]:
+    """Return where each leg's quantities stand in the geometry, and where the frame does."""
+    places: list[dict[str, int]] = []
+    start = 0
+    for leg in robot.legs:
+        places.append({})
+        for q in leg.quantities:
+            places[-1][q.name] = start
+            start += len(q.value)
+        places[-1]["platform_point"] = start
+        start += 6
+    return places, start
+
+
 def _first_direction(leg: LegKind) -> str:
     return next(q.name for q in leg.quantities if q.role == "direction")
 
 
-def slope_matrix(terms: Sequence[Term], geometry: Array, count: int) -> Array:
-    """Return d(geometry)/d(variations) (g, count) in floating point."""
-    matrix = np.zeros((len(geometry), count))
+def slope_matrix(
+    robot: Manipulator, changes: Sequence[Variation], terms: Sequence[Term], geometry: Array
+) -> Array:
+    """Return d(geometry)/d(variations) of a machine in floating point."""
+    matrix = np.zeros((len(geometry), len(changes)))
+    places, _ = _places(robot)
+    for k, change in enumerate(changes):
+        if change.group in AXIAL:
+            for i in range(len(robot.legs)) if change.leg < 0 else (change.leg,):
+                at = places[i]["guide_point"]
+                vectors = _about(np.array(robot.platform.axis), geometry[at : at + 3])
+                matrix[at : at + 3, k] = vectors[change.group == "angles"]
     for term in terms:
         matrix[term.row, term.variation] += term.sign * np.prod(geometry[list(term.factors)])
     return matrix

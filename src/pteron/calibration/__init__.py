@@ -1,0 +1,25 @@
+"""Calibration of a machine's geometry from measurements, with what they cannot show said aloud.
+
+`calibrate` does all of it; `Measurements` are its data, `Calibration` its result.
+"""
+
+from pteron.calibration.calibrate import calibrate
+from pteron.calibration.measurements import Measurements, Place, Plane, Setup
+from pteron.calibration.observability import Observability
+from pteron.calibration.result import Calibration, Finding, HeldOut, Value, Verdict
+from pteron.calibration.unknowns import TOLERANCES
+
+__all__ = [
+    "TOLERANCES",
+    "Calibration",
+    "Finding",
+    "HeldOut",
+    "Measurements",
+    "Observability",
+    "Place",
+    "Plane",
+    "Setup",
+    "Value",
+    "Verdict",
+    "calibrate",
+]

@@ -1,0 +1,199 @@
+"""`calibrate`: a machine's geometry from measurements, judged at rows that the fit did not see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.calibration.fit import Fit, Fitter
+from pteron.calibration.guess import Block, Guess
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.observability import observability_of
+from pteron.calibration.residual_faults import raw_faults, residual_faults
+from pteron.calibration.residuals import MachineSlopes
+from pteron.calibration.result import Calibration, HeldOut, calibrated, values_of
+from pteron.calibration.start import placed, starting_poses
+from pteron.calibration.unknowns import blocks_of
+from pteron.calibration.verdict import verdict_of
+from pteron.errors import DataError
+from pteron.manipulator import RobotLike, as_manipulator
+
+Array = NDArray[np.float64]
+
+_EVERY = 5
+"""Of so many rows one is held out where no other log is given."""
+
+_PER_VALUE = 1.5
+"""Numbers measured for each that can be seen, below which every row is needed for the fit."""
+
+_RANK_ROWS = 400
+"""Rows, evenly spread, at which the singular values are taken."""
+
+
+def calibrate(
+    robot: RobotLike,
+    measurements: Measurements,
+    *,
+    free: Sequence[str] | None = None,
+    prior: Mapping[str, float] | None = None,
+    held_out: Measurements | None = None,
+    seed: int = 0,
+) -> Calibration:
+    """Find a machine's geometry from measurements at many poses.
+
+    Every row's readings lead to a pose; what was measured there, whole poses, positions of marks,
+    heights over planes, distances, any of them together, is compared with it. The most probable
+    geometry follows from the measurements and from ordinary tolerances about the drawing, which
+    keep what the measurements do not show.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine as drawn.
+    measurements : Measurements
+        Readings and what was measured; `read_measurements` reads a log.
+    free : sequence of str, optional
+        What is sought: groups ("zeros", "scales", "lengths", "points", "directions", "tool",
+        "radius", "angles") or single values; by default every group.
+    prior : mapping, optional
+        Standard deviations by group or value, m and rad, in place of ordinary tolerances
+        (`TOLERANCES`); inf for none.
+    held_out : Measurements, optional
+        Rows for the verdict. By default every fifth row is, where there are enough: the verdict is
+        on a fit without them, the values are from all.
+    seed : int
+        Of the random poses of the exact rank.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    DataError
+        If readings lead to no pose, a name is unknown, or the search does not settle.
+
+    Notes
+    -----
+    Residuals are weighted by their noise, given or found; readings' noise is carried to them. Rows
+    beyond what noise explains count less (Huber), and, far beyond, not at all. Intervals are those
+    of measurements and tolerances together. See docs/theory/calibration.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from pteron.calibration import Measurements, calibrate
+    >>> robot = pteron.load("linear-delta")
+    >>> poses = pteron.random_poses(robot, 40)
+    >>> readings = pteron.inverse_kinematics(robot, poses) + [0.001, 0.0, 0.0]
+    >>> found = calibrate(robot, Measurements.of(robot, readings, poses=poses), free=["zeros"])
+    >>> found.fit.guess.zeros.round(6) + 0.0
+    array([-0.001,  0.   ,  0.   ])
+    """
+    robot = as_manipulator(robot)
+    _check(robot.joint_count, measurements)
+    blocks = blocks_of(robot, measurements, free, prior)
+    start = Guess.drawn(robot, measurements)
+    poses = starting_poses(start, measurements)
+    start = placed(start, measurements, poses)
+    if fault := raw_faults(start, measurements, poses):
+        raise DataError(fault)
+    kept = np.ones(len(measurements), dtype=bool)
+    if held_out is None and _enough(measurements, blocks):
+        kept[_EVERY // 2 :: _EVERY] = False
+    judged = None
+    begin = start
+    if held_out is not None or not kept.all():
+        rows = measurements.rows(kept)
+        partial = Fitter(rows, blocks, start, starting_poses(start, rows)).run()
+        other = held_out if held_out is not None else measurements.rows(~kept)
+        judged = _held_out(start, partial, blocks, other)
+    fit = Fitter(measurements, blocks, begin, poses).run()
+    slopes = _scaled_slopes(start, fit, blocks, measurements)
+    shown = observability_of(start, measurements, blocks, slopes, seed)
+    findings = residual_faults(fit, blocks, measurements)
+    return Calibration(
+        robot,
+        calibrated(fit.guess),
+        values_of(start, fit, blocks),
+        {kind: value for kind, value in fit.noise.items() if _has(measurements, kind)},
+        shown,
+        judged,
+        findings,
+        verdict_of(fit, blocks, shown, judged, findings, measurements),
+        measurements,
+        fit,
+        blocks,
+        start,
+    )
+
+
+def _check(joints: int, given: Measurements) -> None:
+    if given.readings.ndim != 2 or given.readings.shape[1] != joints:
+        raise DataError(f"readings: shape {given.readings.shape} given, (N, {joints}) expected")
+    if not np.isfinite(given.readings).all():
+        row = int(np.argwhere(~np.isfinite(given.readings))[0, 0])
+        raise DataError(f"{given.places[row]}: a reading is missing or not finite")
+    parts = given.positions, given.angles, given.heights[:, None], given.distances[:, None]
+    if all(np.isnan(part).all() for part in parts):
+        raise DataError("measurements: nothing was measured; give a position, an angle, a height")
+
+
+def _has(given: Measurements, kind: str) -> bool:
+    columns = {
+        "position": given.positions,
+        "angle": given.angles,
+        "height": given.heights,
+        "distance": given.distances,
+    }
+    return not np.isnan(columns[kind]).all()
+
+
+def _enough(given: Measurements, blocks: Sequence[Block]) -> bool:
+    counted = sum(
+        int((~np.isnan(part)).sum())
+        for part in (given.positions, given.angles, given.heights, given.distances)
+    )
+    return counted >= _PER_VALUE * blocks[-1].where.stop and len(given) >= 2 * _EVERY
+
+
+def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurements) -> HeldOut:
+    """Return the errors at rows that a fit did not see."""
+    before = Fitter(other, blocks, start, starting_poses(start, other))
+    poses = before.slopes.poses(start, start.joints(other.readings), before.begin_poses)
+    moved = before.slopes.poses(fit.guess, fit.guess.joints(other.readings), poses)
+    moved = np.where(np.isnan(moved), poses, moved)
+    chosen = np.arange(len(other))
+    old = before.slopes.rows(start, other, poses, chosen)
+    new = before.slopes.rows(fit.guess, other, moved, chosen)
+    errors: dict[str, dict[str, float]] = {"before": {}, "after": {}, "expected": {}}
+    spread = np.einsum("nkp,pq,nkq->nk", new.slopes, fit.covariance, new.slopes, optimize=True)
+    for kind, noise in fit.noise.items():
+        here = new.measured & (before.kind_of == kind)
+        if here.any():
+            for name, squares in (
+                ("before", old.residuals**2),
+                ("after", new.residuals**2),
+                ("expected", spread + noise**2),
+            ):
+                errors[name][kind] = float(np.sqrt(squares[here].mean()))
+    return HeldOut(int(new.measured.any(axis=1).sum()), **errors)
+
+
+def _scaled_slopes(start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements) -> Array:
+    """Return slopes at the measured poses on the machine as drawn, by noise and tolerance."""
+    slopes = MachineSlopes(start.robot, blocks)
+    chosen = np.unique(np.linspace(0, len(given) - 1, min(len(given), _RANK_ROWS)).astype(int))
+    at = slopes.rows(
+        start, given, slopes.poses(start, start.joints(given.readings), fit.poses), chosen
+    )
+    k = given.angles.shape[1]
+    kinds = [*["position"] * 3, *["angle"] * k, "height", "distance"]
+    sizes = np.array([fit.noise[kind] for kind in kinds])
+    tolerances = np.array([u.tolerance for block in blocks for u in block.unknowns])
+    tolerances[~np.isfinite(tolerances)] = 1.0
+    more = np.sqrt(len(given) / len(chosen))
+    flat = (more * at.slopes / sizes[:, None] * tolerances).reshape(-1, len(tolerances))
+    return np.asarray(flat[at.measured.reshape(-1)])

@@ -1,0 +1,92 @@
+"""The verdict on a calibration: by errors at held-out rows, by faults, and by what was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pteron.calibration.fit import Fit
+from pteron.calibration.guess import Block
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.observability import Observability
+from pteron.calibration.result import Finding, Grade, HeldOut, Verdict
+
+_AT_THE_NOISE = 1.3
+"""Held-out error over what noise and intervals expect up to which the geometry is trusted."""
+
+_FAR = 2.0
+"""The same from which on it is not."""
+
+_OFF = 5.0
+"""Tolerances from the drawing from which on a value is doubted."""
+
+
+def verdict_of(
+    fit: Fit,
+    blocks: Sequence[Block],
+    shown: Observability,
+    held_out: HeldOut | None,
+    findings: Sequence[Finding],
+    given: Measurements,
+) -> Verdict:
+    """Return the verdict."""
+    grade: Grade = "trustworthy"
+    reasons: list[str] = []
+    steps: list[str] = []
+
+    def worse(to: Grade) -> None:
+        nonlocal grade
+        order = ("trustworthy", "usable with care", "not trustworthy")
+        grade = max(grade, to, key=order.index)
+
+    if held_out is None:
+        worse("usable with care")
+        reasons.append("No rows were left for a check: all were needed for the fit.")
+        steps.append("Measure at more poses, or give a second log (--held-out).")
+    else:
+        for kind, after in held_out.after.items():
+            expected, before = held_out.expected[kind], held_out.before[kind]
+            ratio = after / expected
+            unit, factor = ("mrad", 1e3) if kind == "angle" else ("mm", 1e3)
+            text = (
+                f"At {held_out.rows} rows that the fit did not see the {kind} error is "
+                f"{factor * after:.3g} {unit}, {factor * before:.3g} before"
+            )
+            if ratio <= _AT_THE_NOISE:
+                reasons.append(f"{text}: as noise and intervals expect.")
+            else:
+                worse(
+                    "not trustworthy"
+                    if ratio > _FAR and after > 0.5 * before
+                    else "usable with care"
+                )
+                reasons.append(f"{text}: {ratio:.2g} times what noise and intervals expect.")
+    total = fit.total
+    names = [u for block in blocks for u in block.unknowns]
+    far = [
+        u.name
+        for u, t in zip(names, total, strict=True)
+        if u.group != "setup" and np.isfinite(u.tolerance) and abs(t) > _OFF * u.tolerance
+    ]
+    if far:
+        worse("usable with care")
+        several = f"{', '.join(far[:4])}{' ...' if len(far) > 4 else ''}"
+        reasons.append(f"More than {_OFF:g} tolerances from the drawing: {several}.")
+        steps.append(
+            "Check the robot's file at these values, or say by `prior` how far off they may be."
+        )
+    if findings:
+        worse("usable with care")
+        reasons += [finding.text for finding in findings]
+    out = int((~fit.kept).sum())
+    if out > 0.1 * len(fit.kept):
+        worse("usable with care")
+        reasons.append(f"{out} of {len(fit.kept)} rows do not fit and were left out.")
+    open_values = shown.columns - shown.rank
+    if open_values:
+        reasons.append(
+            f"{shown.rank} of {shown.columns} combinations show in these measurements; the other "
+            f"{open_values} are kept at the drawing."
+        )
+    return Verdict(grade, tuple(reasons), tuple(steps))
