@@ -1,4 +1,4 @@
-"""The result of `identify`: values, a verdict on them, and the preprocessing of the data."""
+"""The result of `identify`: values, the machine that has them, a verdict, and how it was found."""
 
 from __future__ import annotations
 

@@ -44,13 +44,13 @@ class Summary:
     best, worst : float
         The extreme values; which of them is the greatest depends on the index.
     best_pose, worst_pose : array, shape (m,)
-        Where, m and rad.
+        Poses that have them, m and rad.
     mean, median : float
-        Over the poses where it is a finite number.
+        Mean and median over the poses where it is a finite number.
     count : int
         Number of these.
     infinite : int
-        At how many poses that serve it is none: they are singular, or next to it.
+        Number of the other poses in reach and within limits: they are singular, or next to it.
     """
 
     name: str

@@ -1,8 +1,9 @@
-"""Cone programs over real bodies, solved by Clarabel: each body is a second-order cone.
+"""Cone programs over real bodies, solved by Clarabel: the parameters of real bodies are a cone.
 
-I m >= hx^2 + hy^2 with m, I >= 0 is |(2 hx, 2 hy, m - I)| <= m + I, in parameters scaled by a mass
-and a length of the body, so that the three numbers are of one size. The second moments of a body
-that turns about any axis, a matrix (4, 4), are a cone of positive semidefinite ones.
+For a body that turns in a plane it is a second-order cone: I m >= hx^2 + hy^2 with m, I >= 0 is
+|(2 hx, 2 hy, m - I)| <= m + I, in parameters scaled by a mass and a length of the body, so that the
+three numbers are of one size. For a body that turns about any axis it is the cone of positive
+semidefinite matrices (4, 4), which its second moments are.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ _UNITS = (1e-4, 1e-3, 1e-2)
 are no problem, and where the solver gives up one of the others is in its range."""
 
 _CONE = 4
-"""Rows of a body that turns: m + I, 2 hx, 2 hy, m - I."""
+"""Rows of a body that turns in a plane: m + I, 2 hx, 2 hy, m - I."""
 
 _TRIANGLE = tuple((i, j) for j in range(4) for i in range(j + 1))
 """Entries of the second moments of a body that turns about any axis, in the solver's order."""
 
 _SOLID = len(_TRIANGLE)
-"""Their rows."""
+"""Rows of such a body."""
 
 
 @dataclass(frozen=True)
