@@ -28,11 +28,11 @@ from pteron.workspace.margins import pose_margins
 from pteron.workspace.unreachable import beyond_limits, nowhere
 
 _DRAWN = 200
-"""Random poses."""
+"""Random poses that the search starts from."""
 
 _MEASURES = 0.3, 0.02, 0.0
-"""Their least type-I and type-II measures, tried in turn: less is asked where legs have little
-common reach."""
+"""Least type-I and type-II measures of these poses, tried in turn: less is asked where legs have
+little common reach."""
 
 _SOURCES = (*EQUATIONS, "kinematics", "workspace")
 """The packages that a home pose depends on: a change of their source makes a stored one void."""

@@ -1,6 +1,7 @@
-"""Faults of single columns of a log: constant forces, encoders that wrap, drives at their limit.
+"""Faults of a log's columns: impossible or constant forces, wrapped encoders, saturated drives.
 
-Logs in memory are checked here; those read from files, as they are read, in `channels`.
+They are looked for in a log in memory, or in the pieces of a file; what shows only over all pieces,
+such as a channel that freezes, in `channels`.
 """
 
 from __future__ import annotations
