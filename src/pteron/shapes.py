@@ -2,7 +2,7 @@
 
 `...` are the batch axes, n the legs, m the pose coordinates (n = m), k the assembly modes and N the
 inertial parameters. SI units and radians; poses are ordered (x, y, z, phi), without z in a plane,
-without phi where the platform does not turn.
+without phi where the platform does not turn, with three angles, or two, where it tilts.
 """
 
 from __future__ import annotations

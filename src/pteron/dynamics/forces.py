@@ -27,7 +27,8 @@ def inverse_dynamics(
     pose, velocity, acceleration : array, shape (..., m)
         The platform's motion; m, rad and s. Leading axes broadcast.
     wrench : array, shape (..., m), optional
-        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m.
+        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m; of a
+        platform that tilts a force and a moment in the base frame, (..., 6).
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -79,7 +80,8 @@ def forward_dynamics(
     forces : array, shape (..., n)
         N at a slider, N m at a crank; positive along +q.
     wrench : array, shape (..., m), optional
-        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m.
+        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m; of a
+        platform that tilts a force and a moment in the base frame, (..., 6).
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -130,7 +132,8 @@ def drive_forces(
     pose, velocity, acceleration : array, shape (..., m)
         The platform's motion; m, rad and s. Leading axes broadcast.
     wrench : array, shape (..., m), optional
-        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m.
+        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m; of a
+        platform that tilts a force and a moment in the base frame, (..., 6).
     smooth : bool
         s is the sign of q', exact where a joint moves, which suits logs; or tanh(q'/rest_speed),
         which suits simulation and controllers (the kernel `feed_forward`).
@@ -189,7 +192,8 @@ def drive_accelerations(
     forces : array, shape (..., n)
         Of the drives, N at a slider, N m at a crank; positive along +q.
     wrench : array, shape (..., m), optional
-        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m.
+        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m; of a
+        platform that tilts a force and a moment in the base frame, (..., 6).
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 

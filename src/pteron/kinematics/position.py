@@ -21,7 +21,7 @@ def inverse_kinematics(
     robot : Manipulator, name or path
         The machine; its elbows choose the branch.
     pose : array, shape (..., m)
-        (x, y, z, phi), or (x, y, z) for 3T; m and rad.
+        The poses, as `robot.coordinates` names their numbers: x, y, z, phi, ...; m and rad.
     on_failure : {"raise", "nan"}
         Whether a pose out of a leg's reach raises, or gives NaN.
 

@@ -150,8 +150,9 @@ class Manipulator:
         """Names of the columns of tables that hold a pose, a velocity and so on.
 
         A pose is x y z phi, a velocity dx dy dz dphi, an acceleration ddx ddy ddz ddphi, a wrench
-        fx fy fz mk: those that the machine has. Joints are rho1 or theta1, their rates drho1 or
-        dtheta1, forces force1 or torque1.
+        fx fy fz mk: those that the machine has; where its platform tilts a pose has other angles,
+        and a wrench is fx fy fz mx my mz. Joints are rho1 or theta1, their rates drho1 or dtheta1,
+        forces force1 or torque1.
         """
         pose, joints = self.coordinates, self.joint_names
         return {

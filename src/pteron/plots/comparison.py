@@ -1,4 +1,4 @@
-"""Pictures that compare measured with predicted forces, over time and over speed."""
+"""Pictures that compare measured with predicted forces: over time, over speed, beside the noise."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """The opened mechanism: legs and platform as chains of bodies from the base, cut where they meet.
 
 Each leg is cut at its platform point, where its last body ends; the joints beyond are left out, as
-the platform's own chain says how it moves: it slides along the pose's lengths and turns by phi. Of
-an articulated platform each part that does not turn is a body of its own, which slides without
-turning and is closed with the platform at its hinge. Gears, and halves of a platform that slide,
-are coupled to phi.
+the platform's own chain says how it moves: it slides along the pose's lengths and turns by its
+angles. Of an articulated platform each part that does not turn is a body of its own, which slides
+without turning and is closed with the platform at its hinge. Gears, and halves of a platform that
+slide, are coupled to phi.
 
 No kind of leg is asked for: all is read from `LegMotion.chain` and `LegMotion.bodies` (`legs.leg`).
 """

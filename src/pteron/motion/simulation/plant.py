@@ -54,10 +54,10 @@ def advance(
     step : float
         Length of a step, s; see `longest_step`.
     count : int
-        How many.
+        Number of steps.
     wrench : array, shape (..., m), optional
-        What acts on the platform at P all the while: a force in N and, where it turns, a moment
-        about k in N m.
+        Load on the platform at P all the while: a force in N and, where it turns, a moment about k
+        in N m; of a platform that tilts a force and a moment, (..., 6).
 
     Returns
     -------

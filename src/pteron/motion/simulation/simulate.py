@@ -97,7 +97,8 @@ def simulate(
     payload : float or sequence of (time, mass)
         What the tool carries, kg; of a sequence each mass from its time (s) on, zero before.
     wrench : array, shape (m,), or callable of the time (s), optional
-        What else acts on the platform at P; held from sample to sample. N and N m.
+        Further load on the platform at P, held from sample to sample: a force in N and, where it
+        turns, a moment about k in N m; of a platform that tilts a force and a moment, (6,).
     sensors : Sensors, optional
         The encoders; by default coordinates and rates are exact.
     delay : float

@@ -37,7 +37,7 @@ def size(
         Time for which the platform rests after the motion, s; the drives hold it there.
     wrench : array, shape (m,), optional
         Load on the platform at P all along: a force in N and, where it turns, a moment about k
-        in N m.
+        in N m; of a platform that tilts a force and a moment, (6,).
 
     Returns
     -------

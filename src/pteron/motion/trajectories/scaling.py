@@ -1,4 +1,4 @@
-"""The largest pick-and-place cycle that a machine can do, as a multiple of the standard one."""
+"""The largest pick-and-place cycle that a machine can do, as a share of the standard one."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pteron.workspace import pose_margins
 from pteron.workspace.margins import joint_distances
 
 _LEAST_RESERVE = 0.2
-"""Least margin, of type I and of type II, that a cycle keeps."""
+"""Least margin, of type I and of type II, that a cycle keeps; or half of its middle's."""
 
 TURN = np.pi / 3.0
 """Turn of the platform on its way across in the full cycle, rad."""
