@@ -1,7 +1,9 @@
 """Pteron: parallel manipulators whose legs carry points of the platform.
 
 Kinematics, dynamics by virtual work, and base inertial parameters, for the Quadrupteron and the
-Tripteron, Deltas, Par4 and H4, five-bars and other planar machines, and any mixture of their legs.
+Tripteron, Deltas, Par4 and H4, five-bars and other planar machines, hexapods and others that tilt,
+and any mixture of their legs. Subpackages have workspaces, motions, control, identification,
+calibration, design, pictures, reports and exports.
 `robot` is a `Manipulator`; poses, velocities and accelerations have shape (..., m), joint
 coordinates and actuator forces (..., n), in SI units and radians.
 """
