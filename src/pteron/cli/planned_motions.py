@@ -27,10 +27,8 @@ def standard_motion(
     from dataclasses import replace
 
     from pteron.motion import check_path, cycle_path, pick_and_place, time_optimal
-    from pteron.motion.trajectories.cycle import STILL_RADIUS
-    from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION
+    from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION, farthest_point
     from pteron.motion.trajectories.time_law import in_time
-    from pteron.motion.trajectories.tool import carries
 
     middle = given_pose(machine, around, "--around")
     found = pick_and_place(machine, middle, scale=scale)
@@ -39,13 +37,13 @@ def standard_motion(
         return time_optimal(machine, path, limits, step=step)
     check_path(machine, path)
     if duration is None and not limits.any:
-        turning = bool(machine.platform.angles) and not carries(machine.platform)
-        beside = f", and that of a point {1e3 * STILL_RADIUS:g} mm from P," if turning else ""
+        tilts = machine.platform.tilts
+        beside = f", and of a point {1e3 * farthest_point(machine):.3g} mm from P as it turns,"
         note(
             "Note: no limits given, and the machine's drives have none: the tool's acceleration"
-            f"{beside} is {PEAK_ACCELERATION:g} m/s^2 at most"
+            f"{beside if tilts else ''} is {PEAK_ACCELERATION:g} m/s^2 at most"
         )
-        if turning:
+        if tilts:
             duration = found.duration
         else:
             limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)

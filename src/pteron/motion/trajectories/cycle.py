@@ -23,9 +23,6 @@ LIFT = 0.025
 ACROSS = 0.305
 """Width of the standard cycle, m."""
 
-STILL_RADIUS = 0.1
-"""Distance from P of the point whose acceleration counts where a cycle is one of angles, m."""
-
 _LIFT_ENDS = 0.4
 """Share of the path out in which the platform rises, and again in which it sinks."""
 
@@ -159,16 +156,15 @@ class Cycle:
         """Whether each angle rises and sinks: the others, where no lengths go across."""
         return np.asarray(~self._across & (len(self.platform.lengths) < 2))
 
-    def acceleration(self, tau: Array) -> Array:
+    def acceleration(self, tau: Array, radius: float) -> Array:
         """Return the tool's acceleration (T, k) by tau, whatever moves it.
 
-        Where turning is not for the sake of the path, that of a point `STILL_RADIUS` from P comes
-        behind it.
+        Of a platform that tilts that of a point at a radius from P, m, as it turns, comes behind.
         """
-        if carries(self.platform) or not self.platform.angles:
+        if not self.platform.tilts:
             return self.path(tau)[2]
         state = self.at(tau)
-        turning = STILL_RADIUS * state[2][:, self.platform.angular]
+        turning = radius * state[2][:, self.platform.angular]
         return np.hstack([tool_path(self.platform, *state)[2], turning])
 
 

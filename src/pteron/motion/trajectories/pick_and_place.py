@@ -12,7 +12,7 @@ from pteron.arguments import expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.motion.trajectories.cycle_path import CyclePath
@@ -86,7 +86,9 @@ def pick_and_place(
     turn : float
         Turn of the platform on its way across, at scale 1, rad; without effect where it does not.
     peak : float
-        Largest acceleration of the tool's centre point, m/s^2, where no duration is given.
+        Largest acceleration of the tool's centre point, m/s^2, where no duration is given; of a
+        platform that tilts, that and the acceleration as it turns of a point as far from P as the
+        farthest platform point, as the root of the sum of squares.
     least : float, optional
         Reserve that the cycle keeps, where no scale is given; see `scaled_to_reach`.
 
@@ -128,7 +130,7 @@ def pick_and_place(
     cycle = Cycle(robot.platform, middle, across, up, angle, scale)
     if duration is None:
         # Accelerations go with 1 / duration^2.
-        duration = float(np.sqrt(_peak_acceleration(cycle) / peak))
+        duration = float(np.sqrt(_peak_acceleration(cycle, farthest_point(robot)) / peak))
     tau = np.linspace(0.0, 1.0, samples)
     pose, first, second = cycle.at(tau)
     return PickAndPlace(
@@ -168,11 +170,16 @@ def cycle_path(found: PickAndPlace) -> BackPath:
     return BackPath(CyclePath(found.cycle))
 
 
-def _peak_acceleration(cycle: Cycle) -> float:
-    """Return the tool's largest acceleration over a cycle that takes one second, m/s^2."""
+def farthest_point(robot: Manipulator) -> float:
+    """Return how far the farthest platform point is from P, m."""
+    return max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
+
+
+def _peak_acceleration(cycle: Cycle, radius: float) -> float:
+    """Return the largest acceleration over a cycle that takes one second, m/s^2."""
 
     def size(tau: Array) -> Array:
-        return np.asarray(np.linalg.norm(cycle.acceleration(tau), axis=-1))
+        return np.asarray(np.linalg.norm(cycle.acceleration(tau, radius), axis=-1))
 
     tau = np.linspace(0.0, 0.5, 1001)
     highest = int(size(tau).argmax())
