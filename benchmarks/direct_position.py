@@ -71,14 +71,15 @@ def drawn(seed: int) -> tuple[pteron.Manipulator, Array]:
 
 
 def searched(robot: pteron.Manipulator, joints: Array) -> int:
-    """Return how many poses Newton's steps find from many."""
+    """Return how many poses Newton's steps, of 0.5 at most, find from many."""
     step, platform = numeric(robot, "newton_step"), robot.platform
     rng = np.random.default_rng(0)
     at = rng.uniform(-np.pi, np.pi, (2000 if quick() else _STARTS, robot.freedom))
     at[:, ~platform.angular] = 1.5 * rng.normal(size=at[:, ~platform.angular].shape)
     with np.errstate(all="ignore"):
         for _ in range(60):
-            at = step(joints, at)[0]
+            move = step(joints, at)[0] - at
+            at += move * np.minimum(1.0, 0.5 / np.linalg.norm(move, axis=-1, keepdims=True))
         at = at[np.isfinite(at).all(axis=-1)]
         at = at[step(joints, at)[1] < 1e-13]
     place, axes = platform.at(at)

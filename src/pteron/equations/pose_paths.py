@@ -7,9 +7,9 @@ times x.x, is
 
     e.e - r^2 x.x,  e = 2 y + x b - a x,    or    (n x).(2 y + x b) - h x.x.
 
-So all closures are quadrics. Six spheres meet in 40 poses, three about a point P that stays, y = 0,
-in 8, and three spheres and three planes of the same three points in 16, complex poses among them,
-for all machines but special ones. Along a straight path between two machines, from one in general
+So all closures are quadrics. Six spheres meet in 40 poses, in 16 where their platform points
+coincide in pairs, three about a point P that stays, y = 0, in 8, and three spheres and three planes
+of the same three points in 16, complex poses among them, for all machines but special ones. Along a straight path between two machines, from one in general
 complex numbers whose poses are known, poses neither meet nor vanish (Sommese and Wampler, The
 numerical solution of systems of polynomials, 2005, chapter 7). `stepped` makes a step along it.
 """
@@ -31,6 +31,9 @@ class Closed(NamedTuple):
     planes: int
     moves: bool
     """Whether P moves; else it is the origin."""
+
+    paired: bool = False
+    """Whether the platform points coincide in pairs, the first with the second, and so on."""
 
     @property
     def equations(self) -> int:

@@ -15,7 +15,12 @@ from pteron.equations.pose_paths import Closed
 from pteron.kernels import Array
 from pteron.kinematics.pose_paths import FILE, Complex, Generic, followed, key_of, rotation
 
-_ALL = {Closed(3, 0, False): 8, Closed(3, 3, True): 16, Closed(6, 0, True): 40}
+_ALL = {
+    Closed(3, 0, False): 8,
+    Closed(3, 3, True): 16,
+    Closed(6, 0, True): 40,
+    Closed(6, 0, True, paired=True): 16,
+}
 """The number of poses that machines of each kind have."""
 
 _COMPLEX = 0.25
@@ -38,6 +43,8 @@ def random_machine(closed: Closed, rng: np.random.Generator) -> tuple[Complex, C
     )
     if closed.moves and not closed.planes:
         a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    if closed.paired:
+        b[1::2] = b[::2]
     if closed.planes:  # of the same points
         b[closed.spheres :] = b[: closed.planes]
     c = place + b @ rotation(x).T

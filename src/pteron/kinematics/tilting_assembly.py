@@ -40,6 +40,12 @@ def tilting_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64],
         len(platform.planes),
         platform.center is None,
     )
+    if closed.spheres == 6:
+        ends = [leg.platform_point for leg in robot.legs]
+        order = sorted(range(6), key=lambda k: ends.index(ends[k]))
+        pairs = zip(order[::2], order[1::2], strict=True)
+        closed = closed._replace(paired=all(ends[i] == ends[j] for i, j in pairs))
+        a, b, r = a[:, order], b[order], r[:, order]
     base, top = np.zeros((len(good), 3)), np.zeros(3)
     if closed.moves:
         base, top = a[:, : closed.spheres].mean(axis=1), b[: closed.spheres].mean(axis=0)
