@@ -9,9 +9,10 @@ times x.x, is
 
 So all closures are quadrics. Six spheres meet in 40 poses, in 16 where their platform points
 coincide in pairs, three about a point P that stays, y = 0, in 8, and three spheres and three planes
-of the same three points in 16, complex poses among them, for all machines but special ones. Along a straight path between two machines, from one in general
-complex numbers whose poses are known, poses neither meet nor vanish (Sommese and Wampler, The
-numerical solution of systems of polynomials, 2005, chapter 7). `stepped` makes a step along it.
+of the same three points in 16, complex poses among them, for all machines but special ones. Along a
+straight path between two machines, from one in general complex numbers whose poses are known, poses
+neither meet nor vanish (Sommese and Wampler, The numerical solution of systems of polynomials,
+2005, chapter 7). `stepped` makes a step along it.
 """
 
 from __future__ import annotations
