@@ -1,4 +1,4 @@
-"""Determinants and adjugates of small matrices of expressions, without a pivot to choose."""
+"""Determinants, adjugates and solutions of small systems of expressions, without a pivot."""
 
 from __future__ import annotations
 

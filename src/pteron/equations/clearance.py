@@ -32,6 +32,7 @@ Segment = tuple[Expression, Expression]
 """Both ends, (3, 1)."""
 
 Kind = Literal["guide", "upper", "lower", "platform"]
+"""Kinds of bodies: a slider's guide, an upper link or crank, a last link or rods, the platform."""
 
 _COINCIDENT = 1e-9
 """m between points, or guides, that are one."""

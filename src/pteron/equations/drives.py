@@ -1,6 +1,7 @@
 """Forces of the drives beside those of the rigid bodies: friction and the motors' inertia.
 
-Stated once, here; `Drive` says what the numbers are.
+The platform's acceleration under the forces of the drives follows. `Drive` says what the numbers
+of a drive are.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Stiffness at the tool, from the elasticity of actuators and links."""
+"""Stiffness at the tool, and natural frequencies, from the elasticity of actuators and links."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The platform: which motions it has, about which axis it turns, and its inertia."""
+"""The platform: which motions it has, about which axes it turns, its parts, inertia and tool."""
 
 from __future__ import annotations
 
