@@ -9,13 +9,13 @@
 
 #ifdef SYMBOLIC
 #include <pinocchio/autodiff/casadi.hpp>
-#endif
-#include <pinocchio/algorithm/rnea.hpp>
-#include <pinocchio/multibody.hpp>
-
+#else
 // Unbounded revolute joints take cosine and sine, so that nothing needs an arctangent.
 #define UNBOUNDED
 #include CLOSED_FORM
+#endif
+#include <pinocchio/algorithm/rnea.hpp>
+#include <pinocchio/multibody.hpp>
 
 namespace {
 
@@ -29,25 +29,6 @@ struct Joint {
     double kind, parent;
     double rotation[9], offset[3], axis[3];
     double mass, center[3], inertia[3];
-};
-
-struct Peer {
-    Closure closure;
-    pinocchio::Model model;
-    pinocchio::Data data;
-    Eigen::Matrix<double, NQ, 1> q;
-    Eigen::Matrix<double, NV, 1> v, a;
-
-    Peer(const pinocchio::Model &tree, const double *numbers) : model(tree), data(tree) {
-        std::memcpy(static_cast<void *>(&closure), numbers, sizeof(Closure));
-    }
-
-    void inverse(const double *pose, const double *velocity, const double *acceleration,
-                 double *forces) {
-        Legs legs;
-        before(&closure, pose, velocity, acceleration, q.data(), v.data(), a.data(), &legs);
-        after(&closure, &legs, pinocchio::rnea(model, data, q, v, a).data(), forces);
-    }
 };
 
 pinocchio::Model built(const Joint *joints, int count, const double *gravity) {
@@ -86,19 +67,31 @@ pinocchio::Model built(const Joint *joints, int count, const double *gravity) {
     return model;
 }
 
+#ifndef SYMBOLIC
+struct Peer {
+    Closure closure;
+    pinocchio::Model model;
+    pinocchio::Data data;
+    Eigen::Matrix<double, NQ, 1> q;
+    Eigen::Matrix<double, NV, 1> v, a;
+
+    Peer(const pinocchio::Model &tree, const double *numbers) : model(tree), data(tree) {
+        std::memcpy(static_cast<void *>(&closure), numbers, sizeof(Closure));
+    }
+
+    void inverse(const double *pose, const double *velocity, const double *acceleration,
+                 double *forces) {
+        Legs legs;
+        before(&closure, pose, velocity, acceleration, q.data(), v.data(), a.data(), &legs);
+        after(&closure, &legs, pinocchio::rnea(model, data, q, v, a).data(), forces);
+    }
+};
+#endif
+
 }  // namespace
 
 #pragma GCC visibility push(default)
 extern "C" {
-
-Peer *create(const double *joints, int count, const double *gravity, const double *closure) {
-    try {
-        const auto model = built(reinterpret_cast<const Joint *>(joints), count, gravity);
-        return model.nq == NQ && model.nv == NV ? new Peer(model, closure) : nullptr;
-    } catch (const std::exception &) {
-        return nullptr;
-    }
-}
 
 #ifdef SYMBOLIC
 // Write the function from (q, v, a) to tau to a file.
@@ -122,7 +115,15 @@ int save(const double *joints, int count, const double *gravity, const char *pat
         return 1;
     }
 }
-#endif
+#else
+Peer *create(const double *joints, int count, const double *gravity, const double *closure) {
+    try {
+        const auto model = built(reinterpret_cast<const Joint *>(joints), count, gravity);
+        return model.nq == NQ && model.nv == NV ? new Peer(model, closure) : nullptr;
+    } catch (const std::exception &) {
+        return nullptr;
+    }
+}
 
 // Fill the forces of a batch and return the seconds that it took.
 double sweep(Peer *peer, std::int64_t count, const double *pose, const double *velocity,
@@ -132,4 +133,5 @@ double sweep(Peer *peer, std::int64_t count, const double *pose, const double *v
         peer->inverse(pose + i, velocity + i, acceleration + i, forces + i);
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
+#endif
 }

@@ -143,10 +143,9 @@ def c_generated(robot: pteron.Manipulator) -> Sweep:
         raise Missing("the package casadi or pin is not installed")
     folder = Path(ca.__file__).parent
     closure = closed_form(robot, robot.platform.turns)
-    header, _ = closure.in_c(unbounded=True)
     options = ["-std=c++17", "-O1", "-DSYMBOLIC", *_BOOST, *_includes()]
     options += ["-I", str(folder / "include"), f"-L{folder}", "-lcasadi", f"-Wl,-rpath,{folder}"]
-    library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"), header)
+    library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"), "")
     joints, gravity = _table(tree(robot, robot.platform.turns)), np.array(robot.gravity)
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "rnea.casadi"
