@@ -13,7 +13,9 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from measuring import quick
@@ -26,7 +28,7 @@ from pteron.platforms import Platform
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-import tilting
+tilting: Any = import_module("tilting")
 
 _BASE = """
 0 0 0, 1.107915 0 0, 0.549094 0.756063 0, 0.735077 -0.223935 0.525991,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import lu
+from scipy.linalg import lu  # type: ignore[import-untyped]
 
 import pteron
 from peers.closure import Array, Expression
