@@ -30,6 +30,8 @@ def _model(robot: pteron.Manipulator, carried: bool, closed: bool = False) -> An
     """Return the tree; with its loops closed by constraints if asked for."""
     import mujoco
 
+    if robot.platform.tilts:
+        raise Missing("its peer is not written for platforms that tilt")
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = robot.gravity
