@@ -116,15 +116,17 @@ def test_its_test_program_passes(tmp_path, name, real, compiler):
 @pytest.mark.parametrize("left_out", gated([(), LARGE], [LARGE]), ids=len)
 def test_every_function_can_be_exported_and_the_test_program_can_fail(tmp_path, left_out):
     names = [n for n in pteron.kernels.FUNCTIONS if n not in ("base_regressor", *left_out)]
-    pteron.export_c(DELTA, names, tmp_path)
-    build(tmp_path, ["delta.c", "test_delta.c"])
+    files = ["five_bar.c", "test_five_bar.c"]
+    pteron.export_c(ROBOTS["five_bar"], names, tmp_path)
+    build(tmp_path, files)
     assert run(tmp_path)[0] == 0
-    source = tmp_path / "delta.c"
-    source.write_text(source.read_text().replace("0.205", "0.206"))
-    build(tmp_path, ["delta.c", "test_delta.c"], "-O0")
+    source = tmp_path / "five_bar.c"
+    length = str(ROBOTS["five_bar"].legs[0].lower_length)
+    source.write_text(source.read_text().replace(length, str(1.01 * float(length))))
+    build(tmp_path, files, "-O0")
     code, output = run(tmp_path)
     assert code == 1
-    assert "jacobian: off by" in output
+    assert "direct_kinematics: off by" in output
 
 
 @cache

@@ -417,7 +417,7 @@ def test_text_can_be_read():
 def test_every_function_can_be_a_block(tmp_path, left_out):
     """What a machine has not, such as a rod's angle, is left alone."""
     names = [what for what in pteron.kernels.FUNCTIONS if what not in ("base_regressor", *left_out)]
-    for path in pteron.export_st(ROBOTS["delta"], names, tmp_path):
+    for path in pteron.export_st(ROBOTS["five_bar"], names, tmp_path):
         Block(read(path.read_text()))
 
 

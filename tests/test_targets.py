@@ -185,7 +185,8 @@ def test_c_on_other_modes_layouts_and_gravity(name):
         pytest.param("quadrupteron-oblique", "direct_kinematics", marks=NIGHTLY),
         pytest.param("quadrupteron-oblique", DYNAMICS, marks=NIGHTLY),
         pytest.param("tripteron", DYNAMICS, marks=NIGHTLY),
-        ("delta", "direct_kinematics"),
+        pytest.param("delta", "direct_kinematics", marks=NIGHTLY),
+        ("delta", "inverse_kinematics"),
         pytest.param("random PRR 0", DYNAMICS, marks=NIGHTLY),
     ],
 )

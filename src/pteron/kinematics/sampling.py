@@ -22,6 +22,9 @@ _BATCH = 4096
 _ATTEMPTS = 250
 """Batches drawn before it is concluded that poses in reach are too rare."""
 
+_MANY = 50
+"""Poses that are not found by a last stroke of luck."""
+
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
 
@@ -148,7 +151,8 @@ def _drawn(
     found: list[Array] = []
     total = reached = 0
     seen = np.empty((0, robot.freedom))
-    for _ in range(_ATTEMPTS + count // 16):
+    attempts = _ATTEMPTS + count // 16
+    for k in range(1, attempts + 1):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
         poses = wanted.reached(robot, 0.5 * (low + high) + 0.5 * (high - low) * poses)
         reached += len(poses)
@@ -157,6 +161,9 @@ def _drawn(
         total += len(found[-1])
         if total >= count:
             return np.concatenate(found)
+        # A quarter of the attempts tells, where many poses are wanted, that they will not be found.
+        if k == attempts // 4 and count >= _MANY and total < count / 16:
+            break
     if reached >= count:
         raise ModelError(
             f"only {total} of {reached} random poses in reach of all legs keep the limits of "
@@ -165,7 +172,7 @@ def _drawn(
             subject=robot.name,
         )
     raise ModelError(
-        f"only {total} of {_ATTEMPTS * _BATCH} random poses are in reach of all legs and away from "
+        f"only {total} of {k * _BATCH} random poses are in reach of all legs and away from "
         "singularities; bring the guide points nearer or lengthen the links",
         subject=robot.name,
     )
