@@ -348,9 +348,13 @@ def gated(cases, gate=GATE, mark=NIGHTLY):
     return [case if case in gate else pytest.param(case, marks=mark) for case in every]
 
 
-def several(cases, gate):
-    """Return the cases of a claim with several arguments; those not of the gate wait."""
-    return [case if case in gate else pytest.param(*case, marks=NIGHTLY) for case in cases]
+def several(cases, gate, mark=NIGHTLY):
+    """Return the cases of a claim with several arguments; those not of the gate wait likewise."""
+    return [case if case in gate else pytest.param(*case, marks=mark) for case in cases]
+
+
+TURNS = {}
+"""By file and its gate, the cases that had a turn."""
 
 
 def in_turn(cases, gate=GATE, share=3, argument="name", **options):
@@ -360,11 +364,13 @@ def in_turn(cases, gate=GATE, share=3, argument="name", **options):
     is tried against what is said of machines, and a claim against kinds of machines, but not every
     pair of the two before `make nightly`.
     """
-    turns = cycle([case for case in gate if case in set(cases)])
+    own = [case for case in gate if case in set(cases)]
+    turns = cycle(own)
 
     def parametrized(test):
-        some = gated(cases, list(islice(turns, share)))
-        return pytest.mark.parametrize(argument, some, **options)(test)
+        chosen = list(islice(turns, share))
+        TURNS.setdefault((test.__module__, *own), set()).update(chosen)
+        return pytest.mark.parametrize(argument, gated(cases, chosen), **options)(test)
 
     return parametrized
 

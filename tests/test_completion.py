@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from mechanisms import CLIENTS
 
 pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
 
@@ -42,6 +43,7 @@ def bash(code: str, folder: Path) -> str:
     return done.stdout
 
 
+@CLIENTS
 def test_bash_completes_machines_parameters_functions_and_choices(tmp_path: Path):
     (tmp_path / "robots").mkdir()
     for file in ("robots/drawn.csv", "robots/drawn.toml"):

@@ -47,7 +47,7 @@ def with_drives(robot, friction=1.0):
 MACHINES = {
     **{name: CATALOG[name] for name in ("quadrupteron", "delta", "par4", "five-bar")},
     "quadrupteron-oblique": CATALOG["quadrupteron-oblique"],
-    "random PRSU": random_machine(2, "PRSU"),
+    "random PRSU": random_machine(0, "PRSU"),
 }
 FEW = ("five-bar", "delta", "random PRSU")
 LAWS = tuple(CONTROLLERS)

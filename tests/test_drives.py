@@ -14,7 +14,7 @@ from pteron.kernels import program
 
 MACHINES = {
     **{name: CATALOG[name] for name in ("quadrupteron", "delta-4", "par4", "five-bar")},
-    "random PRSU": random_machine(2, "PRSU"),
+    "random PRSU": random_machine(0, "PRSU"),
 }
 EVERY = in_turn(MACHINES, ["delta-4", "five-bar", "random PRSU"], share=1)
 

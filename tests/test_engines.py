@@ -52,8 +52,8 @@ def machine(name):
         angles = "xyz" if kinds[-1] == "xyz" else "rpy"
         robot, home = tilting.machine(motion, [k for k in kinds if k != "xyz"], 3, angles)
         return robot, tilting.states(robot, home, COUNT), home
-    robot = random_machine(1, name)
-    return robot, descriptions.states(descriptions.describe(robot), COUNT, 1), None
+    robot = random_machine(0, name)
+    return robot, descriptions.states(descriptions.describe(robot), COUNT, 0), None
 
 
 EVERY = mechanisms.in_turn(

@@ -624,7 +624,7 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
 def test_the_command_says_what_it_leaves_out(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # A base parameter of the five-bar is 0: its column has no nominal size.
-    result = run(f"excite five-bar {QUICK} --seconds 1")
+    result = run(f"excite five-bar {QUICK} --seconds 0.5")
     assert result.exit_code == 0
     assert result.stderr == (
         "Note: no file will be written; to have the trajectory, add --out FILE.csv\n"
@@ -633,13 +633,13 @@ def test_the_command_says_what_it_leaves_out(tmp_path: Path, monkeypatch):
     assert "nan" not in result.stdout
     assert "nominal value is 0" in " ".join(result.stdout.split())
     assert not list(tmp_path.iterdir())
-    found = json.loads(run(f"excite five-bar {QUICK} --seconds 1 --json").stdout)
+    found = json.loads(run(f"excite five-bar {QUICK} --seconds 0.5 --json").stdout)
     assert found["conditioning"]["nominal"] is None
 
 
 def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = run(f"excite quadrupteron {QUICK} --space joints --seconds 2 --elbows +-+- --json")
+    result = run(f"excite quadrupteron {QUICK} --space joints --seconds 1 --elbows +-+- --json")
     assert (result.exit_code, result.stderr) == (0, "")
     found = json.loads(result.stdout)
     assert found["conditioning"]["scaled"] <= found["random"]["scaled"]

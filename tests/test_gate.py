@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import tilting
-from mechanisms import CATALOG, GATE, MACHINES, NIGHTLY, random_machine
+from mechanisms import CATALOG, GATE, MACHINES, NIGHTLY, TURNS, random_machine
 from test_family import KINDS as MIXTURES
 
 from pteron.closures import KINDS as CLOSURES
@@ -48,6 +48,10 @@ def test_both_sides_of_each_choice_are_there():
     }
     for choice, of in choices.items():
         assert {of(robot) for robot in CHOSEN} == {True, False}, choice
+
+
+def test_in_each_file_every_machine_of_its_gate_has_a_turn():
+    assert [file for (file, *gate), taken in TURNS.items() if taken != set(gate)] == []
 
 
 @NIGHTLY

@@ -14,7 +14,7 @@ import pytest
 import xarray
 import zarr
 from dying import dies_once, rows, slow_rows
-from mechanisms import CATALOG
+from mechanisms import CATALOG, CLIENTS
 
 import pteron
 from pteron.errors import DataError, ModelError, OutputError
@@ -328,6 +328,7 @@ def test_indices_and_machines_that_do_not_go_together_are_refused(delta):
 
 
 # Whom a killed process was talking to finds its sockets closed, in threads of its own.
+@CLIENTS
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
@@ -365,6 +366,7 @@ with distributed.LocalCluster(1, threads_per_worker=1, **options) as cluster:
 """
 
 
+@CLIENTS
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from logs_of_motions import log_of
-from mechanisms import CATALOG, MECHANISMS, gated, several
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated, several
 from PIL import Image
 from test_report import driven
 
@@ -123,6 +123,7 @@ def test_a_drag_turns_the_view_and_a_button_turns_it_back(browser, page_of):
         assert picture(page) == before
 
 
+@CLIENTS
 def test_the_wheel_is_the_pages_until_the_view_is_clicked(browser, page_of):
     with opened(browser, page_of("report", "driven")) as page:
         place = page.evaluate_handle("window")
@@ -168,6 +169,7 @@ def border(image, width):
     return inner
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("name", "width"),
     several([("quadrupteron", 390), ("mixed", 1440), ("3-rrr", 390)], [("3-rrr", 390)]),
@@ -216,6 +218,7 @@ def seconds(page):
     return float(page.inner_text("#clock").split()[0])
 
 
+@CLIENTS
 @pytest.mark.parametrize("kind", ["motion", "out"])
 def test_playback_keeps_the_time_it_says(browser, page_of, kind):
     whole = cycle("quadrupteron").duration
@@ -253,6 +256,7 @@ def test_playback_keeps_the_time_it_says(browser, page_of, kind):
             assert 0.0 < seconds(page) < 0.2
 
 
+@CLIENTS
 def test_a_motion_begins_by_itself_where_motion_is_welcome(browser, page_of):
     with opened(browser, page_of("motion", "quadrupteron"), reduced_motion="no-preference") as page:
         assert page.get_attribute("#play", "aria-label") == "Pause"
@@ -304,7 +308,7 @@ def test_the_numbers_shown_are_the_librarys(browser, page_of, name):
 
 
 PAGES = [("report", "driven"), ("out", "3-rrr"), ("motion", "par4"), ("identification", "")]
-EACH_PAGE = pytest.mark.parametrize(("kind", "name"), PAGES)
+EACH_PAGE = pytest.mark.parametrize(("kind", "name"), several(PAGES, PAGES[:1], CLIENTS))
 
 
 @pytest.mark.parametrize(
@@ -315,7 +319,8 @@ EACH_PAGE = pytest.mark.parametrize(("kind", "name"), PAGES)
             *(("out", "3-rrr", width) for width in (390, 1440)),
             *(("identification", "", width) for width in (390, 1440)),
         ],
-        [("report", "driven", 390), ("out", "3-rrr", 1440), ("identification", "", 390)],
+        [("report", "driven", 390)],
+        CLIENTS,
     ),
 )
 def test_a_page_is_as_broad_as_its_window_and_cuts_nothing_without_a_cue(
@@ -412,6 +417,7 @@ def bare(text):
     return re.sub(r"[\W_]+", "", text)
 
 
+@CLIENTS
 def test_without_a_script_there_is_a_picture(browser, page_of):
     path = page_of("motion", "quadrupteron")
     with opened(browser, path, java_script_enabled=False) as page:

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+from mechanisms import CLIENTS
+
 SCRIPT = """
 from jaxtyping import install_import_hook
 
@@ -42,6 +44,7 @@ for name, middle in (("quadrupteron", [0, 0, 0, 0]), ("delta", [0, 0, -0.8])):
 """
 
 
+@CLIENTS
 def test_public_functions_take_and_return_the_shapes_that_they_say():
     done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]

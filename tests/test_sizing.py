@@ -29,7 +29,7 @@ BARE = {
     **{name: CATALOG[name] for name in ("quadrupteron-oblique", "delta-4", "par4", "five-bar")},
     "another mode": with_elbows(CATALOG["quadrupteron"], "+-+-"),
     "mixed": random_machine(0, "PRS"),
-    "random": random_machine(3, "PPPP"),
+    "random": random_machine(0, "PPPP"),
     "sliding": random_machine(0, "PRSSI"),
     "planar": random_machine(0, "CLP"),
 }

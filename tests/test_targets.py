@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from mechanisms import (
     CATALOG,
+    CLIENTS,
     MECHANISMS,
     NEAREST,
     NIGHTLY,
@@ -285,6 +286,7 @@ def test_jax(what):
     assert_close(compiled(robot, what, "jax")(*values), expected, 1e-13)
 
 
+@CLIENTS
 def test_jax_is_a_pure_function_that_jits_maps_and_differentiates():
     jax = pytest.importorskip("jax")
     kernel = compiled(ROBOT, DYNAMICS, "jax", grade="parametric")
@@ -754,6 +756,7 @@ def test_the_oldest_texts_give_way(fresh):
     assert cache.find_text("0") is None
 
 
+@CLIENTS
 def test_the_numba_code_is_cached_too(fresh):
     pytest.importorskip("numba")
     script = textwrap.dedent("""

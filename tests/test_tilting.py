@@ -97,7 +97,7 @@ def test_a_file_holds_all_of_it(drawn, tmp_path):
 
 @pytest.mark.parametrize(("motion", "kind"), [("3T3R", "UPS"), ("2R", "RSS"), ("1T2R", "PRS")])
 def test_a_machine_turned_as_a_whole_needs_the_same_forces(motion, kind):
-    robot, home = tilting.machine(motion, (kind,), 5)
+    robot, home = tilting.machine(motion, (kind,), 3)
     x, dx, ddx = tilting.states(robot, home, 5)
     turn = tilting.rotation(np.random.default_rng(8))
     moved = [np.array(v) for v in (x, dx, ddx)]

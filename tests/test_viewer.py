@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import polars as pl
 import pytest
-from mechanisms import MECHANISMS, gated
+from mechanisms import CLIENTS, MECHANISMS, gated
 
 import pteron
 from pteron.kinematics.jacobian_at import jacobian_at
@@ -489,6 +489,7 @@ def test_a_drag_out_of_reach_stops_and_names_the_leg(page, viewer):
     )
 
 
+@CLIENTS
 def test_the_picture_is_not_blank_and_changes_with_the_pose(page, viewer):
     canvas = page.locator("canvas").first
     page.evaluate("() => new Promise(done => setTimeout(done, 800))")
@@ -532,6 +533,7 @@ def alike(one, other):
     return False
 
 
+@CLIENTS
 def test_a_reload_and_a_second_tab_show_the_same(page, viewer, browser):
     slide(page, "z (mm)", ["ArrowRight"] * 7)
     slide(page, "phi (°)", ["ArrowRight"] * 9)
@@ -551,6 +553,7 @@ def field(tab, label):
     return tab.locator(f"text={label}").locator("xpath=ancestor::*[.//input][1]//input").first
 
 
+@CLIENTS
 def test_what_is_typed_wrongly_is_told_on_the_page(page, viewer):
     field(page, "payload (kg)").fill("0.4")
     settled = "() => !document.querySelector('[role=status]').innerText.includes('payload')"
@@ -639,6 +642,7 @@ def test_no_other_page_opens_the_viewers_socket(browser, local):
         tab.close()
 
 
+@CLIENTS
 def test_the_page_opens_by_the_other_names_of_this_machine_and_in_a_frame(browser, local):
     with view(pteron.load("five-bar"), port=0, host="::1") as viewer, opened(browser, viewer.url):
         assert viewer.url == f"http://[::1]:{viewer.port}"
@@ -651,6 +655,7 @@ def test_the_page_opens_by_the_other_names_of_this_machine_and_in_a_frame(browse
         tab.close()
 
 
+@CLIENTS
 def test_a_lost_connection_and_a_server_that_starts_again(browser):
     robot = pteron.load("five-bar")
     with view(robot, port=0) as first, opened(browser, first.url) as tab:
