@@ -66,10 +66,11 @@ class Worst:
 
 def main() -> None:
     """Print a row for each combination; exit with 1 if a bound is broken or counts differ."""
-    cases = [(motion, kind) for motion, kinds in tilting.LEGS.items() for kind in kinds]
+    motions = reversed(tilting.LEGS)  # those with few legs first
+    cases = [(motion, kind) for motion in motions for kind in tilting.LEGS[motion]]
     faults = []
     print(f"{'':10}machines states modes", *(f"{name:>8}" for name in _BOUNDS), " base", flush=True)
-    for motion, kind in [cases[0], cases[-1]] if quick() else cases:
+    for motion, kind in [cases[0], cases[3]] if quick() else cases:
         name, worst = f"{motion} {kind}", Worst()
         for seed in range(3 * _MACHINES):
             if worst.machines < _MACHINES:

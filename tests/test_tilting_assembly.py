@@ -104,6 +104,7 @@ def test_poses_are_counted_another_way(name):
         ],
         axis=-1,
     )
+    assert np.isnan(step(joints, np.full_like(x[0], np.nan))[1])
     with np.errstate(all="ignore"):
         for _ in range(40):
             at = step(joints, at)[0]

@@ -1,6 +1,7 @@
 """Tilts and balls of places that are proved to lie in the workspace of a platform that tilts."""
 
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -9,7 +10,14 @@ from mechanisms import NIGHTLY
 
 import pteron
 from pteron.errors import DataError, ModelError
-from pteron.workspace import conditions, largest_ball, largest_cube, largest_tilt
+from pteron.workspace import (
+    clearance,
+    conditions,
+    interference,
+    largest_ball,
+    largest_cube,
+    largest_tilt,
+)
 from pteron.workspace.conditions import keeps
 
 drawn = lru_cache(tilting.machine)
@@ -75,3 +83,35 @@ def test_what_has_no_tilt_or_no_place_is_told():
         largest_ball(tripod, home, tilt=2.0)
     with pytest.raises(ModelError, match="not even the middle"):
         largest_tilt(tripod, home + 10.0)
+
+
+def rams_apart(robot, poses, count=60):
+    """Return the least distance of the rams' centre lines (B,), from points along them."""
+    p, axes = robot.platform.at(poses)
+    share = np.linspace(0.0, 1.0, count)[:, None]
+    lines = []
+    for leg in robot.legs:
+        end = p + np.array(leg.platform_point) @ axes
+        lines.append(leg.guide_point + share * (end[:, None] - leg.guide_point))
+    return np.min(
+        [
+            np.linalg.norm(a[:, :, None] - b[:, None], axis=-1).min(axis=(1, 2))
+            for a, b in combinations(lines, 2)
+        ],
+        axis=0,
+    )
+
+
+def test_a_tilt_keeps_the_legs_apart():
+    robot = pteron.load("wrist")
+    home, thick = np.zeros(3), 0.06
+    asked = (*conditions(robot), *interference(robot, thick / 2))
+    found = largest_tilt(robot, home, tolerance=0.02, given=asked)
+    assert found.tilt < 0.95 * largest_tilt(robot, home, tolerance=0.02).tilt
+    poses = leaning(robot, home, found.tilt, 1000)
+    fine = 5e-4  # by which points along two lines are farther apart than the lines, at most
+    assert thick < rams_apart(robot, poses).min() < thick + 0.002
+    exact = clearance(robot, poses, 0.0).least
+    np.testing.assert_array_less(exact, rams_apart(robot, poses) + 1e-12)
+    np.testing.assert_allclose(exact, rams_apart(robot, poses), atol=fine)
+    assert rams_apart(robot, leaning(robot, home, 1.04 * found.tilt, 1000)).min() < thick

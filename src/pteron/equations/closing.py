@@ -35,6 +35,9 @@ that it counts as closed, but each step's determinant is half of the last one's 
 _NOTHING = 1e-9
 """Length that counts as zero beside any machine, m."""
 
+_KEPT = 1e-300
+"""Share of a sum that changes no number but keeps what is none."""
+
 
 class Rows(NamedTuple):
     """The closures of legs whose joints are held, for v = (p - origin) / size.
@@ -184,7 +187,8 @@ def newton_step(
     """Return the pose after one step, and what the pose before it missed (`Misses.relative`)."""
     missed = misses(machine, joints, pose)
     step, determinant = missed.step
-    return pose + step / determinant, missed.relative
+    # The largest drops what is not a number, which a sum keeps.
+    return pose + step / determinant, missed.relative + _KEPT * ca.norm_1(missed.lengths)
 
 
 class Stepped(NamedTuple):
