@@ -149,8 +149,10 @@ def others(motion: str, kinds: tuple[str, ...]) -> None:
     for kind in kinds:
         for seed in range(1 if quick() else 10):
             robot, home = tilting.machine(motion, (kind,), seed)
-            pose = tilting.states(robot, home, 1, seed)[0][0]
-            joints = pteron.inverse_kinematics(robot, pose)
+            poses = tilting.states(robot, home, 1, seed)[0]
+            if not len(poses):
+                continue  # none in reach
+            joints = pteron.inverse_kinematics(robot, poses[0])
             count = real(pteron.direct_kinematics(robot, joints, all_branches=True))
             found = searched(robot, joints)
             all_counts[count] += 1
