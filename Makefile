@@ -29,7 +29,7 @@ quick: $(VENV)/.dev
 	$(BIN)/ruff check
 	$(PYTEST) --quiet $(QUICK:%=tests/test_%.py)
 
-# What uses the library as others do: benchmarks, examples, notebooks, other programs, whole ways.
+# What uses the library as others do: benchmarks, examples, notebooks, browsers, other programs.
 clients: $(VENV)/.dev
 	$(PYTEST) --dist worksteal -m "clients and not nightly"
 
