@@ -84,7 +84,7 @@ def minimised(
 
     def measured(z: Array) -> tuple[float, Array]:
         value, gradient = cost(z.reshape(start.shape))
-        return float(value), _numbers(gradient).ravel()
+        return float(_numbers(value).item()), _numbers(gradient).ravel()
 
     found = sequential_minimum(
         NonlinearProgram(measured, kept.values, kept.slopes),
@@ -101,10 +101,10 @@ def _numbers(matrix: ca.DM) -> Array:
     """Return the entries of a matrix; in the middle of an interrupt CasADi gives none, or fails."""
     try:
         found: Array | None = matrix.full()
+        if found is None:
+            raise KeyboardInterrupt  # a SystemError where an exception is pending
     except SystemError:
-        found = None
-    if found is None:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt from None
     return found
 
 
