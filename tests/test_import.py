@@ -148,7 +148,7 @@ ALLOWED = {
     ("manipulator/files.py", "a kind of leg"): "the kind where a file names none",
     ("manipulator/variants.py", "an elbow"): "working modes",
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
-    ("export/klipper/", "an elbow"): "where Klipper has it, in the message that refuses",
+    ("export/printers/", "an elbow"): "where Klipper has it, in the message that refuses",
     ("report/", "an elbow"): "the working mode",
     ("viewer/", "an elbow"): "the working mode",
     ("workspace/machine_warnings.py", "an elbow"): "whether another working mode is meant",

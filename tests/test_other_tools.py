@@ -628,7 +628,7 @@ LINEAR, DELTA = CATALOG["linear-delta"], CATALOG["delta"]
         (CATALOG["orthoglide"], "leg 1: its guide is not vertical"),
         (CATALOG["delta-omnid"], "turn a model over whose platform is above"),
         (MECHANISMS["random PRR 0"], "neither all linear in the pose"),
-        (with_leg(LINEAR, guide_point=(0.105, -0.0599, 0.0)), r"leg 2: is [\d.]+ mm from the z"),
+        (with_leg(LINEAR, guide_point=(0.14, -0.0599, 0.0)), r"leg 2: is [\d.]+ mm from the z"),
         (with_leg(LINEAR, lower_length=0.09), "rod of 90 mm is shorter than the radius, 99.8 mm"),
         (with_elbows(LINEAR, "+++"), "leg 1: its slider is below the platform"),
         (with_elbows(DELTA, "+-+"), "leg 2: its elbow is inside"),

@@ -21,7 +21,10 @@ Output = Literal["force", "torque", "percent"]
 
 _to = partial(option, metavar="DIR")
 
-_TARGETS = ("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu", "klipper", "linuxcnc")
+_TARGETS = (
+    *("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu"),
+    *("klipper", "marlin", "reprap", "linuxcnc"),
+)
 """The options that name a folder to write to; `pteron.export.export_NAME` writes it."""
 
 
@@ -41,6 +44,12 @@ def export(
     fmu: Annotated[str | None, _to("fmu", "Write an FMU of FMI 3.0.")] = None,
     klipper: Annotated[
         str | None, _to("klipper", "Write the kinematics of a Klipper configuration.")
+    ] = None,
+    marlin: Annotated[
+        str | None, _to("marlin", "Write M665 and M666 of a linear Delta for Marlin.")
+    ] = None,
+    reprap: Annotated[
+        str | None, _to("reprap", "Write M665 and M666 of a linear Delta for RepRapFirmware.")
     ] = None,
     linuxcnc: Annotated[str | None, _to("linuxcnc", "Write kinematics for LinuxCNC.")] = None,
     function: Annotated[
@@ -91,7 +100,7 @@ def export(
     `joint_feed_forward_base`. The others write one thing each, with no options but --elbows and
     --json.
     """
-    folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, linuxcnc)
+    folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
     asked = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
     options = {
         "function": function,

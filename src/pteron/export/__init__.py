@@ -16,8 +16,8 @@ from pteron.export.engines import (
 )
 from pteron.export.fmu import export_fmu
 from pteron.export.functions import FUNCTIONS
-from pteron.export.klipper import export_klipper
 from pteron.export.linuxcnc import export_linuxcnc
+from pteron.export.printers import export_klipper, export_marlin, export_reprap, from_klipper
 from pteron.export.structured_text import export_st
 
 __all__ = [
@@ -31,11 +31,14 @@ __all__ = [
     "export_fmu",
     "export_klipper",
     "export_linuxcnc",
+    "export_marlin",
     "export_mjcf",
     "export_pinocchio",
+    "export_reprap",
     "export_sdf",
     "export_st",
     "export_urdf",
+    "from_klipper",
     "mjcf",
     "pinocchio_model",
     "tree",

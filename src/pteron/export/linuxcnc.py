@@ -52,7 +52,7 @@ _LETTERS |= dict.fromkeys(("yaw", "rz"), "C") | {"x": "X", "y": "Y", "z": "Z"}
 
 
 @dataclass(frozen=True)
-class _Axis:
+class LinuxCncAxis:
     """A coordinate of the pose and the axis of LinuxCNC that it is."""
 
     letter: str
@@ -185,7 +185,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     exported = chosen(robot, names, specialised=True, wrench=False, output="force", base=None)
     texts = c_texts(robot, exported)
     home = start_pose(robot)
-    axes, joints = _axes(robot), tuple(_joints(given, home))
+    axes, joints = linuxcnc_axes(robot), tuple(_joints(given, home))
     platform, seen = robot.platform, home.copy()
     seen[~platform.angular] += platform.directions @ (platform.tool @ platform.at(home)[1])
     tilted = _TurnedArm.of(platform, home) if platform.tilts else None
@@ -246,7 +246,7 @@ def _linear(robot: Manipulator) -> bool:
     )
 
 
-def _axes(robot: Manipulator) -> tuple[_Axis, ...]:
+def linuxcnc_axes(robot: Manipulator) -> tuple[LinuxCncAxis, ...]:
     """Return the axes of LinuxCNC that the pose's coordinates are."""
     letters = iter("XYZ")
     found = []
@@ -254,18 +254,18 @@ def _axes(robot: Manipulator) -> tuple[_Axis, ...]:
         if robot.platform.tilts:
             letter, angle = _LETTERS[name], unit == "rad"
             field = letter.lower() if angle else f"tran.{letter.lower()}"
-            found.append(_Axis(letter, field, name, _DEGREES if angle else _MILLIMETRES))
+            found.append(LinuxCncAxis(letter, field, name, _DEGREES if angle else _MILLIMETRES))
             continue
         if unit == "m":
             letter = next(letters)
-            found.append(_Axis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
+            found.append(LinuxCncAxis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
             continue
         axis = np.array(robot.platform.axis)
         place = int(np.abs(axis).argmax())
         aligned = np.abs(axis[place]) > 1.0 - 1e-12 and not robot.platform.planar
         letter = "ABC"[place] if aligned else "C"
         sign = float(np.sign(axis[place])) if aligned else 1.0
-        found.append(_Axis(letter, letter.lower(), name, sign * _DEGREES))
+        found.append(LinuxCncAxis(letter, letter.lower(), name, sign * _DEGREES))
     return tuple(found)
 
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pteron.errors import ModelError
-from pteron.export.klipper.bed import bed, told_bed
-from pteron.export.klipper.centers import SAME, Center, common, degrees, end_stop
-from pteron.export.klipper.sections import (
+from pteron.export.printers.bed import bed, told_bed
+from pteron.export.printers.centers import SAME, Center, common, degrees, end_stop
+from pteron.export.printers.sections import (
     INSTEAD,
     PINS,
     SPEEDS,

@@ -12,8 +12,8 @@ from itertools import product
 import numpy as np
 
 from pteron.errors import ModelError
-from pteron.export.klipper.bed import tool_of
-from pteron.export.klipper.sections import (
+from pteron.export.printers.bed import tool_of
+from pteron.export.printers.sections import (
     INSTEAD,
     PINS,
     SPEEDS,

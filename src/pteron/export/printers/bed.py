@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from pteron.errors import ModelError
-from pteron.export.klipper.centers import SAME
-from pteron.export.klipper.sections import INSTEAD, number
+from pteron.export.printers.centers import SAME
+from pteron.export.printers.sections import INSTEAD, number
 from pteron.export.start_pose import measures_of
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from pteron.equations.machine import Machine
-from pteron.export.klipper.sections import differs
+from pteron.export.printers.sections import differs
 from pteron.kernels import Array
 from pteron.legs.leg import Sphere
 from pteron.manipulator import Manipulator

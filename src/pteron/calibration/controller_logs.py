@@ -1,0 +1,460 @@
+"""Measurements in the files that controllers write: found by their contents.
+
+Klipper's printer.cfg has stable positions, steps from the end stops, which are readings. The others
+log where the controller takes the tool to be: the readings there follow from the machine as drawn,
+as the controller counts by the same geometry. Where it touched, the tool's height is 0.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.calibration.measurements import TOOL, Measurements
+from pteron.errors import DataError, shown
+from pteron.export.linuxcnc import linuxcnc_axes
+from pteron.export.printers.printer_cfg import millimetres_a_step, printer_cfg, setting
+from pteron.kinematics import inverse_kinematics
+from pteron.manipulator import Manipulator
+from pteron.manipulator.readings import to_readings
+from pteron.toml import told
+
+Array = NDArray[np.float64]
+
+_TABLES = (".csv", ".parquet")
+_LARGEST = 1 << 28
+"""Bytes of a log that are read."""
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_KLIPPER = re.compile(
+    rf"probe:? at ({_NUMBER}),({_NUMBER}) (is z=|bed will contact at z=)({_NUMBER})"
+)
+_OFFSET = re.compile(rf"^\s*z_offset\s*[=:]\s*({_NUMBER})", re.MULTILINE)
+_MARLIN = re.compile(rf"Bed X:\s*({_NUMBER})\s+Y:\s*({_NUMBER})\s+Z:\s*({_NUMBER})")
+_G30 = re.compile(rf"G30\s+P(\d+)\s+X({_NUMBER})\s+Y({_NUMBER})", re.IGNORECASE)
+_HEIGHTS = re.compile(rf"bed probe heights:\s*({_NUMBER}(?:[\s,]+{_NUMBER})*)", re.IGNORECASE)
+_MAP = "RepRapFirmware height map"
+
+
+class _Touched(NamedTuple):
+    """A place where the tool touched, as the controller logs it."""
+
+    place: str
+    values: Sequence[float]
+    """X, Y and Z, then angles if there are, in mm and degrees."""
+    height: float
+    """Of the tool over the plane, mm."""
+
+
+def read_controller_log(path: str | Path, robot: Manipulator) -> Measurements | None:
+    """Read the measurements in a file that a controller wrote; None if it is none of these.
+
+    - Klipper's printer.cfg: the stable positions of DELTA_CALIBRATE and DELTA_ANALYZE
+      (`height0_pos`, `manual_height0_pos`, `distance0_pos1`). A joint is at the upper end of its
+      limits where its end stop is.
+    - Klipper's log: "probe at X,Y is z=Z", the tool then at `z_offset` over the bed.
+    - RepRapFirmware's heightmap.csv, and a console's log with G30 P.. X.. Y.. and the "bed probe
+      heights" of its G32; Marlin's "Bed X: Y: Z:" of G29 V4 and G30.
+    - LinuxCNC's probe log, of (PROBEOPEN ..): lines of X Y Z A B C U V W; probe in machine
+      coordinates.
+
+    Raises
+    ------
+    DataError
+        If it cannot be read, or it is one of these and something is missing in it.
+    """
+    file, source = Path(path), shown(str(path), bare=True, longest=1000)
+    if file.suffix.lower() == ".parquet" or not file.is_file():
+        return None  # told where tables are opened
+    with file.open("rb") as opened:
+        data = opened.read(_LARGEST if file.suffix.lower() != ".csv" else 1 << 20)
+    text = data.decode("utf-8-sig", "replace")
+    if file.suffix.lower() == ".csv" and not text.startswith(_MAP):
+        return None
+    try:
+        if re.search(r"^(?:#\*# )?\[delta_calibrate\]", text, re.MULTILINE):
+            return _stable(robot, text, file.name)
+        for find in _READERS:
+            if touched := list(find(robot, text, file.name)):
+                return _where_touched(robot, touched)
+    except DataError as error:
+        raise DataError(error.message, subject=source) from None
+    if file.suffix.lower() in _TABLES:
+        return None
+    raise DataError(
+        "neither a table (.csv, .parquet) nor a log of Klipper, RepRapFirmware, Marlin or LinuxCNC "
+        "with places where a probe touched",
+        subject=source,
+    )
+
+
+def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
+    """Return the stable positions of a printer.cfg as readings."""
+    config = printer_cfg(text, source)
+    steps = [millimetres_a_step(config, tower) for tower in "abc"]
+    lacking = [f"[stepper_{t}]" for t, step in zip("abc", steps, strict=True) if not step]
+    if lacking:
+        raise DataError(
+            f"{', '.join(lacking)} without rotation_distance and microsteps, or step_distance: "
+            "stable positions are steps; give the whole printer.cfg"
+        )
+    ends, downwards = [], []
+    for i, leg in enumerate(robot.legs, start=1):
+        axis = leg.joint_axis
+        if len(robot.legs) != 3 or leg.joint.unit != "m" or leg.limits is None or not axis:
+            raise DataError(
+                f"stable positions count from three sliders' end stops, and leg {i} of "
+                f"{robot.name} is no slider with limits; give them: the upper is the end stop"
+            )
+        up = axis[2] > 0.0
+        ends.append(leg.limits[1 if up else 0])
+        downwards.append(-1.0 if up else 1.0)
+    away = 1e-3 * np.array(downwards) * np.array([step or 0.0 for step in steps])
+    faults: list[str] = []
+
+    def position(key: str) -> list[float]:
+        given = config.get("delta_calibrate", key, fallback=None)
+        cells = [] if given is None else given.split(",")
+        try:
+            counts = [float(cell) for cell in cells]
+            if len(counts) != 3 or not np.isfinite(counts).all():
+                raise ValueError
+        except ValueError:
+            faults.append(f"[delta_calibrate] {key}: {shown(given)} given, steps a,b,c expected")
+            return [0.0] * 3
+        return counts
+
+    rows: list[tuple[str, list[float], float, float, int]] = []
+    for kind in ("height", "manual_height", "distance"):
+        k = 0
+        while (value := setting(config, "delta_calibrate", f"{kind}{k}")) is not None:
+            key = f"{kind}{k}_pos"
+            if kind == "distance":
+                rows.append((f"{key}1", position(f"{key}1"), np.nan, np.nan, -1))
+                rows.append((f"{key}2", position(f"{key}2"), np.nan, value, len(rows) - 1))
+            else:
+                rows.append((key, position(key), value, np.nan, -1))
+            k += 1
+    if not rows:
+        faults.append("[delta_calibrate]: no height0 nor distance0; run DELTA_CALIBRATE, save it")
+    if faults:
+        raise DataError(told(faults))
+    keys, counts, heights, distances, origins = zip(*rows, strict=True)
+    return _measured(
+        robot,
+        to_readings(robot, np.array(ends) + away * np.array(counts)),
+        [f"{source}, {key}" for key in keys],
+        heights=1e-3 * np.array(heights),
+        distances=1e-3 * np.array(distances),
+        origins=np.array(origins),
+    )
+
+
+def _map(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the points of RepRapFirmware's height map: z where the probe touched."""
+    if not text.startswith(_MAP):
+        return
+    lines = text.splitlines()
+    names = [cell.strip() for cell in lines[1].split(",")]
+    values = [cell.strip() for cell in lines[2].split(",")]
+    given = dict(zip(names, values, strict=False))
+    axes = (("xmin", "xspacing"), ("ymin", "yspacing"))
+    if "axis0" in given:  # since 3.4
+        if (given["axis0"], given.get("axis1")) != ("X", "Y"):
+            raise DataError("a height map over X and Y is read, and this one has other axes")
+        axes = (("min0", "spacing0"), ("min1", "spacing1"))
+    try:
+        (x, dx), (y, dy) = ([float(given[key]) for key in pair] for pair in axes)
+    except (KeyError, ValueError):
+        raise DataError(f"line 3: {shown(lines[2])} given, the grid of a height map expected") from None
+    for j, line in enumerate(lines[3:]):
+        for i, cell in enumerate(line.split(",")):
+            # A point that was not probed is a bare 0.
+            if cell.strip() in ("", "0"):
+                continue
+            try:
+                z = float(cell)
+            except ValueError:
+                raise DataError(f"line {j + 4}: {shown(cell)} given, a height expected") from None
+            yield _Touched(f"{source}, line {j + 4}, column {i + 1}", (x + i * dx, y + j * dy, z), 0.0)
+
+
+def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the points of G30 P.. X.. Y.. with the heights that RepRapFirmware's G32 answers."""
+    found = list(_HEIGHTS.finditer(text))
+    if not found:
+        return
+    points = {int(p): (float(x), float(y)) for p, x, y in _G30.findall(text)}
+    heights = [float(z) for z in re.findall(_NUMBER, found[-1][1])]
+    if sorted(points) != list(range(len(heights))):
+        raise DataError(
+            f"{len(heights)} bed probe heights, and {len(points)} points G30 P.. X.. Y..; put the "
+            "lines of bed.g into the log, P from 0"
+        )
+    for p, z in enumerate(heights):
+        yield _Touched(f"{source}, G30 P{p}", (*points[p], z), 0.0)
+
+
+def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the results of Klipper's probe."""
+    offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
+    for match in _KLIPPER.finditer(text):
+        x, y, word, z = match.groups()
+        before = [value for at, value in offsets if at < match.start()]
+        # It says where the probe touched, the tool above it, or where the tool would.
+        height = before[-1] if before and word.startswith("is") else 0.0
+        yield _Touched(_line(text, match, source), (float(x), float(y), float(z)), height)
+
+
+def _marlin(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the points of Marlin's G29 and G30."""
+    for match in _MARLIN.finditer(text):
+        yield _Touched(_line(text, match, source), [float(v) for v in match.groups()], 0.0)
+
+
+def _linuxcnc(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the lines of LinuxCNC's probe log."""
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    faults = []
+    rows: list[tuple[int, list[float]]] = []
+    for k, line in lines:
+        cells = re.split(r"[\s,]+", line.strip())
+        if all(re.fullmatch(_NUMBER, cell) for cell in cells) and 6 <= len(cells) <= 9:
+            rows.append((k, [float(cell) for cell in cells]))
+        else:
+            faults.append(f"line {k}: {shown(line.strip())} given, 6 to 9 numbers expected")
+    if not rows or len(faults) > len(rows):
+        return
+    if faults:
+        raise DataError(told(faults))
+    for k, row in rows:
+        yield _Touched(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
+
+
+_READERS:
+            if touched := list(find(robot, text, file.name)):
+                return _where_touched(robot, touched)
+    except DataError as error:
+        raise DataError(error.message, subject=source) from None
+    if file.suffix.lower() in _TABLES:
+        return None
+    raise DataError(
+        "neither a table (.csv, .parquet) nor a log of Klipper, RepRapFirmware, Marlin or LinuxCNC "
+        "with places where a probe touched",
+        subject=source,
+    )
+
+
+def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
+    """Return the stable positions of a printer.cfg as readings."""
+    config = printer_cfg(text, source)
+    steps = [millimetres_a_step(config, tower) for tower in "abc"]
+    lacking = [f"[stepper_{t}]" for t, step in zip("abc", steps, strict=True) if not step]
+    if lacking:
+        raise DataError(
+            f"{', '.join(lacking)} without rotation_distance and microsteps, or step_distance: "
+            "stable positions are steps; give the whole printer.cfg"
+        )
+    ends, downwards = [], []
+    for i, leg in enumerate(robot.legs, start=1):
+        axis = leg.joint_axis
+        if len(robot.legs) != 3 or leg.joint.unit != "m" or leg.limits is None or not axis:
+            raise DataError(
+                f"stable positions count from three sliders' end stops, and leg {i} of "
+                f"{robot.name} is no slider with limits; give them: the upper is the end stop"
+            )
+        up = axis[2] > 0.0
+        ends.append(leg.limits[1 if up else 0])
+        downwards.append(-1.0 if up else 1.0)
+    away = 1e-3 * np.array(downwards) * np.array([step or 0.0 for step in steps])
+    faults: list[str] = []
+
+    def position(key: str) -> list[float]:
+        given = config.get("delta_calibrate", key, fallback=None)
+        cells = [] if given is None else given.split(",")
+        try:
+            counts = [float(cell) for cell in cells]
+            if len(counts) != 3 or not np.isfinite(counts).all():
+                raise ValueError
+        except ValueError:
+            faults.append(f"[delta_calibrate] {key}: {shown(given)} given, steps a,b,c expected")
+            return [0.0] * 3
+        return counts
+
+    rows: list[tuple[str, list[float], float, float, int]] = []
+    for kind in ("height", "manual_height", "distance"):
+        k = 0
+        while (value := setting(config, "delta_calibrate", f"{kind}{k}")) is not None:
+            key = f"{kind}{k}_pos"
+            if kind == "distance":
+                rows.append((f"{key}1", position(f"{key}1"), np.nan, np.nan, -1))
+                rows.append((f"{key}2", position(f"{key}2"), np.nan, value, len(rows) - 1))
+            else:
+                rows.append((key, position(key), value, np.nan, -1))
+            k += 1
+    if not rows:
+        faults.append("[delta_calibrate]: no height0 nor distance0; run DELTA_CALIBRATE, save it")
+    if faults:
+        raise DataError(told(faults))
+    keys, counts, heights, distances, origins = zip(*rows, strict=True)
+    return _measured(
+        robot,
+        to_readings(robot, np.array(ends) + away * np.array(counts)),
+        [f"{source}, {key}" for key in keys],
+        heights=1e-3 * np.array(heights),
+        distances=1e-3 * np.array(distances),
+        origins=np.array(origins),
+    )
+
+
+def _map(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the points of RepRapFirmware's height map: z where the probe touched."""
+    if not text.startswith(_MAP):
+        return
+    lines = text.splitlines()
+    names = [cell.strip() for cell in lines[1].split(",")]
+    values = [cell.strip() for cell in lines[2].split(",")]
+    given = dict(zip(names, values, strict=False))
+    axes = (("xmin", "xspacing"), ("ymin", "yspacing"))
+    if "axis0" in given:  # since 3.4
+        if (given["axis0"], given.get("axis1")) != ("X", "Y"):
+            raise DataError("a height map over X and Y is read, and this one has other axes")
+        axes = (("min0", "spacing0"), ("min1", "spacing1"))
+    try:
+        (x, dx), (y, dy) = ([float(given[key]) for key in pair] for pair in axes)
+    except (KeyError, ValueError):
+        raise DataError(f"line 3: {shown(lines[2])} given, the grid of a height map expected") from None
+    for j, line in enumerate(lines[3:]):
+        for i, cell in enumerate(line.split(",")):
+            # A point that was not probed is a bare 0.
+            if cell.strip() in ("", "0"):
+                continue
+            try:
+                z = float(cell)
+            except ValueError:
+                raise DataError(f"line {j + 4}: {shown(cell)} given, a height expected") from None
+            yield _Touched(f"{source}, line {j + 4}, column {i + 1}", (x + i * dx, y + j * dy, z), 0.0)
+
+
+def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the points of G30 P.. X.. Y.. with the heights that RepRapFirmware's G32 answers."""
+    found = list(_HEIGHTS.finditer(text))
+    if not found:
+        return
+    points = {int(p): (float(x), float(y)) for p, x, y in _G30.findall(text)}
+    heights = [float(z) for z in re.findall(_NUMBER, found[-1][1])]
+    if sorted(points) != list(range(len(heights))):
+        raise DataError(
+            f"{len(heights)} bed probe heights, and {len(points)} points G30 P.. X.. Y..; put the "
+            "lines of bed.g into the log, P from 0"
+        )
+    for p, z in enumerate(heights):
+        yield _Touched(f"{source}, G30 P{p}", (*points[p], z), 0.0)
+
+
+def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the results of Klipper's probe."""
+    offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
+    for match in _KLIPPER.finditer(text):
+        x, y, word, z = match.groups()
+        before = [value for at, value in offsets if at < match.start()]
+        # It says where the probe touched, the tool above it, or where the tool would.
+        height = before[-1] if before and word.startswith("is") else 0.0
+        yield _Touched(_line(text, match, source), (float(x), float(y), float(z)), height)
+
+
+def _marlin(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the points of Marlin's G29 and G30."""
+    for match in _MARLIN.finditer(text):
+        yield _Touched(_line(text, match, source), [float(v) for v in match.groups()], 0.0)
+
+
+def _linuxcnc(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+    """Yield the lines of LinuxCNC's probe log."""
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    faults = []
+    rows: list[tuple[int, list[float]]] = []
+    for k, line in lines:
+        cells = re.split(r"[\s,]+", line.strip())
+        if all(re.fullmatch(_NUMBER, cell) for cell in cells) and 6 <= len(cells) <= 9:
+            rows.append((k, [float(cell) for cell in cells]))
+        else:
+            faults.append(f"line {k}: {shown(line.strip())} given, 6 to 9 numbers expected")
+    if not rows or len(faults) > len(rows):
+        return
+    if faults:
+        raise DataError(told(faults))
+    letters = {axis.letter: axis for axis in linuxcnc_axes(robot)}
+    for k, row in rows:
+        by_letter = dict(zip("XYZABCUVW", row, strict=False))
+        angles = [value for letter, value in by_letter.items() if letter in letters and letter in "ABC"]
+        signs = [np.sign(letters[letter].scale) for letter in by_letter if letter in letters and letter in "ABC"]
+        turned = [float(s * a) for s, a in zip(signs, angles, strict=True)]
+        yield _Touched(f"{source}, line {k}", (*row[:3], *turned), 0.0)
+
+
+_READERS: tuple[Callable[[Manipulator, str, str], Iterator[_Touched]], ...] = (
+    _map,
+    _g30,
+    _klippy,
+    _marlin,
+    _linuxcnc,
+)
+
+
+def _line(text: str, match: re.Match[str], source: str) -> str:
+    return f"{source}, line {text.count(chr(10), 0, match.start()) + 1}"
+
+
+def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measurements:
+    """Return heights at readings that follow from the machine as drawn."""
+    platform, axes = robot.platform, linuxcnc_axes(robot)
+    poses = np.array([[one.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for one in touched])
+    tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.at(poses)[1])
+    poses[:, ~platform.angular] -= tool @ platform.directions.T
+    joints = inverse_kinematics(robot, poses, on_failure="nan")
+    lost = np.isnan(joints).any(axis=-1)
+    if lost.any():
+        raise DataError(
+            told(
+                [
+                    f"{one.place}: the machine as drawn does not reach "
+                    f"{', '.join(f'{v:g}' for v in one.values[:3])} mm; is z = 0 the bed in its file?"
+                    for one, bad in zip(touched, lost, strict=True)
+                    if bad
+                ]
+            )
+        )
+    heights = 1e-3 * np.array([one.height for one in touched])
+    places = [one.place for one in touched]
+    return _measured(robot, to_readings(robot, joints), places, heights=heights)
+
+
+def _measured(
+    robot: Manipulator,
+    readings: Array,
+    places: Sequence[str],
+    *,
+    heights: Array,
+    distances: Array | None = None,
+    origins: NDArray[np.int64] | None = None,
+) -> Measurements:
+    n = len(readings)
+    unnamed = (TOOL,) * n
+    return Measurements(
+        readings,
+        np.full((n, 3), np.nan),
+        np.full((n, len(robot.platform.angles)), np.nan),
+        heights,
+        np.full(n, np.nan) if distances is None else distances,
+        np.full(n, -1) if origins is None else origins,
+        unnamed,
+        unnamed,
+        unnamed,
+        tuple(places),
+    )

@@ -1,0 +1,321 @@
+"""Logs of measurements in files: CSV, Parquet, or as a printer's or a mill's controller writes them.
+
+A row is a pose: the joints' readings and what was measured there. docs/calibration.md has the
+columns.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pteron.calibration.controller_logs import read_controller_log
+from pteron.calibration.measurements import TOOL, Measurements, Setup
+from pteron.calibration.setup_file import joined as joined_setups
+from pteron.calibration.setup_file import read_setup_file
+from pteron.errors import DataError, UnlikelyValue, shown
+from pteron.kinematics.unlikely_values import unlikely_length, unlikely_values
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.readings import from_readings
+from pteron.tables import Dialect, Table, listed, open_table, whole_table
+from pteron.toml import told
+
+Array = NDArray[np.float64]
+
+_POSITION = ("x", "y", "z")
+_NAMED = ("mark", "plane", "anchor")
+_UNITS = {
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "°": np.pi / 180.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+}
+_WITH_UNIT = re.compile(r"(.*?)[ _]*[\[(]([^\])]*)[\])]|(.*)_(mm|cm|um|deg|mrad|ms)")
+"""A column's name with its unit: "x (mm)", "x [mm]", "x_mm"."""
+
+
+def read_measurements(robot: RobotLike, *paths: str | Path) -> Measurements:
+    """Read the measurements of a machine from one log or several.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine as drawn.
+    *paths : str or path
+        CSV or Parquet files, or files of controllers; see `read_controller_log`. The TOML file of
+        the same stem, where there is one, says what the measurements refer to.
+
+    Returns
+    -------
+    Measurements
+        All rows, one log after the other. Readings are as the drives count them.
+
+    Raises
+    ------
+    DataError
+        If a column is missing or a cell no number; if a row measures a distance from nowhere; if a
+        mark, plane or anchor is named that the TOML file does not describe. All faults of a log are
+        told at once, each with its line and column.
+
+    Warns
+    -----
+    UnlikelyValue
+        Where values are likely in mm or degrees, a distance is 0, a row measures nothing, or a
+        column is not read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from pteron.calibration.measured_log import read_measurements
+    >>> text = "rho1,rho2,rho3,height (mm)\n0.11,0.10,0.12,0.02\n0.10,0.12,0.11,-0.01\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "bed.csv"
+    ...     _ = path.write_text(text)
+    ...     found = read_measurements("linear-delta", path)
+    >>> found.heights.tolist(), found.places
+    ([2e-05, -1e-05], ('bed.csv, line 2', 'bed.csv, line 3'))
+    """
+    robot = as_manipulator(robot)
+    if not paths:
+        raise DataError("paths: none given; at least one log of measurements is needed")
+    return _joined([_read(robot, path) for path in paths], [str(path) for path in paths])
+
+
+def _read(robot: Manipulator, path: str | Path) -> Measurements:
+    about = read_setup_file(path)
+    found = read_controller_log(path, robot)
+    if found is None:
+        found = _of_table(robot, _opened(robot, path, about.csv), Path(path).name)
+    found = replace(found, setup=about.setup())
+    source = shown(str(path), bare=True, longest=1000)
+    faults = [*_undescribed(found)]
+    if faults:
+        raise DataError(told(faults), subject=source)
+    for text in _unlikely(robot, found):
+        warnings.warn(f"{source}: {text}", UnlikelyValue, stacklevel=3)
+    return found
+
+
+class _Opened(NamedTuple):
+    """A table, and by name the column that holds it and the factor to SI units."""
+
+    table: Table
+    columns: dict[str, tuple[str, float]]
+
+
+def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _Opened:
+    """Open a log in its dialect: plain where its first line names the joints, else found."""
+    units = {**dict.fromkeys(("t",), "s"), **dict.fromkeys((*_POSITION, "height", "distance"), "m")}
+    units |= dict(zip(robot.coordinates, robot.units, strict=True))
+    units |= {
+        name: leg.joint.unit for name, leg in zip(robot.joint_names, robot.legs, strict=True)
+    }
+    units |= dict.fromkeys((*_NAMED, "from"), "")
+    file = open_table(path, noun="log", dialect=dialect)
+    if dialect is None and Path(path).suffix.lower() == ".csv":
+        plain = {_name_and_unit(name)[0] for name in file.columns}
+        if not plain >= set(robot.joint_names):
+            file = open_table(path, noun="log", dialect=Dialect())
+    columns: dict[str, tuple[str, float]] = {}
+    faults, unread = [], []
+    for k, column in enumerate(file.columns):
+        name, unit = _name_and_unit(column)
+        unit = (file.units[k] if k < len(file.units) else "") or unit
+        if name not in units:
+            unread.append(column)
+            continue
+        factor = _UNITS.get(units[name], {}).get(unit.strip("[]() ") or units[name])
+        if factor is None and units[name]:
+            valid = ", ".join(_UNITS[units[name]])
+            faults.append(f"column {shown(column, bare=True)}: its unit is none of {valid}")
+        elif name in columns:
+            faults.append(f"two columns are {name}: {listed([columns[name][0], column])}")
+        columns.setdefault(name, (column, factor or 1.0))
+    if missing := [name for name in robot.joint_names if name not in columns]:
+        faults.append(f"no column {listed(missing)} (found: {listed(file.columns)}); {file.hint}")
+    if faults:
+        raise DataError(told(faults), subject=file.source)
+    others = {*robot.force_names, *(f"{d}{name}" for d in ("d", "dd") for name in units)}
+    if unread := [name for name in unread if name not in others]:
+        text = f"{file.source}: {listed(unread)}: not read; what is measured is called "
+        text += listed([*dict.fromkeys((*_POSITION, *robot.coordinates)), "height", "distance"])
+        warnings.warn(text, UnlikelyValue, stacklevel=5)
+    return _Opened(whole_table(file), columns)
+
+
+def _name_and_unit(column: str) -> tuple[str, str]:
+    """Return the name of a column in small letters, and the unit in it, if any."""
+    match = _WITH_UNIT.fullmatch(column.strip())
+    if match is None:
+        return column.strip().lower(), ""
+    return (match[1] or match[3] or "").strip().lower(), (match[2] or match[4] or "").strip()
+
+
+def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
+    table, columns = opened
+    faults: list[str] = []
+    n = len(table)
+
+    def column(name: str) -> Array:
+        if name not in columns:
+            return np.full(n, np.nan)
+        given, factor = columns[name]
+        return factor * _numbers(table, given, faults)
+
+    def texts(name: str) -> tuple[str, ...]:
+        if name not in columns:
+            return (TOOL,) * n
+        cells = table.frame[columns[name][0]].cast(pl.String).fill_null(TOOL)
+        return tuple(cells.str.strip_chars().to_list())
+
+    readings = np.stack([column(name) for name in robot.joint_names], axis=-1)
+    for i, j in np.argwhere(np.isnan(readings)):
+        name = columns[robot.joint_names[j]][0]
+        faults.append(f"{table.place(int(i))}, column {name}: no number; a row needs every reading")
+    times = column("t") if "t" in columns else None
+    for i in () if times is None else np.flatnonzero(np.isnan(times)):
+        faults.append(f"{table.place(int(i))}, column t: no number; give each row its time, or none")
+    distances, given, anchors = column("distance"), column("from"), texts("anchor")
+    origins = np.full(n, -1)
+    for i in np.flatnonzero(~np.isnan(given)):
+        row = given[i]
+        if row != int(row) or not 1 <= row <= n or row == i + 1:
+            faults.append(
+                f"{table.place(int(i))}, column from: {row:g} given, another row from 1 to {n} "
+                "expected"
+            )
+        else:
+            origins[i] = int(row) - 1
+    for i in range(n):
+        starts = (not np.isnan(given[i])) + bool(anchors[i])
+        if not np.isnan(distances[i]) and starts != 1:
+            both = "both" if starts else "neither"
+            faults.append(
+                f"{table.place(i)}: a distance with {both} from and anchor; give one, the row or "
+                "the point that it is measured from"
+            )
+        elif starts and np.isnan(distances[i]):
+            faults.append(f"{table.place(i)}: from or anchor, but no distance; give all, or none")
+    faults = list(dict.fromkeys(fault.removeprefix(f"{table.source}: ") for fault in faults))
+    if faults:
+        raise DataError(told(faults), subject=table.source)
+    return Measurements(
+        readings=readings,
+        positions=np.stack([column(name) for name in _POSITION], axis=-1),
+        angles=np.stack([*map(column, robot.platform.angles)], axis=-1)
+        if robot.platform.angles
+        else np.empty((n, 0)),
+        heights=column("height"),
+        distances=distances,
+        origins=origins,
+        marks=texts("mark"),
+        planes=texts("plane"),
+        anchors=anchors,
+        places=_places(table, source),
+        times=times,
+    )
+
+
+def _numbers(table: Table, column: str, faults: list[str]) -> Array:
+    """Return a column (N,), NaN where it is empty; what is no number is a fault each."""
+    try:
+        return np.asarray(table.numbers([column], "nan")[:, 0])
+    except DataError as error:
+        if len(table) == 1:
+            faults.append(str(error))
+            return np.zeros(1)
+    # Rows one by one, as each fault is to be told.
+    return np.concatenate([_numbers(_row(table, i), column, faults) for i in range(len(table))])
+
+
+def _row(table: Table, i: int) -> Table:
+    line_of = table.line_of
+    line = None if line_of is None else (lambda _: line_of(i))
+    return replace(table, frame=table.frame[i : i + 1], first_row=table.first_row + i, line_of=line)
+
+
+def _places(table: Table, source: str) -> tuple[str, ...]:
+    """Return where each row stands, for messages: its line, or its number where that is not known.
+
+    A line is looked for from the file's beginning: of many rows only where they are lines that
+    follow each other.
+    """
+    n = len(table)
+    if table.line_of is not None:
+        first, last = table.line_of(0), table.line_of(n - 1)
+        if last - first == n - 1:
+            return tuple(f"{source}, line {first + i}" for i in range(n))
+    return tuple(f"{source}, row {i + 1}" for i in range(n))
+
+
+def _undescribed(found: Measurements) -> Iterator[str]:
+    """Yield the marks, planes and anchors that rows name and the TOML file does not describe."""
+    for part in ("marks", "planes", "anchors"):
+        described = getattr(found.setup, part)
+        for name in sorted({*getattr(found, part)} - {TOOL, *described}):
+            row = getattr(found, part).index(name)
+            yield (
+                f"{found.places[row]}: {part[:-1]} {shown(name)} is not described; give "
+                f"[{part}.{name}] in the TOML file beside it"
+            )
+
+
+def _unlikely(robot: Manipulator, found: Measurements) -> Iterator[str]:
+    """Yield what is possible in measurements, but unlikely."""
+    size = 0.1 * unlikely_length(robot)
+    measured = np.concatenate([found.positions, found.angles], axis=-1)
+    names = (*robot.joint_names, *_POSITION, *robot.platform.angles)
+    values = np.concatenate([found.readings, measured], axis=-1)
+    yield from unlikely_values(robot, names, values)
+    joints = from_readings(robot, found.readings)
+    for j, leg in enumerate(robot.legs):
+        low, high = leg.limits or (-np.inf, np.inf)
+        beyond = np.maximum(low - joints[:, j], joints[:, j] - high)
+        if (row := int(np.argmax(beyond))) >= 0 and beyond[row] > high - low:
+            yield (
+                f"{found.places[row]}: {robot.joint_names[j]} = {joints[row, j]:g} is far beyond its "
+                f"limits {low:g} to {high:g} {leg.joint.unit}: is it in another unit?"
+            )
+    for name, lengths in (("height", found.heights), ("distance", found.distances)):
+        sizes = np.nan_to_num(np.abs(lengths))
+        if (sizes > size).any():
+            row = int(np.argmax(sizes))
+            yield (
+                f"{found.places[row]}: {name} {lengths[row]:g} is more than the machine's size, "
+                f"{size:.3g} m: is it in mm? m are expected"
+            )
+    for row in np.flatnonzero(found.distances == 0.0):
+        yield f"{found.places[row]}: a distance of 0: was it measured?"
+    seen = ~np.isnan(np.column_stack([measured, found.heights, found.distances])).all(axis=1)
+    seen[found.origins[found.origins >= 0]] = True
+    if not seen.all() and robot.joint_count == robot.freedom:
+        rows = [found.places[row] for row in np.flatnonzero(~seen)]
+        yield f"{listed(rows)}: nothing is measured there"
+
+
+def _joined(parts: Sequence[Measurements], sources: Sequence[str]) -> Measurements:
+    """Return the rows of several logs, one log after the other."""
+    setup: Setup = joined_setups([part.setup for part in parts], sources)
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.cumsum([0, *map(len, parts)])
+    arrays = ("readings", "positions", "angles", "heights", "distances")
+    texts = ("marks", "planes", "anchors", "places")
+    timed = all(part.times is not None for part in parts)
+    return Measurements(
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays},
+        origins=np.concatenate(
+            [np.where(p.origins < 0, -1, p.origins + k) for p, k in zip(parts, starts, strict=False)]
+        ),
+        **{name: sum((getattr(part, name) for part in parts), ()) for name in texts},
+        times=np.concatenate([p.times for p in parts if p.times is not None]) if timed else None,
+        setup=setup,
+    )

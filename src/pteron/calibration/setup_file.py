@@ -1,0 +1,149 @@
+"""The TOML file beside a log of measurements: noise, marks, planes, anchors, the instrument."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from pteron.bodies.tables import Number, Table, Three
+from pteron.bodies.vectors import unit_vector
+from pteron.calibration.measurements import Place, Plane, Setup
+from pteron.errors import DataError, shown
+from pteron.tables import Dialect
+from pteron.toml import read_toml, validated
+
+_ABSENT = "no such file; it should describe a log of measurements"
+
+_OF_A_MANIPULATOR = {"platform", "legs"}
+"""Keys by which a file is known to describe a machine."""
+
+KINDS = ("position", "angle", "height", "distance")
+"""Kinds of measured values, each with a noise of its own."""
+
+
+def _named(given: Any) -> Any:
+    """Return one noise as that of all that was measured."""
+    return given if isinstance(given, dict) else dict.fromkeys(KINDS, given)
+
+
+Noise = Annotated[Number, Field(gt=0.0)]
+
+
+class NoiseTable(Table):
+    """`noise` by kind of value, m or rad."""
+
+    position: Noise | None = Field(None, description="of x, y and z, m")
+    angle: Noise | None = Field(None, description="of the pose's angles, rad")
+    height: Noise | None = Field(None, description="m")
+    distance: Noise | None = Field(None, description="m")
+    readings: Noise | None = Field(None, description="of the joints' readings, m or rad")
+
+
+class MeasuredTable(Table):
+    """`[measured]`: how exactly."""
+
+    noise: Annotated[NoiseTable, BeforeValidator(_named)] = Field(
+        NoiseTable(),
+        description="standard deviation: one number for all that was measured, or one by kind",
+    )
+
+
+class PlaceTable(Table):
+    """`[marks.NAME]` on the platform, `[anchors.NAME]` in the base frame."""
+
+    at: Three = Field((0.0, 0.0, 0.0), description="m; where free, where it is sought from")
+    free: bool = Field(False, description="whether it is found with the geometry")
+
+    @model_validator(mode="after")
+    def _somewhere(self) -> PlaceTable:
+        if not self.free and "at" not in self.model_fields_set:
+            raise ValueError("neither at nor free = true given; a place is known or found")
+        return self
+
+
+class PlaneTable(Table):
+    """`[planes.NAME]`: normal . p = offset in the base frame."""
+
+    known: bool = Field(True, description="false: it is found with the geometry")
+    normal: Annotated[Three, AfterValidator(lambda v: unit_vector(v, "normal"))] = Field(
+        (0.0, 0.0, 1.0), description="unit vector along which heights grow"
+    )
+    offset: Number = Field(0.0, description="m")
+
+
+class InstrumentTable(Table):
+    """`[instrument]`: what measured positions and angles."""
+
+    frame: Literal["known", "unknown"] = Field(
+        "known", description='"known": it measures in the base frame'
+    )
+
+
+class MeasuredLog(Table):
+    """The whole file; each table may be left out."""
+
+    csv: Dialect | None = None
+    measured: MeasuredTable = MeasuredTable()
+    marks: dict[str, PlaceTable] = {}
+    planes: dict[str, PlaneTable] = {}
+    anchors: dict[str, PlaceTable] = {}
+    instrument: InstrumentTable = InstrumentTable()
+
+    def setup(self) -> Setup:
+        """Return what the measurements refer to."""
+
+        def places(given: dict[str, PlaceTable]) -> dict[str, Place]:
+            return {name: Place(one.at, not one.free) for name, one in given.items()}
+
+        return Setup(
+            self.measured.noise.model_dump(exclude_none=True),
+            places(self.marks),
+            {name: Plane(p.normal, p.offset, p.known) for name, p in self.planes.items()},
+            places(self.anchors),
+            self.instrument.frame == "known",
+        )
+
+
+def read_setup_file(log: str | Path) -> MeasuredLog:
+    """Return the TOML file beside a log, of the same stem; an empty one where there is none.
+
+    Raises
+    ------
+    DataError
+        If it is not TOML, has unknown keys or values that cannot be; all faults are told at once.
+    """
+    path = Path(log).with_suffix(".toml")
+    if not path.is_file():
+        return MeasuredLog()
+    document = read_toml(path, DataError, _ABSENT)
+    if document.keys() >= _OF_A_MANIPULATOR:
+        return MeasuredLog()
+    return validated(MeasuredLog, document, shown(str(path), bare=True, longest=1000), DataError)
+
+
+def joined(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
+    """Return what the measurements of several logs refer to.
+
+    Raises
+    ------
+    DataError
+        If one name, or the frame, means different things in two of them.
+    """
+    whole, *others = setups
+    for setup, source in zip(others, sources[1:], strict=True):
+        if setup.frame_known != whole.frame_known:
+            raise DataError(f"{source}: another instrument.frame than in {sources[0]}; give one")
+        for part in ("noise", "marks", "planes", "anchors"):
+            old, new = getattr(whole, part), getattr(setup, part)
+            for name in old.keys() & new.keys():
+                if old[name] != new[name]:
+                    raise DataError(
+                        f"{source}: {part}.{shown(name, bare=True)}: another than in an earlier "
+                        "log; make them one, or rename one"
+                    )
+            whole = replace(whole, **{part: {**old, **new}})
+    return whole

@@ -1,0 +1,165 @@
+"""M665 and M666 of a linear Delta, as Marlin and RepRapFirmware read them.
+
+Both have towers X, Y and Z at 210, 330 and 90 degrees, each with a correction of its angle, and the
+numbers of `LinearDelta` otherwise. Marlin (delta.cpp, M665.cpp, M666) counts its end stops down
+from the lowest one's height, so that M666 is 0 or less; RepRapFirmware (LinearDeltaKinematics.cpp)
+from their mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pteron.atomic import write_texts
+from pteron.errors import ModelError
+from pteron.export.descriptions import banner
+from pteron.export.names import prefix_of
+from pteron.export.printers.linear_delta import LinearDelta
+from pteron.export.printers.sections import reading_comment
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+
+_TOWERS = (210.0, 330.0, 90.0)
+"""Where the firmware has its towers X, Y and Z, degrees."""
+
+_MOST_TURN = 60.0
+"""Degrees by which a tower may stand beside its place in the firmware."""
+
+
+def marlin_lines(robot: RobotLike) -> list[str]:
+    """Return M665 and M666 for Marlin.
+
+    Raises
+    ------
+    ModelError
+        As `export_marlin`.
+    """
+    robot = as_manipulator(robot)
+    found, order = _numbers(robot)
+    rod = float(np.mean(found.arms))
+    height, ends = "", []
+    if found.ends is not None:
+        low = min(found.ends)
+        height, ends = f" H{_mm(low)}", [low - found.ends[i] for i in order]
+    trims = [found.arms[i] - rod for i in order]
+    return [
+        f"M665 L{_mm(rod)} R{_mm(found.radius)}{height} B{1e3 * found.bed:.1f}"
+        + _each("XYZ", _turns(found, order), 1.0)
+        + (_each("ABC", trims) if max(map(abs, trims)) > 0.5e-7 else ""),
+        *([f"M666{_each('XYZ', ends)}"] if ends else []),
+    ]
+
+
+def reprap_lines(robot: RobotLike) -> list[str]:
+    """Return M665 and M666 for RepRapFirmware.
+
+    Raises
+    ------
+    ModelError
+        As `export_reprap`.
+    """
+    robot = as_manipulator(robot)
+    found, order = _numbers(robot)
+    height, ends = "", []
+    if found.ends is not None:
+        mean = float(np.mean(found.ends))
+        height, ends = f" H{_mm(mean)}", [found.ends[i] - mean for i in order]
+    rods = ":".join(_mm(found.arms[i]) for i in order)
+    return [
+        f"M665 L{rods} R{_mm(found.radius)}{height} B{1e3 * found.bed:.1f}"
+        + _each("XYZ", _turns(found, order), 1.0),
+        *([f"M666{_each('XYZ', ends)}"] if ends else []),
+    ]
+
+
+def export_marlin(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
+    """Write M665 and M666 of a linear Delta for Marlin, NAME_marlin.gcode.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine; its name becomes the file's.
+    folder : path
+        Where; made if it is missing.
+
+    Returns
+    -------
+    list of Path
+        The file written; it says how far the firmware's numbers are from the machine, if they are.
+
+    Raises
+    ------
+    ModelError
+        If the machine is no linear Delta with towers about 210, 330 and 90 degrees.
+    OutputError
+        If the folder cannot be written.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.export.printers.gcode import marlin_lines
+    >>> print(*marlin_lines(pteron.load("linear-delta")), sep="\\n")
+    M665 L229.4000 R99.8000 H273.4466 B84.8 X0.0000 Y0.0000 Z0.0000
+    M666 X0.0000 Y0.0000 Z0.0000
+    """
+    return _write(robot, folder, "Marlin", marlin_lines(robot))
+
+
+def export_reprap(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
+    """Write M665 and M666 of a linear Delta for RepRapFirmware, NAME_reprap.gcode.
+
+    Parameters, result and errors are those of `export_marlin`.
+    """
+    return _write(robot, folder, "RepRapFirmware", reprap_lines(robot))
+
+
+def _write(
+    robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[str]
+) -> list[Path]:
+    machine = as_manipulator(robot)
+    found, order = _numbers(machine)
+    towers = ", ".join(f"{axis} is leg {i + 1}" for axis, i in zip("XYZ", order, strict=True))
+    head = [line for line in banner(machine, f"{firmware} settings") if "SI units" not in line]
+    told = [
+        f"Towers: {towers}. Lengths in mm, angles in degrees.",
+        f"X, Y and Z are P's place, Z from where its z is {1e3 * found.level + 0.0:.6g} mm.",
+        *found.told,
+        *(text for i in range(3) for text in reading_comment(machine, i, "steps per mm (M92)")),
+    ]
+    text = "\n".join([*(f"; {line}".rstrip() for line in (*head, *told)), *lines]) + "\n"
+    name = firmware.lower().removesuffix("firmware")
+    return write_texts(folder, {f"{prefix_of(machine)}_{name}.gcode": text})
+
+
+def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
+    """Return a machine's numbers, and its leg, from 0, at each of the firmware's towers."""
+    found = LinearDelta.of(robot, "M665")
+    beside = np.abs(_beside(np.subtract.outer(_TOWERS, found.angles)))
+    order = [int(row.argmin()) for row in beside]
+    if sorted(order) != [0, 1, 2] or beside.min(axis=1).max() > _MOST_TURN:
+        angles = ", ".join(f"{angle:.1f}" for angle in found.angles)
+        raise ModelError(
+            f"{robot.name}: its towers stand at {angles} degrees, and M665 has them about 210, 330 "
+            "and 90: turn the model about z"
+        )
+    return found, order
+
+
+def _turns(found: LinearDelta, order: Sequence[int]) -> list[float]:
+    """Return each tower's angle less the one that it has in the firmware, degrees."""
+    return [float(_beside(found.angles[i] - own)) for i, own in zip(order, _TOWERS, strict=True)]
+
+
+def _beside(angle: float | np.ndarray) -> np.ndarray:
+    return np.asarray((np.asarray(angle) + 180.0) % 360.0 - 180.0)
+
+
+def _each(letters: str, values: Sequence[float], factor: float = 1000.0) -> str:
+    pairs = zip(letters, values, strict=True)
+    return "".join(f" {letter}{round(factor * value, 4) + 0.0:.4f}" for letter, value in pairs)
+
+
+def _mm(metres: float) -> str:
+    return f"{1000.0 * metres:.4f}"

@@ -1,0 +1,199 @@
+"""The linear Delta as printers' firmware has it: ten numbers, and what they miss of a machine.
+
+Towers stand on one radius about the z axis, carriage i at the height z + sqrt(arm_i^2 - (x - R cos
+a_i)^2 - (y - R sin a_i)^2) over the bed, z = 0, and at end_i where its end stop is. Klipper, Marlin
+and RepRapFirmware have these numbers alike. A machine whose towers lean, or stand on different
+radii, gets those with which its tool is least far from where the firmware takes it to be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares  # type: ignore[import-untyped]
+
+from pteron.equations.machine import Machine
+from pteron.errors import ModelError
+from pteron.export.printers.bed import bed, tool_of
+from pteron.export.printers.centers import SAME, Center, degrees
+from pteron.export.printers.sections import INSTEAD, differs, mm
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics, jacobian, random_poses
+from pteron.manipulator import Manipulator
+
+_LEAN = 0.1
+"""Greatest slope of a guide against the z axis of what is still taken for a linear Delta."""
+
+_INSIDE = 0.8
+"""Share of the firmware's range that counts as the bed of a machine without limits."""
+
+_WORST = 5e-3
+"""Greatest deviation on the bed, m, of a machine that the firmware's numbers still describe."""
+
+
+@dataclass(frozen=True)
+class LinearDelta:
+    """The firmware's numbers for a linear Delta, in m and degrees.
+
+    Attributes
+    ----------
+    radius : float
+        R, of the towers less the effector's.
+    angles, arms : tuple of float
+        Of each tower, and of its rods.
+    ends : tuple of float or None
+        z over the bed, on the axis, with a carriage at its end stop: `position_endstop`. None where
+        the machine's file has no limits.
+    zeros : tuple of float
+        Height of each carriage over the bed where its joint coordinate is 0.
+    rises : tuple of float
+        1 where a coordinate grows upwards, -1 where downwards.
+    level : float
+        P's z in the machine's frame where the firmware's is 0.
+    bed : float
+        Radius of the bed that is well in reach.
+    most : float
+        Radius to which the firmware lets the tool go.
+    deviation : float
+        Greatest distance on the bed of the machine's place from the firmware's.
+    """
+
+    radius: float
+    angles: tuple[float, ...]
+    arms: tuple[float, ...]
+    ends: tuple[float, ...] | None
+    zeros: tuple[float, ...]
+    rises: tuple[float, ...]
+    level: float
+    bed: float
+    most: float
+    deviation: float
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What is said of a machine that these numbers do not describe wholly."""
+        if self.deviation <= SAME:
+            return ()
+        return (
+            "The firmware has one radius, upright towers and rods that end at it: with the numbers "
+            f"here the tool is up to {1e3 * self.deviation:.3f} mm from where it takes it to be, "
+            f"over a bed of {1e3 * self.bed:.0f} mm radius.",
+        )
+
+    @classmethod
+    def of(cls, robot: Manipulator, what: str = "delta") -> LinearDelta:
+        """Return the numbers of a machine; `what` is the firmware's word for such a one.
+
+        Raises
+        ------
+        ModelError
+            If it is no linear Delta with three upright guides, its carriages above the platform.
+        """
+        machine = Machine.of(robot)
+        centers = [Center.of(machine, i) for i in range(len(robot.legs))]
+        found = [center for center in centers if center is not None and center.slides]
+        if robot.platform.coordinates != ("x", "y", "z") or len(found) != 3:
+            raise ModelError(
+                f"{robot.name}: no linear Delta, whose platform moves x, y and z by three rods on "
+                f"guides, which is what M665 describes; {INSTEAD}"
+            )
+        return cls.from_centers(robot, found, what)
+
+    @classmethod
+    def from_centers(
+        cls, robot: Manipulator, centers: Sequence[Center], what: str
+    ) -> LinearDelta:
+        """Return the numbers of a machine by the spheres on which its platform moves."""
+        for i, center in enumerate(centers, start=1):
+            if np.hypot(*center.along[:2]) > _LEAN:
+                raise differs(robot, i, "its guide is not vertical, along z", what)
+        rises = np.array([np.sign(center.along[2]) for center in centers])
+        limits = [leg.limits for leg in robot.legs]
+        known = all(pair is not None for pair in limits)
+        travels = np.array([pair or (0.0, 0.0) for pair in limits]) * rises[:, None]
+        lowest, highest = travels.min(axis=1), travels.max(axis=1)
+        feet = np.array([center.at for center in centers])
+        leans = np.array([center.along for center in centers]) * rises[:, None]
+        _above(robot, centers, what)
+        # Towers as they stand where the carriages are on their way.
+        towers = feet + (0.5 * (lowest + highest))[:, None] * leans
+        radii, arms = np.hypot(*towers[:, :2].T), np.array([center.radius for center in centers])
+        for i, arm in enumerate(arms, start=1):
+            if arm <= radii.mean():
+                told = f"its rod of {mm(arm)} mm is shorter than the radius, {mm(radii.mean())} mm"
+                raise differs(robot, i, told, what)
+        radius = float(radii.mean())
+        below = np.sqrt(arms**2 - radius**2)
+        most = min(radius, float(arms.min()) - radius)
+        level, good = -float(tool_of(robot)[2]), _INSIDE * most
+        if known:
+            low, high = (feet[:, 2] + end - below for end in (lowest, highest))
+            level, good = bed(robot, most, float(low.max()), float(high.min()))
+        angles = np.radians([degrees(tower) for tower in towers])
+        start = np.array([radius, *angles, *arms, *(feet[:, 2] + highest - level)])
+        found = start
+        off, errors = 0.0, _errors(robot, start, level, rises, highest, good)
+        if np.abs(errors).max() > 0.1 * SAME:
+            fitted = least_squares(
+                lambda p: _errors(robot, p, level, rises, highest, good).ravel(),
+                start,
+                x_scale=radius,
+                xtol=1e-14,
+                ftol=1e-14,
+                gtol=1e-14,
+            )
+            found = fitted.x
+            off = float(np.linalg.norm(fitted.fun.reshape(-1, 3), axis=1).max())
+        if off > _WORST:
+            i = int(np.argmax(np.abs(radii - np.median(radii)))) + 1
+            told = f"is {mm(round(radii[i - 1], 9))} mm from the z axis, the others elsewhere, or it leans"
+            raise differs(robot, i, told, what)
+        radius, angles, arms = found[0], found[1:4], found[4:7]
+        ends = found[7:] - np.sqrt(arms**2 - radius**2)
+        zeros = found[7:] - highest
+        return cls(
+            float(radius),
+            tuple(float(a) for a in np.degrees(angles)),
+            tuple(map(float, arms)),
+            tuple(map(float, ends)) if known else None,
+            tuple(map(float, zeros)),
+            tuple(map(float, rises)),
+            float(level),
+            good,
+            most,
+            off,
+        )
+
+
+def _above(robot: Manipulator, centers: Sequence[Center], what: str) -> None:
+    """Refuse a machine whose sliders are below its platform."""
+    poses = random_poses(robot, 50, seed=1, type_i=0.02, type_ii=0.0, limits=False)
+    joints = inverse_kinematics(robot, poses)
+    for i, center in enumerate(centers):
+        height = center.at[2] + center.along[2] * joints[:, i]
+        if not (height > poses[:, 2]).all():
+            told = "its slider is below the platform, and firmware has it above: turn the model over"
+            raise differs(robot, i + 1, told, what)
+
+
+def _errors(
+    robot: Manipulator, numbers: Array, level: float, rises: Array, highest: Array, good: float
+) -> Array:
+    """Return where the machine's tool is (K, 3), from where the firmware takes it to be, m."""
+    radius, angles, arms, ends = numbers[0], numbers[1:4], numbers[4:7], numbers[7:]
+    turns = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
+    rings = [good * share * np.stack([np.cos(turns), np.sin(turns)], axis=-1) for share in (0.5, 1.0)]
+    places = np.concatenate([np.zeros((1, 2)), *rings])
+    poses = np.concatenate(
+        [np.column_stack([places, np.full(len(places), level + z)]) for z in (0.0, 0.3 * good)]
+    )
+    towers = radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    away = poses[:, None, :2] - towers
+    heights = poses[:, 2:] - level + np.sqrt(arms**2 - (away**2).sum(axis=-1))
+    # The firmware lets carriages down from their end stops by the way that it thinks right.
+    joints = rises * (highest - (ends - heights))
+    wrong = joints - inverse_kinematics(robot, poses)
+    return np.asarray(np.linalg.solve(jacobian(robot, poses), wrong[..., None])[..., 0])
