@@ -1,9 +1,11 @@
 """Calibration of a machine's geometry from measurements, with what they cannot show said aloud.
 
-`calibrate` does all of it; `Measurements` are its data, `Calibration` its result.
+`read_measurements` reads logs, `calibrate` does all the rest; `Measurements` are its data,
+`Calibration` its result.
 """
 
 from pteron.calibration.calibrate import calibrate
+from pteron.calibration.measured_log import read_measurements
 from pteron.calibration.measurements import Measurements, Place, Plane, Setup
 from pteron.calibration.observability import Observability
 from pteron.calibration.result import Calibration, Finding, HeldOut, Value, Verdict
@@ -22,4 +24,5 @@ __all__ = [
     "Value",
     "Verdict",
     "calibrate",
+    "read_measurements",
 ]

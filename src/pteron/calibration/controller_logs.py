@@ -45,8 +45,8 @@ class _Touched(NamedTuple):
     """A place where the tool touched, as the controller logs it."""
 
     place: str
-    values: Sequence[float]
-    """X, Y and Z, then angles if there are, in mm and degrees."""
+    at: dict[str, float]
+    """By the letters of its axes, X to C, in mm and degrees."""
     height: float
     """Of the tool over the plane, mm."""
 
@@ -171,7 +171,9 @@ def _map(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
     try:
         (x, dx), (y, dy) = ([float(given[key]) for key in pair] for pair in axes)
     except (KeyError, ValueError):
-        raise DataError(f"line 3: {shown(lines[2])} given, the grid of a height map expected") from None
+        raise DataError(
+            f"line 3: {shown(lines[2])} given, the grid of a height map expected"
+        ) from None
     for j, line in enumerate(lines[3:]):
         for i, cell in enumerate(line.split(",")):
             # A point that was not probed is a bare 0.
@@ -181,7 +183,9 @@ def _map(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
                 z = float(cell)
             except ValueError:
                 raise DataError(f"line {j + 4}: {shown(cell)} given, a height expected") from None
-            yield _Touched(f"{source}, line {j + 4}, column {i + 1}", (x + i * dx, y + j * dy, z), 0.0)
+            yield _Touched(
+                f"{source}, line {j + 4}, column {i + 1}", _xyz(x + i * dx, y + j * dy, z), 0.0
+            )
 
 
 def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
@@ -197,7 +201,7 @@ def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
             "lines of bed.g into the log, P from 0"
         )
     for p, z in enumerate(heights):
-        yield _Touched(f"{source}, G30 P{p}", (*points[p], z), 0.0)
+        yield _Touched(f"{source}, G30 P{p}", _xyz(*points[p], z), 0.0)
 
 
 def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
@@ -208,13 +212,13 @@ def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
         before = [value for at, value in offsets if at < match.start()]
         # It says where the probe touched, the tool above it, or where the tool would.
         height = before[-1] if before and word.startswith("is") else 0.0
-        yield _Touched(_line(text, match, source), (float(x), float(y), float(z)), height)
+        yield _Touched(_line(text, match, source), _xyz(float(x), float(y), float(z)), height)
 
 
 def _marlin(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
     """Yield the points of Marlin's G29 and G30."""
     for match in _MARLIN.finditer(text):
-        yield _Touched(_line(text, match, source), [float(v) for v in match.groups()], 0.0)
+        yield _Touched(_line(text, match, source), _xyz(*map(float, match.groups())), 0.0)
 
 
 def _linuxcnc(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
@@ -236,168 +240,6 @@ def _linuxcnc(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
         yield _Touched(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
 
 
-_READERS:
-            if touched := list(find(robot, text, file.name)):
-                return _where_touched(robot, touched)
-    except DataError as error:
-        raise DataError(error.message, subject=source) from None
-    if file.suffix.lower() in _TABLES:
-        return None
-    raise DataError(
-        "neither a table (.csv, .parquet) nor a log of Klipper, RepRapFirmware, Marlin or LinuxCNC "
-        "with places where a probe touched",
-        subject=source,
-    )
-
-
-def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
-    """Return the stable positions of a printer.cfg as readings."""
-    config = printer_cfg(text, source)
-    steps = [millimetres_a_step(config, tower) for tower in "abc"]
-    lacking = [f"[stepper_{t}]" for t, step in zip("abc", steps, strict=True) if not step]
-    if lacking:
-        raise DataError(
-            f"{', '.join(lacking)} without rotation_distance and microsteps, or step_distance: "
-            "stable positions are steps; give the whole printer.cfg"
-        )
-    ends, downwards = [], []
-    for i, leg in enumerate(robot.legs, start=1):
-        axis = leg.joint_axis
-        if len(robot.legs) != 3 or leg.joint.unit != "m" or leg.limits is None or not axis:
-            raise DataError(
-                f"stable positions count from three sliders' end stops, and leg {i} of "
-                f"{robot.name} is no slider with limits; give them: the upper is the end stop"
-            )
-        up = axis[2] > 0.0
-        ends.append(leg.limits[1 if up else 0])
-        downwards.append(-1.0 if up else 1.0)
-    away = 1e-3 * np.array(downwards) * np.array([step or 0.0 for step in steps])
-    faults: list[str] = []
-
-    def position(key: str) -> list[float]:
-        given = config.get("delta_calibrate", key, fallback=None)
-        cells = [] if given is None else given.split(",")
-        try:
-            counts = [float(cell) for cell in cells]
-            if len(counts) != 3 or not np.isfinite(counts).all():
-                raise ValueError
-        except ValueError:
-            faults.append(f"[delta_calibrate] {key}: {shown(given)} given, steps a,b,c expected")
-            return [0.0] * 3
-        return counts
-
-    rows: list[tuple[str, list[float], float, float, int]] = []
-    for kind in ("height", "manual_height", "distance"):
-        k = 0
-        while (value := setting(config, "delta_calibrate", f"{kind}{k}")) is not None:
-            key = f"{kind}{k}_pos"
-            if kind == "distance":
-                rows.append((f"{key}1", position(f"{key}1"), np.nan, np.nan, -1))
-                rows.append((f"{key}2", position(f"{key}2"), np.nan, value, len(rows) - 1))
-            else:
-                rows.append((key, position(key), value, np.nan, -1))
-            k += 1
-    if not rows:
-        faults.append("[delta_calibrate]: no height0 nor distance0; run DELTA_CALIBRATE, save it")
-    if faults:
-        raise DataError(told(faults))
-    keys, counts, heights, distances, origins = zip(*rows, strict=True)
-    return _measured(
-        robot,
-        to_readings(robot, np.array(ends) + away * np.array(counts)),
-        [f"{source}, {key}" for key in keys],
-        heights=1e-3 * np.array(heights),
-        distances=1e-3 * np.array(distances),
-        origins=np.array(origins),
-    )
-
-
-def _map(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
-    """Yield the points of RepRapFirmware's height map: z where the probe touched."""
-    if not text.startswith(_MAP):
-        return
-    lines = text.splitlines()
-    names = [cell.strip() for cell in lines[1].split(",")]
-    values = [cell.strip() for cell in lines[2].split(",")]
-    given = dict(zip(names, values, strict=False))
-    axes = (("xmin", "xspacing"), ("ymin", "yspacing"))
-    if "axis0" in given:  # since 3.4
-        if (given["axis0"], given.get("axis1")) != ("X", "Y"):
-            raise DataError("a height map over X and Y is read, and this one has other axes")
-        axes = (("min0", "spacing0"), ("min1", "spacing1"))
-    try:
-        (x, dx), (y, dy) = ([float(given[key]) for key in pair] for pair in axes)
-    except (KeyError, ValueError):
-        raise DataError(f"line 3: {shown(lines[2])} given, the grid of a height map expected") from None
-    for j, line in enumerate(lines[3:]):
-        for i, cell in enumerate(line.split(",")):
-            # A point that was not probed is a bare 0.
-            if cell.strip() in ("", "0"):
-                continue
-            try:
-                z = float(cell)
-            except ValueError:
-                raise DataError(f"line {j + 4}: {shown(cell)} given, a height expected") from None
-            yield _Touched(f"{source}, line {j + 4}, column {i + 1}", (x + i * dx, y + j * dy, z), 0.0)
-
-
-def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
-    """Yield the points of G30 P.. X.. Y.. with the heights that RepRapFirmware's G32 answers."""
-    found = list(_HEIGHTS.finditer(text))
-    if not found:
-        return
-    points = {int(p): (float(x), float(y)) for p, x, y in _G30.findall(text)}
-    heights = [float(z) for z in re.findall(_NUMBER, found[-1][1])]
-    if sorted(points) != list(range(len(heights))):
-        raise DataError(
-            f"{len(heights)} bed probe heights, and {len(points)} points G30 P.. X.. Y..; put the "
-            "lines of bed.g into the log, P from 0"
-        )
-    for p, z in enumerate(heights):
-        yield _Touched(f"{source}, G30 P{p}", (*points[p], z), 0.0)
-
-
-def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
-    """Yield the results of Klipper's probe."""
-    offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
-    for match in _KLIPPER.finditer(text):
-        x, y, word, z = match.groups()
-        before = [value for at, value in offsets if at < match.start()]
-        # It says where the probe touched, the tool above it, or where the tool would.
-        height = before[-1] if before and word.startswith("is") else 0.0
-        yield _Touched(_line(text, match, source), (float(x), float(y), float(z)), height)
-
-
-def _marlin(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
-    """Yield the points of Marlin's G29 and G30."""
-    for match in _MARLIN.finditer(text):
-        yield _Touched(_line(text, match, source), [float(v) for v in match.groups()], 0.0)
-
-
-def _linuxcnc(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
-    """Yield the lines of LinuxCNC's probe log."""
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    faults = []
-    rows: list[tuple[int, list[float]]] = []
-    for k, line in lines:
-        cells = re.split(r"[\s,]+", line.strip())
-        if all(re.fullmatch(_NUMBER, cell) for cell in cells) and 6 <= len(cells) <= 9:
-            rows.append((k, [float(cell) for cell in cells]))
-        else:
-            faults.append(f"line {k}: {shown(line.strip())} given, 6 to 9 numbers expected")
-    if not rows or len(faults) > len(rows):
-        return
-    if faults:
-        raise DataError(told(faults))
-    letters = {axis.letter: axis for axis in linuxcnc_axes(robot)}
-    for k, row in rows:
-        by_letter = dict(zip("XYZABCUVW", row, strict=False))
-        angles = [value for letter, value in by_letter.items() if letter in letters and letter in "ABC"]
-        signs = [np.sign(letters[letter].scale) for letter in by_letter if letter in letters and letter in "ABC"]
-        turned = [float(s * a) for s, a in zip(signs, angles, strict=True)]
-        yield _Touched(f"{source}, line {k}", (*row[:3], *turned), 0.0)
-
-
 _READERS: tuple[Callable[[Manipulator, str, str], Iterator[_Touched]], ...] = (
     _map,
     _g30,
@@ -407,6 +249,10 @@ _READERS: tuple[Callable[[Manipulator, str, str], Iterator[_Touched]], ...] = (
 )
 
 
+def _xyz(x: float, y: float, z: float) -> dict[str, float]:
+    return {"X": x, "Y": y, "Z": z}
+
+
 def _line(text: str, match: re.Match[str], source: str) -> str:
     return f"{source}, line {text.count(chr(10), 0, match.start()) + 1}"
 
@@ -414,7 +260,9 @@ def _line(text: str, match: re.Match[str], source: str) -> str:
 def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measurements:
     """Return heights at readings that follow from the machine as drawn."""
     platform, axes = robot.platform, linuxcnc_axes(robot)
-    poses = np.array([[one.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for one in touched])
+    poses = np.array(
+        [[one.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for one in touched]
+    )
     tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.at(poses)[1])
     poses[:, ~platform.angular] -= tool @ platform.directions.T
     joints = inverse_kinematics(robot, poses, on_failure="nan")
@@ -424,7 +272,8 @@ def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measureme
             told(
                 [
                     f"{one.place}: the machine as drawn does not reach "
-                    f"{', '.join(f'{v:g}' for v in one.values[:3])} mm; is z = 0 the bed in its file?"
+                    f"{' '.join(f'{a.letter}{one.at.get(a.letter, 0.0):g}' for a in axes)}; is "
+                    "z = 0 the bed in its file?"
                     for one, bad in zip(touched, lost, strict=True)
                     if bad
                 ]

@@ -1,6 +1,6 @@
-"""Logs of measurements in files: CSV, Parquet, or as a printer's or a mill's controller writes them.
+"""Logs of measurements in files: CSV, Parquet, or as controllers write them.
 
-A row is a pose: the joints' readings and what was measured there. docs/calibration.md has the
+A row is a pose: the joints' readings and what was measured there. docs/calibration-logs.md has the
 columns.
 """
 
@@ -42,7 +42,7 @@ _WITH_UNIT = re.compile(r"(.*?)[ _]*[\[(]([^\])]*)[\])]|(.*)_(mm|cm|um|deg|mrad|
 
 
 def read_measurements(robot: RobotLike, *paths: str | Path) -> Measurements:
-    """Read the measurements of a machine from one log or several.
+    r"""Read the measurements of a machine from one log or several.
 
     Parameters
     ----------
@@ -115,9 +115,7 @@ def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _O
     """Open a log in its dialect: plain where its first line names the joints, else found."""
     units = {**dict.fromkeys(("t",), "s"), **dict.fromkeys((*_POSITION, "height", "distance"), "m")}
     units |= dict(zip(robot.coordinates, robot.units, strict=True))
-    units |= {
-        name: leg.joint.unit for name, leg in zip(robot.joint_names, robot.legs, strict=True)
-    }
+    units |= {name: leg.joint.unit for name, leg in zip(robot.joint_names, robot.legs, strict=True)}
     units |= dict.fromkeys((*_NAMED, "from"), "")
     file = open_table(path, noun="log", dialect=dialect)
     if dialect is None and Path(path).suffix.lower() == ".csv":
@@ -182,7 +180,12 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
         faults.append(f"{table.place(int(i))}, column {name}: no number; a row needs every reading")
     times = column("t") if "t" in columns else None
     for i in () if times is None else np.flatnonzero(np.isnan(times)):
-        faults.append(f"{table.place(int(i))}, column t: no number; give each row its time, or none")
+        faults.append(
+            f"{table.place(int(i))}, column t: no number; give each row its time, or none"
+        )
+    positions = np.stack([column(name) for name in _POSITION], axis=-1)
+    angles = [column(name) for name in robot.platform.angles]
+    heights = column("height")
     distances, given, anchors = column("distance"), column("from"), texts("anchor")
     origins = np.full(n, -1)
     for i in np.flatnonzero(~np.isnan(given)):
@@ -209,11 +212,9 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
         raise DataError(told(faults), subject=table.source)
     return Measurements(
         readings=readings,
-        positions=np.stack([column(name) for name in _POSITION], axis=-1),
-        angles=np.stack([*map(column, robot.platform.angles)], axis=-1)
-        if robot.platform.angles
-        else np.empty((n, 0)),
-        heights=column("height"),
+        positions=positions,
+        angles=np.stack(angles, axis=-1) if angles else np.empty((n, 0)),
+        heights=heights,
         distances=distances,
         origins=origins,
         marks=texts("mark"),
@@ -279,10 +280,11 @@ def _unlikely(robot: Manipulator, found: Measurements) -> Iterator[str]:
     for j, leg in enumerate(robot.legs):
         low, high = leg.limits or (-np.inf, np.inf)
         beyond = np.maximum(low - joints[:, j], joints[:, j] - high)
-        if (row := int(np.argmax(beyond))) >= 0 and beyond[row] > high - low:
+        row = int(np.argmax(beyond))
+        if beyond[row] > high - low:
             yield (
-                f"{found.places[row]}: {robot.joint_names[j]} = {joints[row, j]:g} is far beyond its "
-                f"limits {low:g} to {high:g} {leg.joint.unit}: is it in another unit?"
+                f"{found.places[row]}: {robot.joint_names[j]} = {joints[row, j]:g} is far beyond "
+                f"its limits {low:g} to {high:g} {leg.joint.unit}: is it in another unit?"
             )
     for name, lengths in (("height", found.heights), ("distance", found.distances)):
         sizes = np.nan_to_num(np.abs(lengths))
@@ -313,7 +315,10 @@ def _joined(parts: Sequence[Measurements], sources: Sequence[str]) -> Measuremen
     return Measurements(
         **{name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays},
         origins=np.concatenate(
-            [np.where(p.origins < 0, -1, p.origins + k) for p, k in zip(parts, starts, strict=False)]
+            [
+                np.where(p.origins < 0, -1, p.origins + k)
+                for p, k in zip(parts, starts, strict=False)
+            ]
         ),
         **{name: sum((getattr(part, name) for part in parts), ()) for name in texts},
         times=np.concatenate([p.times for p in parts if p.times is not None]) if timed else None,

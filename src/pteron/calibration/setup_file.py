@@ -88,9 +88,9 @@ class MeasuredLog(Table):
 
     csv: Dialect | None = None
     measured: MeasuredTable = MeasuredTable()
-    marks: dict[str, PlaceTable] = {}
-    planes: dict[str, PlaneTable] = {}
-    anchors: dict[str, PlaceTable] = {}
+    marks: dict[str, PlaceTable] = Field(default_factory=dict)
+    planes: dict[str, PlaneTable] = Field(default_factory=dict)
+    anchors: dict[str, PlaceTable] = Field(default_factory=dict)
     instrument: InstrumentTable = InstrumentTable()
 
     def setup(self) -> Setup:

@@ -65,7 +65,7 @@ class Center:
         return None
 
 
-def common(robot: Manipulator, values: Sequence[float], told: str, kind: str) -> float:
+def common(robot: Manipulator, values: Sequence[float], told: str, taker: str) -> float:
     """Return the value that the legs share.
 
     Raises
@@ -77,7 +77,7 @@ def common(robot: Manipulator, values: Sequence[float], told: str, kind: str) ->
         if abs(value - values[0]) > SAME:
             one, other = (round(1000.0 * v, 6) + 0.0 for v in (value, values[0]))
             text = f"{told.format(one)}, leg 1 {other:.6g} mm"
-            raise differs(robot, i, text, kind)
+            raise differs(robot, i, text, taker)
     return float(np.mean(values))
 
 

@@ -15,12 +15,12 @@ from pteron.atomic import write_texts
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.export.descriptions import banner
+from pteron.export.names import prefix_of
 from pteron.export.printers.cartesian import cartesian
 from pteron.export.printers.centers import Center
 from pteron.export.printers.delta import delta
 from pteron.export.printers.rotary_delta import rotary
 from pteron.export.printers.sections import INSTEAD, ConfigSection
-from pteron.export.names import prefix_of
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 

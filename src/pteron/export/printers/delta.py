@@ -22,7 +22,7 @@ from pteron.manipulator import Manipulator
 
 def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSection]:
     """Yield the sections of `delta`, with the numbers of `LinearDelta`."""
-    found = LinearDelta.from_centers(robot, centers, "delta")
+    found = LinearDelta.from_centers(robot, centers, "Klipper's delta")
     good = found.most if found.ends is None else found.bed
     yield ConfigSection(
         "printer",

@@ -75,7 +75,7 @@ def reprap_lines(robot: RobotLike) -> list[str]:
 
 
 def export_marlin(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
-    """Write M665 and M666 of a linear Delta for Marlin, NAME_marlin.gcode.
+    r"""Write M665 and M666 of a linear Delta for Marlin, NAME_marlin.gcode.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def export_marlin(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     --------
     >>> import pteron
     >>> from pteron.export.printers.gcode import marlin_lines
-    >>> print(*marlin_lines(pteron.load("linear-delta")), sep="\\n")
+    >>> print(*marlin_lines(pteron.load("linear-delta")), sep="\n")
     M665 L229.4000 R99.8000 H273.4466 B84.8 X0.0000 Y0.0000 Z0.0000
     M666 X0.0000 Y0.0000 Z0.0000
     """
@@ -115,9 +115,7 @@ def export_reprap(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     return _write(robot, folder, "RepRapFirmware", reprap_lines(robot))
 
 
-def _write(
-    robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[str]
-) -> list[Path]:
+def _write(robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[str]) -> list[Path]:
     machine = as_manipulator(robot)
     found, order = _numbers(machine)
     towers = ", ".join(f"{axis} is leg {i + 1}" for axis, i in zip("XYZ", order, strict=True))
@@ -135,7 +133,7 @@ def _write(
 
 def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
     """Return a machine's numbers, and its leg, from 0, at each of the firmware's towers."""
-    found = LinearDelta.of(robot, "M665")
+    found = LinearDelta.of(robot)
     beside = np.abs(_beside(np.subtract.outer(_TOWERS, found.angles)))
     order = [int(row.argmin()) for row in beside]
     if sorted(order) != [0, 1, 2] or beside.min(axis=1).max() > _MOST_TURN:

@@ -84,8 +84,8 @@ class LinearDelta:
         )
 
     @classmethod
-    def of(cls, robot: Manipulator, what: str = "delta") -> LinearDelta:
-        """Return the numbers of a machine; `what` is the firmware's word for such a one.
+    def of(cls, robot: Manipulator) -> LinearDelta:
+        """Return the numbers of a machine.
 
         Raises
         ------
@@ -100,16 +100,14 @@ class LinearDelta:
                 f"{robot.name}: no linear Delta, whose platform moves x, y and z by three rods on "
                 f"guides, which is what M665 describes; {INSTEAD}"
             )
-        return cls.from_centers(robot, found, what)
+        return cls.from_centers(robot, found, "M665")
 
     @classmethod
-    def from_centers(
-        cls, robot: Manipulator, centers: Sequence[Center], what: str
-    ) -> LinearDelta:
-        """Return the numbers of a machine by the spheres on which its platform moves."""
+    def from_centers(cls, robot: Manipulator, centers: Sequence[Center], taker: str) -> LinearDelta:
+        """Return the same by the spheres on which P moves; `taker` is what errors call the firmware."""
         for i, center in enumerate(centers, start=1):
             if np.hypot(*center.along[:2]) > _LEAN:
-                raise differs(robot, i, "its guide is not vertical, along z", what)
+                raise differs(robot, i, "its guide is not vertical, along z", taker)
         rises = np.array([np.sign(center.along[2]) for center in centers])
         limits = [leg.limits for leg in robot.legs]
         known = all(pair is not None for pair in limits)
@@ -117,14 +115,14 @@ class LinearDelta:
         lowest, highest = travels.min(axis=1), travels.max(axis=1)
         feet = np.array([center.at for center in centers])
         leans = np.array([center.along for center in centers]) * rises[:, None]
-        _above(robot, centers, what)
+        _above(robot, centers, taker)
         # Towers as they stand where the carriages are on their way.
         towers = feet + (0.5 * (lowest + highest))[:, None] * leans
         radii, arms = np.hypot(*towers[:, :2].T), np.array([center.radius for center in centers])
         for i, arm in enumerate(arms, start=1):
             if arm <= radii.mean():
                 told = f"its rod of {mm(arm)} mm is shorter than the radius, {mm(radii.mean())} mm"
-                raise differs(robot, i, told, what)
+                raise differs(robot, i, told, taker)
         radius = float(radii.mean())
         below = np.sqrt(arms**2 - radius**2)
         most = min(radius, float(arms.min()) - radius)
@@ -147,10 +145,10 @@ class LinearDelta:
             )
             found = fitted.x
             off = float(np.linalg.norm(fitted.fun.reshape(-1, 3), axis=1).max())
-        if off > _WORST:
+        if off > _WORST:  # then they may be anything
             i = int(np.argmax(np.abs(radii - np.median(radii)))) + 1
-            told = f"is {mm(round(radii[i - 1], 9))} mm from the z axis, the others elsewhere, or it leans"
-            raise differs(robot, i, told, what)
+            told = f"is {mm(round(radii[i - 1], 9))} mm from the z axis or leans, unlike the others"
+            raise differs(robot, i, told, taker)
         radius, angles, arms = found[0], found[1:4], found[4:7]
         ends = found[7:] - np.sqrt(arms**2 - radius**2)
         zeros = found[7:] - highest
@@ -168,15 +166,17 @@ class LinearDelta:
         )
 
 
-def _above(robot: Manipulator, centers: Sequence[Center], what: str) -> None:
+def _above(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:
     """Refuse a machine whose sliders are below its platform."""
     poses = random_poses(robot, 50, seed=1, type_i=0.02, type_ii=0.0, limits=False)
     joints = inverse_kinematics(robot, poses)
     for i, center in enumerate(centers):
         height = center.at[2] + center.along[2] * joints[:, i]
         if not (height > poses[:, 2]).all():
-            told = "its slider is below the platform, and firmware has it above: turn the model over"
-            raise differs(robot, i + 1, told, what)
+            told = (
+                "its slider is below the platform, and firmware has it above: turn the model over"
+            )
+            raise differs(robot, i + 1, told, taker)
 
 
 def _errors(
@@ -185,14 +185,18 @@ def _errors(
     """Return where the machine's tool is (K, 3), from where the firmware takes it to be, m."""
     radius, angles, arms, ends = numbers[0], numbers[1:4], numbers[4:7], numbers[7:]
     turns = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
-    rings = [good * share * np.stack([np.cos(turns), np.sin(turns)], axis=-1) for share in (0.5, 1.0)]
+    rings = [
+        good * share * np.stack([np.cos(turns), np.sin(turns)], axis=-1) for share in (0.5, 1.0)
+    ]
     places = np.concatenate([np.zeros((1, 2)), *rings])
     poses = np.concatenate(
         [np.column_stack([places, np.full(len(places), level + z)]) for z in (0.0, 0.3 * good)]
     )
     towers = radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     away = poses[:, None, :2] - towers
-    heights = poses[:, 2:] - level + np.sqrt(arms**2 - (away**2).sum(axis=-1))
+    # Numbers that are tried may have rods that do not reach.
+    up = np.sqrt(np.maximum(arms**2 - (away**2).sum(axis=-1), 0.0))
+    heights = poses[:, 2:] - level + up
     # The firmware lets carriages down from their end stops by the way that it thinks right.
     joints = rises * (highest - (ends - heights))
     wrong = joints - inverse_kinematics(robot, poses)

@@ -26,9 +26,11 @@ from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
 
+_TAKER = "Klipper's rotary_delta"
+
+
 def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSection]:
     """Yield the sections of `rotary_delta`: arms that turn in vertical planes through z."""
-    kind = "rotary_delta"
     radii, heights, angles, lifts, zeros = [], [], [], [], []
     for i, center in enumerate(centers, start=1):
         assert center.across is not None  # it turns
@@ -36,18 +38,18 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSect
         axis = np.cross(center.along, center.across)
         axis /= np.linalg.norm(axis)
         if abs(axis[2]) > SAME:
-            raise differs(robot, i, "its crank's axis is not horizontal", kind)
+            raise differs(robot, i, "its crank's axis is not horizontal", _TAKER)
         aside = 1000.0 * float(center.at @ axis)
         if abs(aside) > 1000.0 * SAME:
             told = f"its crank's plane passes the z axis at {abs(aside):.6g} mm, not through it"
-            raise differs(robot, i, told, kind)
+            raise differs(robot, i, told, _TAKER)
         lifts.append(float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis)))
         zeros.append(math.atan2(center.along[2], center.along @ out))
         radii.append(float(np.hypot(*center.at[:2])))
         heights.append(float(center.at[2]))
         angles.append(degrees(center.at))
-    radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", kind)
-    height = common(robot, heights, "has its shoulder at z = {:.6g} mm", kind)
+    radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
+    height = common(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
     uppers = [float(np.linalg.norm(center.along)) for center in centers]
     arms = [center.radius for center in centers]
     _outside(robot, centers, lifts, zeros, height)
@@ -60,7 +62,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSect
     yield ConfigSection(
         "printer",
         (
-            ("kinematics", kind),
+            ("kinematics", "rotary_delta"),
             *SPEEDS,
             ("shoulder_radius", mm(radius)),
             ("shoulder_height", mm(height - level)),
@@ -122,7 +124,7 @@ def _outside(
                 "its elbow is inside while the platform is below, and Klipper has it outside; turn "
                 "a model over whose platform is above"
             )
-            raise differs(robot, i + 1, told, "rotary_delta")
+            raise differs(robot, i + 1, told, _TAKER)
 
 
 def _bed(
@@ -137,7 +139,7 @@ def _bed(
     lengths = [upper + arm for upper, arm in zip(uppers, arms, strict=True)]
     for i, length in enumerate(lengths, start=1):
         if length <= radius:
-            raise differs(robot, i, "its arms do not reach the z axis", "rotary_delta")
+            raise differs(robot, i, "its arms do not reach the z axis", _TAKER)
     reach = math.sqrt(min(lengths) ** 2 - radius**2)
     # Klipper lets the tool go so far from the axis, whatever the legs reach.
     most = min(radius + min(uppers), min(arms) - radius)

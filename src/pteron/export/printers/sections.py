@@ -34,9 +34,9 @@ PINS: tuple[tuple[str, None], ...] = (
 """Settings of every stepper."""
 
 
-def differs(robot: Manipulator, leg: int, told: str, kind: str) -> ModelError:
+def differs(robot: Manipulator, leg: int, told: str, taker: str) -> ModelError:
     """Return the error that refuses a machine because of one of its legs."""
-    return ModelError(f"{robot.name}: Klipper's {kind} does not fit leg {leg}: {told}; {INSTEAD}")
+    return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {told}; {INSTEAD}")
 
 
 def mm(metres: float) -> str:
