@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -294,8 +294,8 @@ def _unlikely(robot: Manipulator, found: Measurements) -> Iterator[str]:
                 f"{found.places[row]}: {name} {lengths[row]:g} is more than the machine's size, "
                 f"{size:.3g} m: is it in mm? m are expected"
             )
-    for row in np.flatnonzero(found.distances == 0.0):
-        yield f"{found.places[row]}: a distance of 0: was it measured?"
+    for k in np.flatnonzero(found.distances == 0.0):
+        yield f"{found.places[k]}: a distance of 0: was it measured?"
     seen = ~np.isnan(np.column_stack([measured, found.heights, found.distances])).all(axis=1)
     seen[found.origins[found.origins >= 0]] = True
     if not seen.all() and robot.joint_count == robot.freedom:
@@ -309,18 +309,16 @@ def _joined(parts: Sequence[Measurements], sources: Sequence[str]) -> Measuremen
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0, *map(len, parts)])
-    arrays = ("readings", "positions", "angles", "heights", "distances")
     texts = ("marks", "planes", "anchors", "places")
-    timed = all(part.times is not None for part in parts)
-    return Measurements(
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays},
-        origins=np.concatenate(
-            [
-                np.where(p.origins < 0, -1, p.origins + k)
-                for p, k in zip(parts, starts, strict=False)
-            ]
-        ),
-        **{name: sum((getattr(part, name) for part in parts), ()) for name in texts},
-        times=np.concatenate([p.times for p in parts if p.times is not None]) if timed else None,
-        setup=setup,
-    )
+    whole: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("readings", "positions", "angles", "heights", "distances")
+    }
+    whole |= {name: sum((getattr(part, name) for part in parts), ()) for name in texts}
+    if all(part.times is not None for part in parts):
+        whole["times"] = np.concatenate([part.times for part in parts if part.times is not None])
+    moved = [
+        np.where(part.origins < 0, -1, part.origins + start)
+        for part, start in zip(parts, starts, strict=False)
+    ]
+    return Measurements(**whole, origins=np.concatenate(moved), setup=setup)

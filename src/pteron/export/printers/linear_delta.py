@@ -30,7 +30,7 @@ _LEAN = 0.1
 _INSIDE = 0.8
 """Share of the firmware's range that counts as the bed of a machine without limits."""
 
-_WORST = 5e-3
+_WORST = 1e-3
 """Greatest deviation on the bed, m, of a machine that the firmware's numbers still describe."""
 
 
@@ -104,7 +104,7 @@ class LinearDelta:
 
     @classmethod
     def from_centers(cls, robot: Manipulator, centers: Sequence[Center], taker: str) -> LinearDelta:
-        """Return the same by the spheres on which P moves; `taker` is what errors call the firmware."""
+        """Return the same by the spheres on which P moves; errors name the `taker`."""
         for i, center in enumerate(centers, start=1):
             if np.hypot(*center.along[:2]) > _LEAN:
                 raise differs(robot, i, "its guide is not vertical, along z", taker)

@@ -192,11 +192,12 @@ def _leg(leg: LegKind, turn: float, radius: float, arm: float, end: float) -> Le
     kinds = zip(leg.bodies["l"].kinds, leg.bodies["l"].values, strict=True)
     powers = {"m": 1, "mgx": 2, "I": 3}
     rods = type(leg.bodies["l"]).of_values([v * size ** powers[kind] for kind, v in kinds])
+    (length,) = (quantity.name for quantity in leg.quantities if quantity.role == "length")
     lowest = math.sqrt(max(0.0, arm**2 - (2.0 * radius) ** 2))
     return replace(
         moved.with_bodies({**moved.bodies, "l": rods}),
         guide_point=vector(((radius + _EFFECTOR) * out).tolist(), "guide_point"),
         platform_point=vector((_EFFECTOR * out).tolist(), "platform_point"),
-        lower_length=arm,
         limits=(lowest, end + math.sqrt(arm**2 - radius**2)),
+        **{length: arm},
     )

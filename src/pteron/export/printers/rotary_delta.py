@@ -25,7 +25,6 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
-
 _TAKER = "Klipper's rotary_delta"
 
 
