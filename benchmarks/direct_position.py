@@ -3,9 +3,9 @@
 Dietmaier's machine with its 40 real poses; then 1000 random machines of 6 U-P-S legs with joint
 coordinates that a pose has, of which `direct_position_counts.txt` has the number of real poses by
 other solvers: general ones, with the base or both figures in a plane, with platform points that
-coincide in pairs (6-3), every third of them turned as a whole. On 50 of them, and on wrists, ankles
-and tripods, Newton's steps from many poses look for what is missing. Times are of one machine a
-call, and of a batch. `--quick` takes fewer.
+coincide in pairs (6-3), every third of them turned as a whole; and 200 beside Dietmaier's. On 50 of
+them, and on wrists, ankles and tripods, Newton's steps from many poses look for what is missing.
+Times are of one machine a call, and of a batch. `--quick` takes fewer.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ _TOP = """
 _LENGTHS = [1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071]
 _COUNTS = Path(__file__).with_name("direct_position_counts.txt")
 _KINDS = (*5 * ("general",), *2 * ("base plane",), "plane", "6-3", "6-3 plane")
-_STARTS = 20_000
+_MOST = 1000
+_STARTS = 100_000
 _SAME = 1e-6
 
 
@@ -54,9 +55,24 @@ def hexapod(base: Array, top: Array) -> pteron.Manipulator:
     return pteron.Manipulator("hexapod", Platform("3T3R", body), legs, (0.0, 0.0, -9.81))
 
 
+def dietmaiers() -> Array:
+    """Return the points of Dietmaier's machine on the base and on the platform."""
+    parts = (np.fromstring(part.replace(",", " "), sep=" ") for part in (_BASE, _TOP))
+    return np.array([part.reshape(6, 3) for part in parts])
+
+
+def kind_of(seed: int) -> str:
+    """Return the kind of a random machine; those of many poses are beside Dietmaier's."""
+    return _KINDS[seed % len(_KINDS)] if seed < _MOST else "many poses"
+
+
 def drawn(seed: int) -> tuple[pteron.Manipulator, Array]:
     """Return a random machine and joint coordinates that a pose of it has."""
-    rng, kind = np.random.default_rng([7, seed]), _KINDS[seed % len(_KINDS)]
+    rng, kind = np.random.default_rng([7, seed]), kind_of(seed)
+    if kind == "many poses":
+        size, (base, top) = 10.0 ** rng.uniform(-4.0, -1.3), dietmaiers()
+        base, top = (part + size * rng.normal(size=(6, 3)) for part in (base, top))
+        return hexapod(base, top), np.array(_LENGTHS) + size * rng.normal(size=6)
     base, top = rng.normal(size=(6, 3)), 0.6 * rng.normal(size=(6, 3))
     if "plane" in kind:
         base[:, 2] = 0.0
@@ -100,10 +116,8 @@ def real(poses: Array) -> int:
 
 def main() -> None:
     """Print counts and times."""
-    most, looked = (20, 4) if quick() else (1000, 50)
-    robot = hexapod(
-        *(np.fromstring(part.replace(",", " "), sep=" ").reshape(6, 3) for part in (_BASE, _TOP))
-    )
+    most, looked = (20, 4) if quick() else (_MOST, 50)
+    robot = hexapod(*dietmaiers())
     poses = pteron.direct_kinematics(robot, _LENGTHS)
     back = np.abs(pteron.inverse_kinematics(robot, poses) - _LENGTHS).max()
     print(f"Dietmaier's machine: {len(poses)} of 40 poses, lengths back to {back:.0e} m")
@@ -111,8 +125,8 @@ def main() -> None:
     times: dict[str, list[float]] = {}
     counts: dict[str, Counter[int]] = {}
     other, sought = [], []
-    for seed in range(most):
-        kind = _KINDS[seed % len(_KINDS)]
+    for seed in (*range(most), *range(_MOST, _MOST + most // 5)):
+        kind = kind_of(seed)
         robot, joints = drawn(seed)
         pteron.direct_kinematics(robot, joints)  # its programs are built
         begin = time.process_time()
