@@ -1,12 +1,17 @@
 """Indices of machines whose platforms tilt, against linear algebra on Jacobians by differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import tilting
-from mechanisms import several
+from mechanisms import TILTED, gated, several
+from scipy.linalg import eigh
 
 import pteron
-from pteron.indices import evaluate, indices_of
+from pteron.errors import ModelError
+from pteron.indices import Elasticity, evaluate, geometric_sensitivities, indices_of, stiffness
+from pteron.workspace import home_pose
 
 CASES = [("1T2R", ("RPS", "PRS", "RRS")), ("3T3R", ("UPS",))]
 CASES += [("2R", ("UPS", "PSS", "RSS")), ("3R", ("UPS", "PSS", "RSS"))]
@@ -75,3 +80,41 @@ def test_singular_values_of_six_columns(shape):
             one = rng.normal(size=shape) * 10.0 ** rng.uniform(-graded, graded, shape[1])
             found = np.sort(np.asarray(values(one)).ravel())[::-1]
             np.testing.assert_allclose(found, np.linalg.svd(one)[1], rtol=1e-11)
+
+
+@pytest.mark.parametrize("name", gated(["wrist", "ball-table", "stewart"], ["ball-table"]))
+def test_stiffness_is_that_of_the_actuators_springs(name):
+    """C = T J^-1 K^-1 J^-T T^T, T the tool's twist against the pose's rates."""
+    robot, tool = TILTED[name], np.array([0.1, 0.02, -0.05])
+    m = robot.freedom
+    robot = replace(robot, platform=replace(robot.platform, tool=tuple(tool)))
+    pose = home_pose(robot)
+    pose[robot.platform.angular] += 0.05 * np.arange(1, 1 + robot.platform.angular.sum())
+    springs = 1e5 * np.arange(1.0, m + 1.0)
+    found = stiffness(robot, pose, Elasticity(tuple(springs)))
+    rows = pteron.jacobian(robot, pose)
+    moves = pteron.twist(robot, pose, np.eye(m))
+    moves[:, :3] += np.cross(moves[:, 3:], tool @ robot.platform.at(pose)[1])
+    per_joint = moves.T @ np.linalg.inv(rows)
+    exact = per_joint @ np.diag(1.0 / springs) @ per_joint.T
+    np.testing.assert_allclose(found.compliance, exact, atol=1e-12 * np.abs(exact).max())
+    mass = pteron.mass_matrix(robot, pose)
+    squares = eigh(rows.T @ np.diag(springs) @ rows, mass, eigvals_only=True)
+    np.testing.assert_allclose(found.frequencies, np.sqrt(squares) / (2 * np.pi), rtol=1e-9)
+    assert found.along([0.0, 0.0, 1.0]) == pytest.approx(1.0 / exact[2, 2], rel=1e-9)
+    if m < 6:
+        with pytest.raises(ModelError, match=f"a platform of {m} freedoms does not give way"):
+            _ = found.matrix
+    # A platform point that is elsewhere moves the tool as the changed machine's poses say.
+    told = geometric_sensitivities(robot, pose)
+    k = told.names.index("leg 2: platform_point z")
+    step, leg = 1e-6, robot.legs[1]
+    x, y, z = leg.platform_point
+    other = replace(leg, platform_point=(x, y, z + step))
+    changed = replace(robot, legs=(robot.legs[0], other, *robot.legs[2:]))
+    joints = pteron.inverse_kinematics(robot, pose)
+    p, axes = robot.platform.at(pteron.follow(changed, joints[None], pose)[0])
+    before, turned = robot.platform.at(pose)
+    moved = robot.platform.directions @ (p + tool @ axes - before - tool @ turned)
+    count = len(robot.platform.lengths)
+    np.testing.assert_allclose(told.tool[:count, k], moved / step, atol=2e-5)

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.dynamics import mass_matrix
-from pteron.errors import DataError
+from pteron.errors import DataError, ModelError
 from pteron.indices.elasticity import Elasticity, Section, Springs
 from pteron.indices.internal_forces import Equations, blocks, hold, moved, on_platform, units
 from pteron.indices.sensitivities import tool_arm
 from pteron.kernels import Array, as_array
+from pteron.kinematics import twist
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
@@ -31,12 +32,13 @@ class Stiffness:
     Attributes
     ----------
     compliance : array, shape (..., m, m)
-        C: how the tool's pose changes per unit of a wrench on it: m/N, rad/N and rad/(N m).
+        C: how the tool's pose changes per unit of a wrench on it: m/N, rad/N and rad/(N m). Of a
+        platform that tilts (..., 6, 6): displacement and turn in base axes per force and moment.
     frequencies : array, shape (..., m)
         Natural frequencies of the bodies' masses, in platform coordinates, on these springs, Hz,
         ascending; infinite where nothing gives way.
     lengths : int
-        Number of the pose's coordinates, the first ones, that are lengths.
+        Number of the rows of C, the first ones, that are lengths.
     """
 
     compliance: Matrices
@@ -45,7 +47,19 @@ class Stiffness:
 
     @property
     def matrix(self) -> Matrices:
-        """K, the inverse of the compliance."""
+        """K, the inverse of the compliance.
+
+        Raises
+        ------
+        ModelError
+            If the platform tilts and has fewer than six freedoms: its joints hold the others.
+        """
+        size, freedom = self.compliance.shape[-1], self.frequencies.shape[-1]
+        if freedom < size:
+            raise ModelError(
+                f"matrix: a platform of {freedom} freedoms does not give way in {size - freedom} "
+                "others, so that the compliance has no inverse; use compliance, least or along"
+            )
         return np.linalg.inv(self.compliance)
 
     @property
@@ -74,7 +88,7 @@ class Stiffness:
         Raises
         ------
         DataError
-            If it has not as many numbers as the pose has lengths, or no length.
+            If it has not as many numbers as C has lengths, or no length.
         """
         u = as_array(direction, "direction", (self.lengths,))
         size = np.linalg.norm(u, axis=-1, keepdims=True)
@@ -151,7 +165,8 @@ def stiffness(
         np.concatenate(part).reshape((*poses.shape[:-1], *part[0].shape[1:]))
         for part in zip(*parts, strict=True)
     )
-    return Stiffness(compliance, frequencies, len(robot.platform.lengths))
+    lengths = 3 if robot.platform.tilts else len(robot.platform.lengths)
+    return Stiffness(compliance, frequencies, lengths)
 
 
 def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple[Array, Array]:
@@ -161,14 +176,19 @@ def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple
     equations: tuple[Array, ...] = evaluated(robot, "reactions", "nan", poses, rest, rest)
     links: tuple[Array, ...] = evaluated(robot, "beams", "nan", poses)
     mass: Array = mass_matrix(robot, poses, on_failure="nan")
-    compliance, frequencies = np.full((batch, m, m), np.nan), np.full((batch, m), np.nan)
+    size = 6 if robot.platform.tilts else m
+    compliance, frequencies = np.full((batch, size, size), np.nan), np.full((batch, m), np.nan)
     good = np.asarray(np.isfinite(equations[0]).all(axis=(-2, -1)))
     if good.any():
         given = Equations(*(part[good] for part in equations))
         beams = [part[good] for part in links]
         energy = _energy(elasticity.of_legs(robot), elasticity.rod_distance, given, beams)
         at_p = _compliance(robot, given, energy, np.zeros((len(energy), 3)))
-        compliance[good], frequencies[good] = at_p, _frequencies(at_p, mass[good])
+        compliance[good] = at_p
+        if robot.platform.tilts:
+            rates = np.linalg.pinv(twist(robot, poses[good][:, None], np.eye(m)).mT)
+            at_p = rates @ at_p @ rates.mT
+        frequencies[good] = _frequencies(at_p, mass[good])
         if any(robot.platform.tool):
             arm = tool_arm(robot, poses[good])
             compliance[good] = _compliance(robot, given, energy, arm)
@@ -176,20 +196,14 @@ def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple
 
 
 def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array) -> Array:
-    """Return C (B, m, m) at a point whose vector from P is `arm` (B, 3)."""
-    batch, m = len(arm), robot.freedom
-    wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load
-    force = on_platform(robot, wrench, np.zeros(3))[..., :3]
-    moment = np.cross(arm[:, None], force)
-    if robot.platform.angles:
-        axis = np.array(robot.platform.axis)
-        wrench[..., robot.platform.angular] += moment @ axis[:, None]
-        # `on_platform` has the part about the axis from the wrench.
-        moment = moment - (moment @ axis)[..., None] * axis
-    load = on_platform(robot, wrench, moment)
-    right = np.zeros((batch, given.rows.shape[-2], m))
-    presumed = np.zeros((batch, given.presumed_rows.shape[-2], m))
-    right[:, :m], presumed[:, :6] = -wrench.mT, -load.mT
+    """Return C (B, m, m), or (B, 6, 6), at a point whose vector from P is `arm` (B, 3)."""
+    load, applied = _unit_loads(robot, given, arm)
+    batch, _, count = load.shape
+    right = np.zeros((batch, given.rows.shape[-2], count))
+    presumed = np.zeros((batch, given.presumed_rows.shape[-2], count))
+    right[:, : robot.freedom] = -applied
+    if presumed.size:  # else a joint holds what the legs do not
+        presumed[:, :6] = -load
     held = hold(robot, given, right, presumed)
     w, free = held.forces, held.stresses
     if free.shape[-1]:  # the self-stress of the least energy
@@ -200,6 +214,23 @@ def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array)
         w = w - free @ back @ (free.mT @ energy @ w)
     found = w.mT @ energy @ w
     return np.asarray(0.5 * (found + found.mT))
+
+
+def _unit_loads(robot: Manipulator, given: Equations, arm: Array) -> tuple[Array, Array]:
+    """Return unit loads at a point: about P (B, 6, K), and against the freedoms (B, m, K)."""
+    batch, m = len(arm), robot.freedom
+    if robot.platform.tilts:
+        load = moved(arm)
+        return load, given.loads @ load
+    wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load
+    force = on_platform(robot, wrench, np.zeros(3))[..., :3]
+    moment = np.cross(arm[:, None], force)
+    if robot.platform.angles:
+        axis = np.array(robot.platform.axis)
+        wrench[..., robot.platform.angular] += moment @ axis[:, None]
+        # `on_platform` has the part about the axis from the wrench.
+        moment = moment - (moment @ axis)[..., None] * axis
+    return on_platform(robot, wrench, moment).mT, wrench.mT
 
 
 def _energy(

@@ -12,6 +12,7 @@ import numpy as np
 from pteron.bodies.vectors import Vector, cross, dot
 from pteron.equations.machine import numbers
 from pteron.kernels import Array, bare, general_program
+from pteron.kinematics import twist
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.legs.kind import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -127,11 +128,16 @@ def at_tool(robot: Manipulator, poses: Array, errors: Array) -> Array:
     """Return changes of the pose (..., m, K) as the tool's centre point sees them."""
     if not robot.platform.angles or not any(robot.platform.tool):
         return errors
-    platform = robot.platform
-    lever = np.cross(np.array(platform.axis), tool_arm(robot, poses)) @ platform.directions.T
+    platform, turning = robot.platform, robot.platform.angular
+    arm = tool_arm(robot, poses)
+    if platform.tilts:
+        turns = twist(robot, poses[..., None, :], np.eye(robot.freedom))[..., 3:]
+        levers = np.cross(turns, arm[..., None, :]) @ platform.directions.T
+    else:
+        lever = np.cross(np.array(platform.axis), arm) @ platform.directions.T
+        levers = turning[:, None] * lever[..., None, :]
     found = errors.copy()
-    turning = platform.angular
-    found[..., ~turning, :] += lever[..., :, None] * errors[..., turning, :]
+    found[..., ~turning, :] += levers.mT @ errors
     return found
 
 
@@ -176,7 +182,10 @@ def _of_leg(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...
         for q in leg.quantities
         if q.role in ("direction", "normal")
     }
-    first, *others = (q.name for q in leg.quantities if q.role == "direction")
+    directions = [q.name for q in leg.quantities if q.role == "direction"]
+    if not directions:  # a ram's pose depends on points alone
+        return
+    first, *others = directions
     carried = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < _UPRIGHT]
     if leg.plane_normal is None:
         yield from _tilts(first, [first, *carried], vectors)
