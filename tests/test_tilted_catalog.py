@@ -8,9 +8,10 @@ from mechanisms import TILTED, gated
 from test_cli import run
 
 import pteron
+from pteron.maps import pose_grid
 from pteron.motion import replay
 from pteron.playback import playback
-from pteron.workspace import home_pose, pose_margins
+from pteron.workspace import bounding_box, home_pose, pose_margins
 
 HOMES = {
     "ankle": [0.0, 0.0],
@@ -63,3 +64,24 @@ def test_tables_of_poses_may_be_in_mm_and_degrees(tmp_path):
     np.testing.assert_allclose(joints, pteron.inverse_kinematics(robot, pose), rtol=1e-12)
     shown = playback(robot, table)
     np.testing.assert_allclose(shown.motion.pose[0], pose, rtol=1e-12)
+
+
+def test_a_map_of_lengths_and_an_angle_has_the_reach_of_every_angle():
+    robot = TILTED["ball-table"]
+    over = pose_grid(robot, held={"pitch": 0.1}, ranges={"roll": (-0.3, 0.3)})
+    (z,) = [axis for axis in over.axes if axis.name == "z"]
+    for roll in (-0.3, 0.0, 0.3):
+        low, high = bounding_box(robot, [0.12, roll, 0.1])[:, 0]
+        assert z.least <= low < high <= z.greatest
+
+
+def test_a_design_of_a_platform_that_only_turns_is_refused(tmp_path):
+    file = tmp_path / "design.toml"
+    file.write_text(
+        'robot = "wrist"\n[[variables]]\nmoves = "legs.platform_point.z"\nrange = [-0.05, 0.05]\n'
+        '[[objectives]]\nmaximise = "type_ii"\n',
+        encoding="utf-8",
+    )
+    done = run(f"design {file} --out {tmp_path / 'out'}")
+    assert done.exit_code == 2
+    assert "wrist: a 3R platform only turns, but a design is for places" in done.stderr

@@ -55,6 +55,12 @@ class Task:
             If the search does not suit the machine; all its faults are listed.
         """
         robot = load(spec.robot)
+        if not robot.platform.lengths:
+            raise ModelError(
+                f"a {robot.platform.motion} platform only turns, but a design is for places: it "
+                "needs one that moves",
+                subject=robot.name,
+            )
         faults = list(_misfits(spec, robot))
         variables: tuple[Variable, ...] = ()
         try:
@@ -137,7 +143,8 @@ def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
     if spec.angles is not None and len(robot.platform.angles) != 1:
-        yield f"angles: given, but the platform of {robot.name} does not turn; leave it out"
+        turns = "tilts: give its orientation in pose" if robot.platform.tilts else "does not turn"
+        yield f"angles: given, but the platform of {robot.name} {turns}; leave it out"
     lengths = robot.platform.lengths
     if spec.workspace is not None and spec.workspace.lengths != len(lengths):
         yield (

@@ -289,13 +289,12 @@ def pose_grid(
 
 
 def _box(robot: Manipulator, pose: Array, spans: Mapping[str, tuple[float, ...]]) -> Array:
-    """Return the box (2, k) of the reach at a pose's orientation, or over the spans of an angle."""
-    if robot.platform.tilts:
-        return bounding_box(robot, pose)
+    """Return the box (2, k) of the reach at a pose's orientation, or over the spans of angles."""
     varying = [k for k in np.flatnonzero(robot.platform.angular) if robot.coordinates[k] in spans]
     ends = [spans[robot.coordinates[k]][:2] for k in varying]
+    turns = _TURNS if len(varying) < 2 else 3
     boxes, at = [], pose.copy()
-    for turned in product(*(np.linspace(low, high, _TURNS) for low, high in ends)):
+    for turned in product(*(np.linspace(low, high, turns) for low, high in ends)):
         at[varying] = turned
         try:
             boxes.append(bounding_box(robot, at))
