@@ -5,67 +5,21 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from typer import Argument, Option
 from typer.core import TyperCommand
 
-from pteron.cli.completion import machines
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
 
 
-def option(name: str, help: str, metavar: str | None = None, **more: Any) -> Any:  # noqa: A002
-    """Return an option with its name, its help, and the word that stands for its value there."""
-    return Option(f"--{name}", help=help, metavar=metavar, **more)
-
-
 STANDARD = "adept"
 """The name of the pick-and-place cycle of 25, 305 and 25 mm."""
 
-Robot = Annotated[
-    str,
-    Argument(
-        metavar="ROBOT",
-        help="A machine of the catalog (see pteron catalog) or a TOML file.",
-        autocompletion=machines,
-    ),
-]
-Json = Annotated[bool, option("json", "Print data for a program, as JSON.")]
-Out = Annotated[str | None, option("out", "Write the result to a .csv or .parquet file.", "FILE")]
-TableFile = Annotated[
-    str | None,
-    option("table", "Take a .csv or .parquet file's rows; - is CSV on standard input.", "FILE"),
-]
 Failure = Literal["raise", "nan"]
 """Whether a row that fails ends the command or is left empty."""
-OnFailure = Annotated[
-    Failure, option("on-failure", "Stop at a row that fails, or leave its results empty.")
-]
-Elbows = Annotated[
-    str | None, option("elbows", "The working mode, one sign a leg, such as ++-+.", "SIGNS")
-]
-Payload = Annotated[float, option("payload", "At the tool's centre point, kg.")]
-Cycle = Annotated[
-    str,
-    option(
-        "cycle", f"{STANDARD}, the standard pick-and-place cycle, or a table of a motion.", "CYCLE"
-    ),
-]
-Duration = Annotated[
-    float | None,
-    option("duration", "Of the standard cycle, s.", show_default="10 m/s^2 at the tool"),
-]
-Scheduler = Annotated[
-    str | None,
-    option(
-        "scheduler",
-        "A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.",
-        "ADDRESS",
-    ),
-]
 
 MOTION = ("--pose", "--velocity", "--acceleration", "--wrench")
 """The options that give a state."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from typer import Exit, echo
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.completion import parameters
+from pteron.cli.arguments import load_robot
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import is_terminal, plain, show, show_json, table
 
@@ -24,36 +23,34 @@ _COMMENTS = {"sympy": "#", "latex": "%", "booktabs": "%"}
 
 
 def base(
-    robot: Robot,
-    method: Annotated[
-        Literal["exact", "svd", "qr"],
-        option("method", "Exact arithmetic with a proof, or a numerical rank."),
-    ] = "exact",
-    keep: Annotated[
-        str | None,
-        option(
-            "keep",
-            "Parameters to keep before others: I_l1,m_l4.",
-            "NAMES",
-            autocompletion=parameters,
-        ),
-    ] = None,
-    shared: Annotated[
-        bool, option("shared", "All legs share one set of inertial parameters.")
-    ] = False,
-    format: Annotated[Format, option("format", "How they are written.")] = "text",  # noqa: A002
-    symbols: Annotated[
-        bool, option("symbols", "Write the coefficients in symbols of the geometry.")
-    ] = False,
-    leg_symbols: Annotated[
-        bool, option("leg-symbols", "The same, and equal lengths of several legs share no symbol.")
-    ] = False,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    method: Literal["exact", "svd", "qr"] = "exact",
+    keep: str | None = None,
+    shared: bool = False,
+    format_: Format = "text",
+    symbols: bool = False,
+    leg_symbols: bool = False,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Find the base inertial parameters: the sums of parameters that act on the forces.
 
     Formats latex and booktabs are lines of mathematics, and a table with values for a paper.
+
+    Options
+    -------
+    --method: Exact arithmetic with a proof, or a numerical rank.
+    --keep NAMES: Parameters to keep before others: I_l1,m_l4.
+    --shared: All legs share one set of inertial parameters.
+    --format: How they are written.
+    --symbols: Write the coefficients in symbols of the geometry.
+    --leg-symbols: The same, and equal lengths of several legs share no symbol.
+
+    Examples
+    --------
+    pteron base quadrupteron --symbols
+    pteron base quadrupteron --keep I_l1,m_l4 --format latex
     """
     written: Symbols = "leg" if leg_symbols else symbols
     machine = load_robot(robot, elbows)
@@ -62,22 +59,22 @@ def base(
 
         names = None if keep is None else [name.strip() for name in keep.split(",")]
         found = base_parameters(machine, method, names, shared=shared)
-    if json or format == "json":
+    if json or format_ == "json":
         data = found.as_dict()
         if written:
             data["symbolic"] = list(found.expressions(symbols=written))
             data["geometry"] = _geometry(found, written)
             data["shared_symbols"] = {} if written == "leg" else found.shared_symbols
         show_json(data)
-    elif format == "text":
+    elif format_ == "text":
         _show(found, written)
     else:
-        if format == "booktabs":
+        if format_ == "booktabs":
             echo(found.to_latex(symbols=written))
         else:
-            echo("\n".join(map(str, found.expressions(format, symbols=written))))
+            echo("\n".join(map(str, found.expressions(format_, symbols=written))))
         for line in _closing(found, written):
-            echo(f"{_COMMENTS[format]} {line}")
+            echo(f"{_COMMENTS[format_]} {line}")
 
 
 def _show(found: BaseParameters, symbols: Symbols) -> None:
@@ -121,8 +118,16 @@ def _closing(found: BaseParameters, symbols: Symbols) -> list[str]:
     return [*lines, *found.certificate.summary().splitlines()]
 
 
-def table1(json: Json = False) -> None:
-    """Print the paper's Table 1, as printed and as computed; exit with 1 if they disagree."""
+def table1(
+    *,
+    json: bool = False,
+) -> None:
+    """Print the paper's Table 1, as printed and as computed; exit with 1 if they disagree.
+
+    Examples
+    --------
+    pteron table1
+    """
     with spinner("Computing Table 1"):
         from pteron.report.table1 import rows as computed
 

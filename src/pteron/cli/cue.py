@@ -3,64 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from functools import partial
-from typing import Annotated
 
-from typer import Argument
-
-from pteron.cli.arguments import Elbows, Json, load_robot, option
+from pteron.cli.arguments import load_robot
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show, show_json, written
 from pteron.errors import DataError
 
-_filter = partial(option, metavar="NUMBER", rich_help_panel="Filters", show_default=False)
-
 
 def cue(
-    motion: Annotated[
-        str,
-        Argument(
-            metavar="MOTION",
-            help="The vehicle's motion, a .csv or .parquet file: t ax ay az wx wy wz.",
-            show_default=False,
-        ),
-    ],
-    robot: Annotated[
-        str, option("robot", "A machine whose platform moves and turns freely.", "FILE")
-    ],
-    out: Annotated[
-        str | None, option("out", "Write poses and joints to a .csv or .parquet file.", "FILE")
-    ] = None,
-    page: Annotated[
-        str | None, option("page", "Write a page that shows the motion, a .html file.", "FILE")
-    ] = None,
-    type_ii: Annotated[
-        float, option("type-ii", "Least type-II measure of the poses that it keeps within.")
-    ] = 0.0,
-    scale: Annotated[
-        float | None, _filter("scale", "Share of accelerations and rates that is shown: 0.5.")
-    ] = None,
-    translation: Annotated[
-        float | None, _filter("translation", "What is quicker is moved: 2.5 rad/s.")
-    ] = None,
-    return_speed: Annotated[
-        float | None, _filter("return-speed", "It comes back to the middle with: 0.25 rad/s.")
-    ] = None,
-    tilting: Annotated[
-        float | None, _filter("tilting", "What lasts longer is tilted into: 2 rad/s.")
-    ] = None,
-    tilt_rate: Annotated[
-        float | None, _filter("tilt-rate", "Greatest rate of that tilt: 0.05 rad/s.")
-    ] = None,
-    rotation: Annotated[
-        float | None, _filter("rotation", "Turns that are quicker are turned: 0.7 rad/s.")
-    ] = None,
-    smoothing: Annotated[
-        float | None, _filter("smoothing", "Nothing quicker is shown: 30 rad/s.")
-    ] = None,
-    elbows: Elbows = None,
-    json: Json = False,
+    motion: str,
+    *,
+    robot: str,
+    out: str | None = None,
+    page: str | None = None,
+    type_ii: float = 0.0,
+    scale: float | None = None,
+    translation: float | None = None,
+    return_speed: float | None = None,
+    tilting: float | None = None,
+    tilt_rate: float | None = None,
+    rotation: float | None = None,
+    smoothing: float | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Show a vehicle's accelerations and turns with a simulator's platform: a classical washout.
 
@@ -68,6 +34,32 @@ def cue(
     (rad/s) in the vehicle's axes: x ahead, y to the left, z up. What is quick is moved, what lasts
     is tilted into, and the platform comes back to the middle. It never leaves a box of poses that
     is proved to lie in the workspace: what is too large for it is pressed together.
+
+    Arguments
+    ---------
+    MOTION: The vehicle's motion, a .csv or .parquet file: t ax ay az wx wy wz.
+
+    Options
+    -------
+    --robot FILE: A machine whose platform moves and turns freely.
+    --out FILE: Write poses and joints to a .csv or .parquet file.
+    --page FILE: Write a page that shows the motion, a .html file.
+    --type-ii: Least type-II measure of the poses that it keeps within.
+
+    Filters
+    -------
+    --scale NUMBER: Share of accelerations and rates that is shown: 0.5.
+    --translation NUMBER: What is quicker is moved: 2.5 rad/s.
+    --return-speed NUMBER: It comes back to the middle with: 0.25 rad/s.
+    --tilting NUMBER: What lasts longer is tilted into: 2 rad/s.
+    --tilt-rate NUMBER: Greatest rate of that tilt: 0.05 rad/s.
+    --rotation NUMBER: Turns that are quicker are turned: 0.7 rad/s.
+    --smoothing NUMBER: Nothing quicker is shown: 30 rad/s.
+
+    Examples
+    --------
+    pteron cue drive.csv --robot simulator.toml --out cue.csv
+    pteron cue flight.csv --robot simulator.toml --scale 0.3 --page cue.html
     """
     from pteron.motion import Washout, limits_of, peaks
     from pteron.motion import cue as shown

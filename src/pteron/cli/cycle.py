@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import (
-    Elbows,
-    Json,
-    Payload,
-    Robot,
     check_rate,
     load_robot,
-    option,
     parsed_list,
 )
 from pteron.cli.motion_argument import given_pose, loaded, replayed
@@ -35,78 +29,33 @@ _ROUNDING = 1e-6
 _DENSE = 10
 """Moments per sample at which a motion's peaks are sought."""
 
-_way, _time, _limit = (partial(option, rich_help_panel=p) for p in ("Way", "Time", "Limits"))
-"""Makers of options, one for each section of the help."""
-
-_pose = partial(_way, metavar="POSE", show_default=False)
-
-_numbers = partial(_limit, metavar="NUMBERS")
-"""Makers, here and above, of options with a number for each joint, or a pose."""
-
 
 def cycle(
-    robot: Robot,
-    kind: Annotated[
-        Kind | None,
-        _way(
-            "kind",
-            "The pick-and-place cycle, straight lines, the joints' own way, or a table's motion.",
-            show_default="adept, or what --to, --via or --table says",
-        ),
-    ] = None,
-    from_: Annotated[
-        str | None, _pose("from", "Where it begins; the home pose if left out.")
-    ] = None,
-    to: Annotated[str | None, _pose("to", "Where it ends.")] = None,
-    via: Annotated[
-        str | None, _way("via", "Poses to pass, a .csv or .parquet file.", "FILE")
-    ] = None,
-    corner: Annotated[
-        float, _way("corner", "Metres before a pose at which its corner is rounded; 0 stops there.")
-    ] = 0.0,
-    back: Annotated[bool, _way("back", "And the same way back.")] = False,
-    around: Annotated[
-        str | None, _pose("around", "The middle of adept; the home pose if left out.")
-    ] = None,
-    scale: Annotated[
-        float | None,
-        _way("scale", "Of adept, 25 x 305 mm at 1.", show_default="the largest that fits"),
-    ] = None,
-    file: Annotated[
-        str | None, _way("table", "A motion to replay: t and poses, or joints.", "FILE")
-    ] = None,
-    duration: Annotated[
-        float | None,
-        _time("duration", "Of all of it, s.", show_default="the shortest within the limits"),
-    ] = None,
-    optimal: Annotated[bool, _time("optimal", "As fast as the limits allow.")] = False,
-    law: Annotated[
-        Literal["quintic", "seventh"], _time("law", "Of a line, by the polynomial's degree.")
-    ] = "quintic",
-    rate: Annotated[float, _time("rate", "Samples a second.")] = 1000.0,
-    speed: Annotated[
-        str | None,
-        _numbers("speed", "Of the joints, m/s or rad/s.", show_default="the drives'"),
-    ] = None,
-    acceleration: Annotated[
-        str | None, _numbers("acceleration", "Of the joints, the same per s.", show_default=False)
-    ] = None,
-    force: Annotated[
-        str | None, _numbers("force", "Of the drives, N or N m.", show_default="the drives'")
-    ] = None,
-    jerk: Annotated[
-        str | None, _numbers("jerk", "Of joints, with --kind joints.", show_default=False)
-    ] = None,
-    tool_speed: Annotated[float | None, _limit("tool-speed", "Of the tool, m/s.")] = None,
-    tool_acceleration: Annotated[
-        float | None, _limit("tool-acceleration", "Of the tool, m/s^2.")
-    ] = None,
-    payload: Payload = 0.0,
-    out: Annotated[
-        str | None, option("out", "Write its samples to a .csv or .parquet file.", "FILE")
-    ] = None,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    kind: Kind | None = None,
+    from_: str | None = None,
+    to: str | None = None,
+    via: str | None = None,
+    corner: float = 0.0,
+    back: bool = False,
+    around: str | None = None,
+    scale: float | None = None,
+    table: str | None = None,
+    duration: float | None = None,
+    optimal: bool = False,
+    law: Literal["quintic", "seventh"] = "quintic",
+    rate: float = 1000.0,
+    speed: str | None = None,
+    acceleration: str | None = None,
+    force: str | None = None,
+    jerk: str | None = None,
+    tool_speed: float | None = None,
+    tool_acceleration: float | None = None,
+    payload: float = 0.0,
+    out: str | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Make a motion, within the limits, and see what it asks of the drives.
 
@@ -118,6 +67,46 @@ def cycle(
     The file's columns are t x y z phi dx ... ddx ... of the pose, rho1 ... drho1 ... ddrho1 ... of
     the joints (theta1 of cranks), and force1 ... (torque1) of the drives: pteron forces --table
     reads it. --speed, --acceleration, --force and --jerk take one number, or one for each joint.
+
+    Way
+    ---
+    --kind: The pick-and-place cycle, straight lines, the joints' own way, or a table's motion.
+        [default: adept, or what --to, --via or --table says]
+    --from POSE: Where it begins; the home pose if left out.
+    --to POSE: Where it ends.
+    --via FILE: Poses to pass, a .csv or .parquet file.
+    --corner: Metres before a pose at which its corner is rounded; 0 stops there.
+    --back: And the same way back.
+    --around POSE: The middle of adept; the home pose if left out.
+    --scale: Of adept, 25 x 305 mm at 1. [default: the largest that fits]
+    --table FILE: A motion to replay: t and poses, or joints.
+
+    Time
+    ----
+    --duration: Of all of it, s. [default: the shortest within the limits]
+    --optimal: As fast as the limits allow.
+    --law: Of a line, by the polynomial's degree.
+    --rate: Samples a second.
+
+    Limits
+    ------
+    --speed NUMBERS: Of the joints, m/s or rad/s. [default: the drives']
+    --acceleration NUMBERS: Of the joints, the same per s.
+    --force NUMBERS: Of the drives, N or N m. [default: the drives']
+    --jerk NUMBERS: Of joints, with --kind joints.
+    --tool-speed: Of the tool, m/s.
+    --tool-acceleration: Of the tool, m/s^2.
+
+    Options
+    -------
+    --out FILE: Write its samples to a .csv or .parquet file.
+
+    Examples
+    --------
+    pteron cycle quadrupteron
+    pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv
+    pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv
+    pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv
     """
     from pteron.motion import limits_of
 
@@ -135,7 +124,7 @@ def cycle(
         tool_speed=tool_speed,
         tool_acceleration=tool_acceleration,
     )
-    way = kind or ("replay" if file else "line" if to or via else "adept")
+    way = kind or ("replay" if table else "line" if to or via else "adept")
     _expect_fitting(
         way,
         {
@@ -146,7 +135,7 @@ def cycle(
             "back": (back, ("line",)),
             "around": (around, ("adept",)),
             "scale": (scale, ("adept",)),
-            "table": (file, ("replay",)),
+            "table": (table, ("replay",)),
             "optimal": (optimal, ("line", "adept")),
             "duration": (duration, ("line", "adept")),
             "jerk": (jerk, ("joints",)),
@@ -157,10 +146,10 @@ def cycle(
     with spinner(f"A motion of {machine.name}"):
         step = 1.0 / rate
         if way == "replay":
-            if file is None:
+            if table is None:
                 raise DataError("no motion given; give --table FILE")
             start = None if from_ is None else given_pose(machine, from_, "--from")
-            motion = replayed(machine, file, start)
+            motion = replayed(machine, table, start)
         elif way == "joints":
             motion = joint_motion(machine, from_, to, parsed_list(jerk, "--jerk"), limits, step)
         elif way == "line":

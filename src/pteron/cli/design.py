@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import json as json_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from typer import Argument
-
-from pteron.cli.arguments import Json, Scheduler, option
-from pteron.cli.completion import machines
 from pteron.cli.progress import progress_bar
 from pteron.cli.terminal import plain, show, show_json, table, written
 from pteron.errors import DataError
@@ -24,25 +20,14 @@ _GENERATIONS, _SURVEY = "generations", "survey"
 
 
 def design(
-    spec: Annotated[
-        str,
-        Argument(metavar="SPEC", help="What is asked, a TOML file.", autocompletion=machines),
-    ],
-    out: Annotated[
-        str | None,
-        option("out", "Write the results to a folder, and go on there if ended.", "FOLDER"),
-    ] = None,
-    seed: Annotated[int | None, option("seed", "Of all chance.", show_default="the file's")] = None,
-    sweep: Annotated[
-        int | None,
-        option("sweep", "Evaluate so many designs spread evenly, instead of a search."),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        option("workers", "Processes that do the work.", show_default="this one"),
-    ] = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
+    spec: str,
+    *,
+    out: str | None = None,
+    seed: int | None = None,
+    sweep: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    json: bool = False,
 ) -> None:
     """Search for the dimensions of a machine that are best for what is asked of it.
 
@@ -54,6 +39,23 @@ def design(
     A folder gets front.csv, front.parquet, front.png, report.md with what changed and what is
     proved, design.json, and the best machines as TOML files. What is evaluated is kept there, so
     that the same command goes on where it was ended, and ends in the same front.
+
+    Arguments
+    ---------
+    SPEC: What is asked, a TOML file.
+
+    Options
+    -------
+    --out FOLDER: Write the results to a folder, and go on there if ended.
+    --seed: Of all chance. [default: the file's]
+    --sweep: Evaluate so many designs spread evenly, instead of a search.
+    --workers: Processes that do the work. [default: this one]
+
+    Examples
+    --------
+    pteron design search.toml --out best
+    pteron design search.toml --out best --seed 7 --workers 4
+    pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786
     """
     from pteron.design import Summary, read_spec
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.table import Table
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.arguments import load_robot
 from pteron.cli.progress import progress_bar
 from pteron.cli.terminal import note, show, show_json, table, written
 from pteron.errors import ModelError
@@ -23,75 +22,39 @@ _MEASURES = {
 }
 """Names of limits where those of the code will not do."""
 
-_motion, _limit, _search, _file = (
-    partial(option, rich_help_panel=panel) for panel in ("Motion", "Limits", "Search", "File")
-)
-"""Makers of options, one for each section of the help."""
-
 
 def excite(
-    robot: Robot,
-    out: Annotated[
-        str | None,
-        option("out", "Write it to a .csv or .parquet file, with others beside it.", "FILE"),
-    ] = None,
-    space: Annotated[
-        Literal["platform", "joints"],
-        _motion("space", "Whose coordinates the Fourier series are of."),
-    ] = "platform",
-    harmonics: Annotated[int, _motion("harmonics", "How many.")] = 5,
-    period: Annotated[float, _motion("period", "In s.")] = 5.0,
-    periods: Annotated[int, _motion("periods", "Between lead-in and lead-out.")] = 3,
-    stribeck: Annotated[
-        bool, _motion("stribeck", "Slow passages too, for friction that falls with speed.")
-    ] = False,
-    speed: Annotated[
-        float | None,
-        _limit("speed", "Of the joints, m/s or rad/s.", show_default="the drives', else 1"),
-    ] = None,
-    acceleration: Annotated[float, _limit("acceleration", "The same per s.")] = 10.0,
-    force: Annotated[
-        float | None,
-        _limit("force", "Of the drives, N or N m.", show_default="the drives', else none"),
-    ] = None,
-    type_i: Annotated[float, _limit("type-i", "Least type-I measure of every leg.")] = 0.25,
-    type_ii: Annotated[float, _limit("type-ii", "Least type-II measure.")] = 0.3,
-    clearance: Annotated[
-        float, _limit("clearance", "Of the joints from their limits, m or rad.")
-    ] = 0.005,
-    passive_clearance: Annotated[
-        float, _limit("passive-clearance", "Of passive joints and phi, share of half their range.")
-    ] = 0.02,
-    rate: Annotated[float, _file("rate", "Samples a second.")] = 1000.0,
-    contents: Annotated[
-        Literal["all", "joints", "poses"],
-        _file("contents", "All columns, or t with the joints or the poses only."),
-    ] = "all",
-    columns: Annotated[
-        str | None, _file("columns", "Names of the joints' columns, such as A1,A2.", "NAMES")
-    ] = None,
-    length_unit: Annotated[
-        Literal["m", "mm", "um"], _file("length-unit", "Of sliders and poses.")
-    ] = "m",
-    angle_unit: Annotated[Literal["rad", "deg"], _file("angle-unit", "Of cranks and phi.")] = "rad",
-    time_unit: Annotated[Literal["s", "ms", "us"], _file("time-unit", "Of t.")] = "s",
-    separator: Annotated[
-        Literal[",", ";", "tab", "|"] | None,
-        _file("separator", "Of the cells.", show_default=", or ; with a decimal comma"),
-    ] = None,
-    decimal: Annotated[Literal[".", ","], _file("decimal", "The decimal sign.")] = ".",
-    criterion: Annotated[
-        Literal["condition", "logdet"], _search("criterion", "What is made small.")
-    ] = "condition",
-    starts: Annotated[int, _search("starts", "Random motions improved.")] = 12,
-    draws: Annotated[int, _search("draws", "Random motions drawn.")] = 100,
-    seconds: Annotated[float, _search("seconds", "Time for the search.")] = 60.0,
-    seed: Annotated[int, _search("seed", "Of the random motions.")] = 0,
-    workers: Annotated[
-        int | None, _search("workers", "Processes at a time.", show_default="one a core, up to 4")
-    ] = None,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    out: str | None = None,
+    space: Literal["platform", "joints"] = "platform",
+    harmonics: int = 5,
+    period: float = 5.0,
+    periods: int = 3,
+    stribeck: bool = False,
+    speed: float | None = None,
+    acceleration: float = 10.0,
+    force: float | None = None,
+    type_i: float = 0.25,
+    type_ii: float = 0.3,
+    clearance: float = 0.005,
+    passive_clearance: float = 0.02,
+    rate: float = 1000.0,
+    contents: Literal["all", "joints", "poses"] = "all",
+    columns: str | None = None,
+    length_unit: Literal["m", "mm", "um"] = "m",
+    angle_unit: Literal["rad", "deg"] = "rad",
+    time_unit: Literal["s", "ms", "us"] = "s",
+    separator: Literal[",", ";", "tab", "|"] | None = None,
+    decimal: Literal[".", ","] = ".",
+    criterion: Literal["condition", "logdet"] = "condition",
+    starts: int = 12,
+    draws: int = 100,
+    seconds: float = 60.0,
+    seed: int = 0,
+    workers: int | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Find a periodic trajectory from whose forces the base parameters are seen best.
 
@@ -108,6 +71,54 @@ def excite(
     log, log.toml beside log.csv, and pteron identify reads a log in the same layout.
 
     Ctrl-C ends the search and keeps the best until then.
+
+    Options
+    -------
+    --out FILE: Write it to a .csv or .parquet file, with others beside it.
+
+    Motion
+    ------
+    --space: Whose coordinates the Fourier series are of.
+    --harmonics: How many.
+    --period: In s.
+    --periods: Between lead-in and lead-out.
+    --stribeck: Slow passages too, for friction that falls with speed.
+
+    Limits
+    ------
+    --speed: Of the joints, m/s or rad/s. [default: the drives', else 1]
+    --acceleration: The same per s.
+    --force: Of the drives, N or N m. [default: the drives', else none]
+    --type-i: Least type-I measure of every leg.
+    --type-ii: Least type-II measure.
+    --clearance: Of the joints from their limits, m or rad.
+    --passive-clearance: Of passive joints and phi, share of half their range.
+
+    File
+    ----
+    --rate: Samples a second.
+    --contents: All columns, or t with the joints or the poses only.
+    --columns NAMES: Names of the joints' columns, such as A1,A2.
+    --length-unit: Of sliders and poses.
+    --angle-unit: Of cranks and phi.
+    --time-unit: Of t.
+    --separator: Of the cells. [default: , or ; with a decimal comma]
+    --decimal: The decimal sign.
+
+    Search
+    ------
+    --criterion: What is made small.
+    --starts: Random motions improved.
+    --draws: Random motions drawn.
+    --seconds: Time for the search.
+    --seed: Of the random motions.
+    --workers: Processes at a time. [default: one a core, up to 4]
+
+    Examples
+    --------
+    pteron excite quadrupteron --out exciting.csv
+    pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60
+    pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,
     """
     machine = load_robot(robot, elbows)
     from pteron.identification.excitation import (

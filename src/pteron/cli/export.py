@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
 from importlib import import_module
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.completion import functions
-from pteron.cli.exported_functions import FUNCTIONS
+from pteron.cli.arguments import load_robot
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show, show_json, written
 from pteron.errors import DataError
@@ -19,8 +16,6 @@ _TRUSTED = "trustworthy"
 Output = Literal["force", "torque", "percent"]
 """A copy of `pteron.export.command_units.Output`: importing that would slow the command line."""
 
-_to = partial(option, metavar="DIR")
-
 _TARGETS = (
     *("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu"),
     *("klipper", "marlin", "reprap", "linuxcnc"),
@@ -29,65 +24,28 @@ _TARGETS = (
 
 
 def export(
-    robot: Robot,
-    c: Annotated[str | None, _to("c", "Write C99 to this folder.")] = None,
-    st: Annotated[str | None, _to("st", "Write Structured Text to this folder.")] = None,
-    mjcf: Annotated[str | None, _to("mjcf", "Write MuJoCo's MJCF.")] = None,
-    sdf: Annotated[str | None, _to("sdf", "Write SDF, for Gazebo.")] = None,
-    urdf: Annotated[str | None, _to("urdf", "Write URDF of the tree, and its closures.")] = None,
-    pinocchio: Annotated[
-        str | None, _to("pinocchio", "Write a module that makes Pinocchio's model.")
-    ] = None,
-    casadi: Annotated[
-        str | None, _to("casadi", "Write CasADi functions, for acados and the like.")
-    ] = None,
-    fmu: Annotated[str | None, _to("fmu", "Write an FMU of FMI 3.0.")] = None,
-    klipper: Annotated[
-        str | None, _to("klipper", "Write the kinematics of a Klipper configuration.")
-    ] = None,
-    marlin: Annotated[
-        str | None, _to("marlin", "Write M665 and M666 of a linear Delta for Marlin.")
-    ] = None,
-    reprap: Annotated[
-        str | None, _to("reprap", "Write M665 and M666 of a linear Delta for RepRapFirmware.")
-    ] = None,
-    linuxcnc: Annotated[str | None, _to("linuxcnc", "Write kinematics for LinuxCNC.")] = None,
-    function: Annotated[
-        list[str] | None,
-        option(
-            "function",
-            f"What to write; again for more: {', '.join(FUNCTIONS)}.",
-            "NAME",
-            autocompletion=functions,
-        ),
-    ] = None,
-    single: Annotated[bool, option("float", "C: float instead of double.")] = False,
-    specialised: Annotated[
-        bool, option("specialised", "C: fold the inertial parameters in.")
-    ] = False,
-    wrench: Annotated[
-        bool, option("wrench", "Dynamics take a wrench on the platform too.")
-    ] = False,
-    output: Annotated[
-        Output,
-        option(
-            "output",
-            "What drives are told: force at the joints, torque of the motors, or percent of what "
-            "they are rated for.",
-            "UNIT",
-        ),
-    ] = "force",
-    base: Annotated[
-        str | None,
-        option(
-            "base",
-            "The identification.json of pteron identify: its values go into the code.",
-            "FILE",
-            show_default=False,
-        ),
-    ] = None,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    c: str | None = None,
+    st: str | None = None,
+    mjcf: str | None = None,
+    sdf: str | None = None,
+    urdf: str | None = None,
+    pinocchio: str | None = None,
+    casadi: str | None = None,
+    fmu: str | None = None,
+    klipper: str | None = None,
+    marlin: str | None = None,
+    reprap: str | None = None,
+    linuxcnc: str | None = None,
+    function: list[str] | None = None,
+    float_: bool = False,
+    specialised: bool = False,
+    wrench: bool = False,
+    output: Output = "force",
+    base: str | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Write code for a controller, or the machine as another engine or tool wants it.
 
@@ -99,12 +57,42 @@ def export(
     identify` found, as it lists it, and are called `feed_forward_base` and
     `joint_feed_forward_base`. The others write one thing each, with no options but --elbows and
     --json.
+
+    Options
+    -------
+    --c DIR: Write C99 to this folder.
+    --st DIR: Write Structured Text to this folder.
+    --mjcf DIR: Write MuJoCo's MJCF.
+    --sdf DIR: Write SDF, for Gazebo.
+    --urdf DIR: Write URDF of the tree, and its closures.
+    --pinocchio DIR: Write a module that makes Pinocchio's model.
+    --casadi DIR: Write CasADi functions, for acados and the like.
+    --fmu DIR: Write an FMU of FMI 3.0.
+    --klipper DIR: Write the kinematics of a Klipper configuration.
+    --marlin DIR: Write M665 and M666 of a linear Delta for Marlin.
+    --reprap DIR: Write M665 and M666 of a linear Delta for RepRapFirmware.
+    --linuxcnc DIR: Write kinematics for LinuxCNC.
+    --float: C: float instead of double.
+    --specialised: C: fold the inertial parameters in.
+    --wrench: Dynamics take a wrench on the platform too.
+    --output UNIT: What drives are told: force at the joints, torque of the motors, or percent of
+        what they are rated for.
+    --base FILE: The identification.json of pteron identify: its values go into the code.
+
+    Examples
+    --------
+    pteron export quadrupteron --c controller
+    pteron export my-robot.toml --c controller --float --function inverse_kinematics
+    pteron export quadrupteron --st plc
+    pteron export quadrupteron --fmu models
+    pteron export linear-delta --klipper printer
+    pteron export robot.toml --base result/identification.json --c controller
     """
     folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
     asked = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
     options = {
         "function": function,
-        "float": single,
+        "float": float_,
         "specialised": specialised,
         "wrench": wrench,
         "output": output != "force",
@@ -119,7 +107,7 @@ def export(
 
         grade = read_identified(machine, base).grade if base is not None else _TRUSTED
         if c is not None:
-            real: Real = "float" if single else "double"
+            real: Real = "float" if float_ else "double"
             look: dict[str, Any] = {"real": real, "specialised": specialised}
             files += export_c(machine, function, c, **look, wrench=wrench, output=output, base=base)
         if st is not None:

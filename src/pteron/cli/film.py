@@ -2,54 +2,52 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from typer import Option
-
-from pteron.cli.arguments import STANDARD, Cycle, Duration, Elbows, Json, Robot, load_robot, option
+from pteron.cli.arguments import STANDARD, load_robot
 from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.terminal import plain, show, show_json, written
 from pteron.errors import DataError
 
-_OUT = Option(
-    *("--out", "-o"), help="The film: .mp4 (H.264) or .gif.", metavar="FILE", show_default=False
-)
-"""The option `--out`."""
-
 
 def film(
-    robot: Robot,
-    out: Annotated[str, _OUT],
-    cycle: Cycle = STANDARD,
-    duration: Duration = None,
-    speed: Annotated[
-        float | None,
-        option(
-            "speed",
-            "Of the film: 1 is real time, 0.4 slow motion.",
-            show_default="the largest of 1, 0.5, 0.2, 0.1 ... that takes 2 s",
-        ),
-    ] = None,
-    fps: Annotated[float, option("fps", "Frames a second.")] = 30.0,
-    size: Annotated[
-        str, option("size", "Width and height, pixels, both even.", "WIDTHxHEIGHT")
-    ] = "960x720",
-    turns: Annotated[
-        float, option("turns", "How often the eye goes round the machine; not of planar ones.")
-    ] = 0.0,
-    forces: Annotated[bool, option("forces", "Draw the drives' forces below.")] = False,
-    payload: Annotated[
-        float, option("payload", "At the tool's centre point, kg: the forces carry it.")
-    ] = 0.0,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    out: str,
+    cycle: str = STANDARD,
+    duration: float | None = None,
+    speed: float | None = None,
+    fps: float = 30.0,
+    size: str = "960x720",
+    turns: float = 0.0,
+    forces: bool = False,
+    payload: float = 0.0,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Film a machine that goes through a cycle, in real time or slow motion, as MP4 or GIF.
 
     The view is the same from the first frame to the last, or goes round the machine with --turns;
     the film says its speed in a corner. Ctrl-C leaves no file. An MP4 is H.264 as browsers and
     slides play it, and needs FFmpeg, which the extra film brings.
+
+    Options
+    -------
+    --out, -o FILE: The film: .mp4 (H.264) or .gif.
+    --speed: Of the film: 1 is real time, 0.4 slow motion. [default: the largest of 1, 0.5, 0.2, 0.1
+        ... that takes 2 s]
+    --fps: Frames a second.
+    --size WIDTHxHEIGHT: Width and height, pixels, both even.
+    --turns: How often the eye goes round the machine; not of planar ones.
+    --forces: Draw the drives' forces below.
+    --payload: At the tool's centre point, kg: the forces carry it.
+
+    Examples
+    --------
+    pteron film delta -o cycle.mp4
+    pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4
+    pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif
     """
     machine = load_robot(robot, elbows)
     from pteron.dynamics import drive_forces

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.table import Table
-from typer import Argument
 
-from pteron.cli.arguments import Elbows, Json, load_robot, option
-from pteron.cli.completion import machines
+from pteron.cli.arguments import load_robot
 from pteron.cli.progress import Times, spinner, stages
 from pteron.cli.terminal import is_terminal, note, plain, show, show_json, table, written
 from pteron.errors import DataError
@@ -42,69 +40,28 @@ Derivatives = Literal["periodic", "central", "spline"]
 
 
 def identify(
-    logs: Annotated[
-        list[str],
-        Argument(metavar="LOG...", help="Recorded motions, .csv or .parquet: t, joints, forces."),
-    ],
-    robot: Annotated[
-        str,
-        option("robot", "The machine as it is drawn.", "ROBOT", autocompletion=machines),
-    ],
-    out: Annotated[str, option("out", "The folder to write it to.", "DIR")],
-    held_out: Annotated[
-        list[str] | None,
-        option(
-            "held-out",
-            "What to judge by; once for each. By default the last 30 % of every log.",
-            "LOG",
-        ),
-    ] = None,
-    description: Annotated[
-        str | None, option("description", "Of all logs; by default beside each.", "TOML")
-    ] = None,
-    estimator: Annotated[
-        Estimator, option("estimator", "How the equations are solved.")
-    ] = "weighted",
-    without: Annotated[
-        str | None, option("without", "Leave out: coulomb,viscous,offset.", "TERMS")
-    ] = None,
-    joints: Annotated[
-        Passive, option("joints", "Viscous friction in the passive joints.")
-    ] = "none",
-    stribeck: Annotated[
-        str | None,
-        option("stribeck", "Friction falls with this speed, m/s or rad/s.", "SPEED,...|auto"),
-    ] = None,
-    delay: Annotated[
-        str | None,
-        option("delay", "How late forces are for positions, s; auto: find it.", "S|auto"),
-    ] = None,
-    rotors: Annotated[bool, option("rotors", "With the inertia of the motors.")] = False,
-    payload: Annotated[
-        bool,
-        option("payload", "A payload too: logs with it and without, column payload 1 and 0."),
-    ] = False,
-    shared: Annotated[
-        bool, option("shared", "All legs share one set of inertial parameters.")
-    ] = False,
-    derivatives: Annotated[
-        Derivatives | None,
-        option("derivatives", "How positions are differentiated; the data decide."),
-    ] = None,
-    cutoff: Annotated[float | None, option("cutoff", "Of the positions' filter.", "HZ")] = None,
-    band: Annotated[float | None, option("band", "Of the filter on both sides.", "HZ")] = None,
-    period: Annotated[
-        float | None, option("period", "After which the motion repeats.", "S")
-    ] = None,
-    cad: Annotated[
-        str, option("cad", "Bodies are near: robot, none, or a machine's file.", "WHICH")
-    ] = "robot",
-    boxes: Annotated[
-        list[str] | None,
-        option("box", "Holds all mass of u1, l3, e, u, ...; m.", "BODY=X0,X1,Y0,Y1"),
-    ] = None,
-    elbows: Elbows = None,
-    as_json: Json = False,
+    log: list[str],
+    *,
+    robot: str,
+    out: str,
+    held_out: list[str] | None = None,
+    description: str | None = None,
+    estimator: Estimator = "weighted",
+    without: str | None = None,
+    joints: Passive = "none",
+    stribeck: str | None = None,
+    delay: str | None = None,
+    rotors: bool = False,
+    payload: bool = False,
+    shared: bool = False,
+    derivatives: Derivatives | None = None,
+    cutoff: float | None = None,
+    band: float | None = None,
+    period: float | None = None,
+    cad: str = "robot",
+    box: list[str] | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Identify a machine from recorded motions, and say whether the result can be trusted.
 
@@ -113,6 +70,36 @@ def identify(
 
     The folder gets identification.html to read, identification.json with all numbers, and the
     machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
+
+    Arguments
+    ---------
+    LOG...: Recorded motions, .csv or .parquet: t, joints, forces.
+
+    Options
+    -------
+    --robot ROBOT: The machine as it is drawn.
+    --out DIR: The folder to write it to.
+    --held-out LOG: What to judge by; once for each. By default the last 30 % of every log.
+    --description TOML: Of all logs; by default beside each.
+    --estimator: How the equations are solved.
+    --without TERMS: Leave out: coulomb,viscous,offset.
+    --joints: Viscous friction in the passive joints.
+    --stribeck SPEED,...|auto: Friction falls with this speed, m/s or rad/s.
+    --delay S|auto: How late forces are for positions, s; auto: find it.
+    --rotors: With the inertia of the motors.
+    --payload: A payload too: logs with it and without, column payload 1 and 0.
+    --shared: All legs share one set of inertial parameters.
+    --derivatives: How positions are differentiated; the data decide.
+    --cutoff HZ: Of the positions' filter.
+    --band HZ: Of the filter on both sides.
+    --period S: After which the motion repeats.
+    --cad WHICH: Bodies are near: robot, none, or a machine's file.
+    --box BODY=X0,X1,Y0,Y1: Holds all mass of u1, l3, e, u, ...; m.
+
+    Examples
+    --------
+    pteron identify log.csv --robot quadrupteron --out identified
+    pteron identify a.csv b.csv --held-out c.csv --robot my-robot.toml --out identified
     """
     machine = load_robot(robot, elbows)
     named = {"robot": "robot", "none": None}
@@ -125,13 +112,13 @@ def identify(
 
         falls = _speeds(stribeck)
         terms = _terms(without, joints, rotors=rotors, payload=payload, stribeck=falls)
-        bounds = _bounds(boxes, machine)
+        bounds = _bounds(box, machine)
         processing = Processing(derivatives, cutoff, band, period, delay=_delay(delay))
         fit, check = (
             [open_log(path, machine, description=description) for path in paths]
-            for paths in (logs, held_out or [])
+            for paths in (log, held_out or [])
         )
-    read = [*logs, *(held_out or ()), *(path for path in (robot, description) if path)]
+    read = [*log, *(held_out or ()), *(path for path in (robot, description) if path)]
     sources = [path for path in read if Path(path).is_file()]
     model_path(out, machine.name, sources)
     rows = sum(log.rows_estimate or 0 for log in (*fit, *check))
@@ -146,7 +133,7 @@ def identify(
         files = write_identification(result, folder, sources=sources)
     if is_terminal():
         note(times.told())
-    if as_json:
+    if json:
         show_json({"files": [str(path) for path in files.paths], **numbers(result)})
         return
     _show(result, files)

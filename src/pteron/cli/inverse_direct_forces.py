@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
-
-from typer import Argument
+from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import (
     MOTION,
-    Elbows,
     Failure,
-    Json,
-    OnFailure,
-    Out,
-    Robot,
-    TableFile,
     load_robot,
-    option,
     parsed_numbers,
 )
 from pteron.cli.table_rows import (
@@ -37,20 +28,14 @@ if TYPE_CHECKING:
 
 
 def inverse(
-    robot: Robot,
-    pose: Annotated[
-        list[str] | None,
-        Argument(
-            metavar="POSE",
-            help="x y z phi, x y z roll pitch yaw, or those that the machine has; m and rad.",
-            show_default=False,
-        ),
-    ] = None,
-    table: TableFile = None,
-    out: Out = None,
-    elbows: Elbows = None,
-    on_failure: OnFailure = "raise",
-    json: Json = False,
+    robot: str,
+    pose: list[str] | None = None,
+    *,
+    table: str | None = None,
+    out: str | None = None,
+    elbows: str | None = None,
+    on_failure: Failure = "raise",
+    json: bool = False,
 ) -> None:
     """Compute the joint coordinates at poses.
 
@@ -58,6 +43,15 @@ def inverse(
     rad, or in units that their names say: x (mm), roll (deg). The result has its columns, in SI
     units, and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad, as the drives
     count them where a leg has a `reading`.
+
+    Arguments
+    ---------
+    POSE: x y z phi, x y z roll pitch yaw, or those that the machine has; m and rad.
+
+    Examples
+    --------
+    pteron inverse quadrupteron 0.01 0.02 -0.03 0.1
+    pteron inverse tripteron --table poses.csv --out joints.csv
     """
     from pteron.kinematics import inverse_kinematics
     from pteron.manipulator.readings import to_readings
@@ -80,34 +74,34 @@ def inverse(
 
 
 def direct(
-    robot: Robot,
-    joints: Annotated[
-        list[str] | None,
-        Argument(
-            metavar="JOINTS",
-            help="One a leg: rho of a slider, m; theta of a crank, rad.",
-            show_default=False,
-        ),
-    ] = None,
-    table: TableFile = None,
-    out: Out = None,
-    elbows: Elbows = None,
-    on_failure: Annotated[
-        Failure | None,
-        option(
-            "on-failure",
-            "Stop where no pose has the joint coordinates, or leave the row empty; raise for those "
-            "typed here, nan for a table.",
-            show_default=False,
-        ),
-    ] = None,
-    json: Json = False,
+    robot: str,
+    joints: list[str] | None = None,
+    *,
+    table: str | None = None,
+    out: str | None = None,
+    elbows: str | None = None,
+    on_failure: Failure | None = None,
+    json: bool = False,
 ) -> None:
     """Compute every pose that has the joint coordinates: all assembly modes.
 
     A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row
     for each real pose, with the table's row (from 1) and its columns, the assembly mode (from 1)
     and x y z phi, those that the machine has. Where there is no real pose, these are empty.
+
+    Arguments
+    ---------
+    JOINTS: One a leg: rho of a slider, m; theta of a crank, rad.
+
+    Options
+    -------
+    --on-failure: Stop where no pose has the joint coordinates, or leave the row empty; raise for
+        those typed here, nan for a table.
+
+    Examples
+    --------
+    pteron direct quadrupteron 0.03 0.02 0.01 0.02
+    pteron direct quadrupteron --table log.csv --out poses.parquet
     """
     from pteron.kinematics import direct_kinematics
     from pteron.manipulator.readings import from_readings
@@ -150,29 +144,19 @@ def _modes(table: Table, poses: NDArray[Any], coordinates: tuple[str, ...]) -> T
     return replace(table, frame=frame).extended(dict(zip(coordinates, found, strict=True)))
 
 
-def _vector(name: str, text: str) -> Any:
-    return option(name, text, "NUMBERS", show_default=False)
-
-
 def forces(
-    robot: Robot,
-    pose: Annotated[str | None, _vector("pose", "x y z phi, or those it has; m and rad.")] = None,
-    velocity: Annotated[str | None, _vector("velocity", "Its rate; at rest if left out.")] = None,
-    acceleration: Annotated[
-        str | None, _vector("acceleration", "The rate of that; zero if left out.")
-    ] = None,
-    wrench: Annotated[
-        str | None,
-        _vector("wrench", "fx fy fz mk, or fx fy fz mx my mz where it tilts, at P; N and N m."),
-    ] = None,
-    drives: Annotated[
-        bool, option("drives", "What the drives must give: with friction and the motors' inertia.")
-    ] = False,
-    table: TableFile = None,
-    out: Out = None,
-    elbows: Elbows = None,
-    on_failure: OnFailure = "raise",
-    json: Json = False,
+    robot: str,
+    *,
+    pose: str | None = None,
+    velocity: str | None = None,
+    acceleration: str | None = None,
+    wrench: str | None = None,
+    drives: bool = False,
+    table: str | None = None,
+    out: str | None = None,
+    elbows: str | None = None,
+    on_failure: Failure = "raise",
+    json: bool = False,
 ) -> None:
     """Compute the actuator forces of a motion.
 
@@ -182,6 +166,19 @@ def forces(
     force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m. They are those of
     the bodies or, with --drives, those of the drives. Where these are more than a drive's limits in
     the machine's file, a note says so.
+
+    Options
+    -------
+    --pose NUMBERS: x y z phi, or those it has; m and rad.
+    --velocity NUMBERS: Its rate; at rest if left out.
+    --acceleration NUMBERS: The rate of that; zero if left out.
+    --wrench NUMBERS: fx fy fz mk, or fx fy fz mx my mz where it tilts, at P; N and N m.
+    --drives: What the drives must give: with friction and the motors' inertia.
+
+    Examples
+    --------
+    pteron forces quadrupteron --pose 0.01 0.02 -0.03 0.1 --velocity 0 0 0.5 0
+    pteron forces quadrupteron --table motion.csv --out forces.csv
     """
     import numpy as np
 

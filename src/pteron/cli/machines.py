@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
-from typer import Argument, Exit
+from typer import Exit
 
-from pteron.cli.arguments import Elbows, Json, load_robot, option, signs
-from pteron.cli.completion import machines
+from pteron.cli.arguments import load_robot, signs
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import complain, note, plain, show, show_json, table, write
 from pteron.errors import ModelError, OutputError, PteronError
@@ -30,12 +29,20 @@ _FAULTY = 2
 """Exit code for a faulty file."""
 
 
-def catalog(json: Json = False) -> None:
-    """List the machines that come with Pteron."""
+def catalog(
+    *,
+    json: bool = False,
+) -> None:
+    """List the machines that come with Pteron.
+
+    Examples
+    --------
+    pteron catalog --json
+    """
     _list(json)
 
 
-def _list(json: bool) -> None:
+def _list(*, json: bool) -> None:
     from pteron.manipulator import catalog as names
     from pteron.manipulator import load
 
@@ -50,22 +57,29 @@ def _list(json: bool) -> None:
 
 
 def new(
-    kind: Annotated[
-        str | None,
-        Argument(
-            metavar="KIND",
-            help="A machine of the catalog, or a TOML file.",
-            show_default=False,
-            autocompletion=machines,
-        ),
-    ] = None,
-    out: Annotated[str | None, option("out", "Write it to this TOML file.", "FILE")] = None,
-    overwrite: Annotated[bool, option("overwrite", "Replace the file if it is there.")] = False,
-    json: Json = False,
+    kind: str | None = None,
+    *,
+    out: str | None = None,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> None:
     """Write a file for a machine of your own, which says what every key is.
 
     It is a machine like KIND, to put your numbers into; without KIND the kinds are listed.
+
+    Arguments
+    ---------
+    KIND: A machine of the catalog, or a TOML file.
+
+    Options
+    -------
+    --out FILE: Write it to this TOML file.
+    --overwrite: Replace the file if it is there.
+
+    Examples
+    --------
+    pteron new
+    pteron new delta --out robot.toml
     """
     if kind is None:
         _list(json)
@@ -97,17 +111,24 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
 
 
 def check(
-    file: Annotated[
-        str, Argument(metavar="FILE", help="A machine's TOML file.", autocompletion=machines)
-    ],
-    elbows: Elbows = None,
-    json: Json = False,
+    file: str,
+    *,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Check a machine's file and say what the machine is.
 
     It fails if the file is not valid, telling all its faults, if the machine is singular at every
     pose, or if no pose is in reach of all its legs. What is possible but unlikely, such as a length
     in millimetres or a centre of mass beyond its link, is told as a warning.
+
+    Arguments
+    ---------
+    FILE: A machine's TOML file.
+
+    Examples
+    --------
+    pteron check robot.toml
     """
     try:
         robot = load_robot(file, elbows)

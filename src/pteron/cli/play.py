@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from typer import Argument
-
-from pteron.cli.arguments import STANDARD, Elbows, Json, Payload, Robot, load_robot, option
+from pteron.cli.arguments import STANDARD, load_robot
 from pteron.cli.motion_argument import loaded, played
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import plain, show, show_json
@@ -19,28 +17,14 @@ if TYPE_CHECKING:
 
 
 def play(
-    robot: Robot,
-    motion: Annotated[
-        str | None,
-        Argument(
-            metavar="MOTION",
-            help="A table of a motion or of joints, or a log: a .csv or .parquet file.",
-            show_default=False,
-        ),
-    ] = None,
-    out: Annotated[str, option("out", "The page to write, a .html file.", "FILE")] = "motion.html",
-    cycle: Annotated[
-        str | None,
-        option(
-            "cycle",
-            f"{STANDARD}, the standard pick-and-place cycle, in place of a file.",
-            "CYCLE",
-            show_default=False,
-        ),
-    ] = None,
-    payload: Payload = 0.0,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    motion: str | None = None,
+    *,
+    out: str = "motion.html",
+    cycle: str | None = None,
+    payload: float = 0.0,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Show a motion in 3-D: one page that needs no other file or network.
 
@@ -49,6 +33,21 @@ def play(
     simulate or excite write, a table of your own (t and x y z phi, or t and rho1 theta2 ...), or a
     log with the TOML file that describes it. Forces are those of the file, where it has them;
     else what the drives must give. Without a file the page shows the standard cycle.
+
+    Arguments
+    ---------
+    MOTION: A table of a motion or of joints, or a log: a .csv or .parquet file.
+
+    Options
+    -------
+    --out FILE: The page to write, a .html file.
+    --cycle CYCLE: adept, the standard pick-and-place cycle, in place of a file.
+
+    Examples
+    --------
+    pteron play quadrupteron
+    pteron play quadrupteron motion.csv --out motion.html
+    pteron play my-robot.toml log.parquet --out log.html
     """
     from pteron.report.write import checked_page, write_motion_page
 

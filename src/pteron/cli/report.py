@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
+import json as json_module
 import math
-from typing import Annotated, Any
+from typing import Any
 
 from rich.table import Table
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.arguments import load_robot
 from pteron.cli.motion_argument import played
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, show_json, table
@@ -18,23 +18,26 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 
 
 def report(
-    robot: Robot,
-    out: Annotated[str, option("out", "The folder to write it to.", "DIR")],
-    motion: Annotated[
-        str | None,
-        option(
-            "motion",
-            "Show this motion in place of the standard cycle: a table of it, or a log.",
-            "FILE",
-            show_default=False,
-        ),
-    ] = None,
-    elbows: Elbows = None,
-    as_json: Json = False,
+    robot: str,
+    *,
+    out: str,
+    motion: str | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Write a report on a machine: one page with pictures, and its numbers.
 
     The page is report.html, the numbers are in report.json beside it.
+
+    Options
+    -------
+    --out DIR: The folder to write it to.
+    --motion FILE: Show this motion in place of the standard cycle: a table of it, or a log.
+
+    Examples
+    --------
+    pteron report quadrupteron --out report
+    pteron report quadrupteron --motion motion.csv --out report
     """
     machine = load_robot(robot, elbows)
     with spinner(f"Writing the report on {machine.name}"):
@@ -42,12 +45,12 @@ def report(
 
         shown = None if motion is None else played(machine, motion)
         page = write_report(machine, out, motion=shown)
-    found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
+    found = json_module.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     for text in found["doubts"]:
         note(f"Warning: {text}")
     for text in found["cycle"]["overloads"]:
         note(f"Warning: {text}")
-    if as_json:
+    if json:
         cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
         show_json({"page": str(page), **found, "cycle": cycle})
         return

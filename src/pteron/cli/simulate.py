@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from typer import Exit
 
 from pteron.cli.arguments import (
     STANDARD,
-    Cycle,
-    Duration,
-    Elbows,
-    Json,
-    Payload,
-    Robot,
     check_rate,
     load_robot,
-    option,
 )
-from pteron.cli.completion import machines
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import spinner
@@ -39,49 +31,24 @@ Name = Literal["computed-torque", "feed-forward", "pd", "adaptive", "adaptive-dr
 
 
 def simulate(
-    robot: Robot,
-    cycle: Cycle = STANDARD,
-    controller: Annotated[
-        Name,
-        option("controller", "What makes the machine follow the cycle; see docs/controllers.md."),
-    ] = "computed-torque",
-    payload: Payload = 0.0,
-    cycles: Annotated[int, option("cycles", "How many, one after the other.")] = 1,
-    duration: Duration = None,
-    rate: Annotated[float, option("rate", "Samples of the controller a second.")] = 1000.0,
-    bandwidth: Annotated[
-        float | None,
-        option("bandwidth", "Of the controller, rad/s.", show_default="a tenth of the rate"),
-    ] = None,
-    model: Annotated[
-        str | None,
-        option(
-            "model",
-            "What the controller takes the machine for; by default what it is, payload and all.",
-            "ROBOT",
-            show_default=False,
-            autocompletion=machines,
-        ),
-    ] = None,
-    encoder: Annotated[
-        float, option("encoder", "Step of the encoders at the joints, m or rad; 0 is exact.")
-    ] = 0.0,
-    delay: Annotated[float, option("delay", "From a sample to the drives' force, s.")] = 0.0,
-    step: Annotated[float, option("step", "Of the integration, s.")] = 1e-4,
-    method: Annotated[
-        Literal["rk4", "dop853"], option("method", "Fixed steps, compiled, or SciPy's DOP853.")
-    ] = "rk4",
-    anyway: Annotated[
-        bool, option("anyway", "Simulate a cycle that is more than the drives can do, too.")
-    ] = False,
-    out: Annotated[
-        str | None,
-        option(
-            "out", "Write a table and pictures to a folder, or the table to a file.", "DIR|FILE"
-        ),
-    ] = None,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    cycle: str = STANDARD,
+    controller: Name = "computed-torque",
+    payload: float = 0.0,
+    cycles: int = 1,
+    duration: float | None = None,
+    rate: float = 1000.0,
+    bandwidth: float | None = None,
+    model: str | None = None,
+    encoder: float = 0.0,
+    delay: float = 0.0,
+    step: float = 1e-4,
+    method: Literal["rk4", "dop853"] = "rk4",
+    anyway: bool = False,
+    out: str | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Simulate a machine with its drives under a controller.
 
@@ -93,6 +60,27 @@ def simulate(
     it was to be (xref ...), the joints and their rates, forces, and what the machine carries. A
     folder gets simulation.csv, simulation.json, tracking.svg and forces.svg. The exit code is 1 if
     the machine does not come to the end; why is said.
+
+    Options
+    -------
+    --controller: What makes the machine follow the cycle; see docs/controllers.md.
+    --cycles: How many, one after the other.
+    --rate: Samples of the controller a second.
+    --bandwidth: Of the controller, rad/s. [default: a tenth of the rate]
+    --model ROBOT: What the controller takes the machine for; by default what it is, payload and
+        all.
+    --encoder: Step of the encoders at the joints, m or rad; 0 is exact.
+    --delay: From a sample to the drives' force, s.
+    --step: Of the integration, s.
+    --method: Fixed steps, compiled, or SciPy's DOP853.
+    --anyway: Simulate a cycle that is more than the drives can do, too.
+    --out DIR|FILE: Write a table and pictures to a folder, or the table to a file.
+
+    Examples
+    --------
+    pteron simulate delta --payload 1.0
+    pteron simulate robot.toml --controller adaptive --model drawing.toml --cycles 10 --out run
+    pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv
     """
     machine = load_robot(robot, elbows)
     from pteron.motion import Sensors

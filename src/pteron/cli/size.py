@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import rich.table
 from typer import Exit
 
 from pteron.cli.arguments import (
     STANDARD,
-    Cycle,
-    Duration,
-    Elbows,
-    Json,
-    Payload,
-    Robot,
     load_robot,
-    option,
 )
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import cycle_of, loaded
@@ -38,24 +31,17 @@ _BEST = 3
 
 
 def size(
-    robot: Robot,
-    cycle: Cycle = STANDARD,
-    payload: Payload = 0.0,
-    duration: Duration = None,
-    dwell: Annotated[float, option("dwell", "Rest after each cycle, s.")] = 0.0,
-    motors: Annotated[
-        str | None,
-        option("motors", "Choose from the motors in this CSV or TOML file.", "FILE"),
-    ] = None,
-    margin: Annotated[
-        float, option("margin", "What a motor must be able to do, over what the cycle asks.")
-    ] = 1.0,
-    out: Annotated[
-        str | None,
-        option("out", "Write tables, numbers and pictures to a folder, or one table.", "DIR|FILE"),
-    ] = None,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    cycle: str = STANDARD,
+    payload: float = 0.0,
+    duration: float | None = None,
+    dwell: float = 0.0,
+    motors: str | None = None,
+    margin: float = 1.0,
+    out: str | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Size the motors: peak and RMS force, speed, power and energy of each drive over a cycle.
 
@@ -69,6 +55,19 @@ def size(
 
     A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv. The exit code
     is 1 if the drives cannot do the cycle, or no motor of the list serves a joint.
+
+    Options
+    -------
+    --dwell: Rest after each cycle, s.
+    --motors FILE: Choose from the motors in this CSV or TOML file.
+    --margin: What a motor must be able to do, over what the cycle asks.
+    --out DIR|FILE: Write tables, numbers and pictures to a folder, or one table.
+
+    Examples
+    --------
+    pteron size delta --payload 1.0
+    pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing
+    pteron size quadrupteron --cycle motion.csv --out sizing.csv
     """
     machine = load_robot(robot, elbows)
     from pteron.motion import choose, read_motors

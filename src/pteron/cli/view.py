@@ -7,11 +7,10 @@ import sys
 import webbrowser
 from contextlib import suppress
 from threading import Event
-from typing import Annotated
 
 from typer import echo
 
-from pteron.cli.arguments import STANDARD, Elbows, Json, Payload, Robot, load_robot, option
+from pteron.cli.arguments import load_robot
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show_json
 
@@ -20,34 +19,35 @@ _TICK = 0.5
 
 
 def view(
-    robot: Robot,
-    motion: Annotated[
-        str | None,
-        option(
-            "motion",
-            f"Play {STANDARD}, the standard pick-and-place cycle, or a file: a motion, a "
-            "simulation or a log.",
-            "CYCLE",
-        ),
-    ] = None,
-    payload: Payload = 0.0,
-    host: Annotated[
-        str, option("host", "The address to serve at; by default this machine alone.")
-    ] = "127.0.0.1",
-    port: Annotated[
-        int, option("port", "Its port, or the next one that is free; 0 is any.")
-    ] = 8080,
-    no_browser: Annotated[
-        bool, option("no-browser", "Print the address, and open no browser.")
-    ] = False,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    motion: str | None = None,
+    payload: float = 0.0,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    no_browser: bool = False,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Show a machine in the browser, where it can be moved; Ctrl-C ends it.
 
     Sliders move the platform or the joints; the page tells the drives' forces, the condition
     number and how far the machine is from singularities and limits, shows slices of the workspace
     and plays motions, logs and simulations. docs/view.md tells more.
+
+    Options
+    -------
+    --motion CYCLE: Play adept, the standard pick-and-place cycle, or a file: a motion, a simulation
+        or a log.
+    --host: The address to serve at; by default this machine alone.
+    --port: Its port, or the next one that is free; 0 is any.
+    --no-browser: Print the address, and open no browser.
+
+    Examples
+    --------
+    pteron view delta
+    pteron view quadrupteron --motion adept --payload 0.5
+    pteron view robot.toml --motion log.csv --port 9000 --no-browser
     """
     machine = load_robot(robot, elbows)
     with spinner(f"Preparing {machine.name}"):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from typer import Option
 
-from pteron.cli.arguments import Elbows, Json, Robot, Scheduler, load_robot, option
-from pteron.cli.certify import TOLERANCE, Proofs
+from pteron.cli.arguments import load_robot
+from pteron.cli.certify import Proofs
 from pteron.cli.completion import indices
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
@@ -58,70 +58,22 @@ _INDEX = Option(
 
 
 def workspace(
-    robot: Robot,
-    index: Annotated[list[str] | None, _INDEX] = None,
-    slice_: Annotated[
-        str | None,
-        option(
-            "slice",
-            "What is held, and what ranges: z=0,phi=0 or z=0,phi=-1:1; m and rad. The rest varies.",
-            "NAME=VALUE,...",
-            show_default="the plane through the home pose",
-        ),
-    ] = None,
-    points: Annotated[
-        int | None,
-        option(
-            "points",
-            "Along each coordinate that varies.",
-            show_default="200 in a plane, 100 in space",
-        ),
-    ] = None,
-    out: Annotated[
-        str | None,
-        option(
-            "out",
-            "A picture (.png .svg .pdf), data (.csv .parquet .npz .zarr), surfaces (.vtk .vtu .ply "
-            ".stl) or a film (.mp4 .gif).",
-            "FILE",
-        ),
-    ] = None,
-    engine: Annotated[
-        Literal["auto", "jax"], option("engine", "What computes: jax takes an accelerator.")
-    ] = "auto",
-    workers: Annotated[
-        int | None, option("workers", "Processes of this computer that share the work.")
-    ] = None,
-    scheduler: Scheduler = None,
-    certify: Annotated[
-        bool,
-        option("certify", "Prove how large the workspace is, what ends it, and a cube in it."),
-    ] = False,
-    prove: Annotated[
-        str | None,
-        option(
-            "prove",
-            "Prove that all poses of a box serve: x=-0.05:0.05,y=0:0.1,z=0; m and rad.",
-            "NAME=LEAST:GREATEST,...",
-        ),
-    ] = None,
-    tolerance: Annotated[
-        float | None,
-        option(
-            "tolerance",
-            "With --certify: greatest undecided share.",
-            "SHARE",
-            show_default=f"{TOLERANCE:g}",
-        ),
-    ] = None,
-    type_i: Annotated[
-        float | None, option("type-i", "With a proof: least type-I measure of every leg.", "FLOOR")
-    ] = None,
-    type_ii: Annotated[
-        float | None, option("type-ii", "With a proof: least type-II measure.", "FLOOR")
-    ] = None,
-    elbows: Elbows = None,
-    json: Json = False,
+    robot: str,
+    *,
+    index: list[str] | None = None,
+    slice_: str | None = None,
+    points: int | None = None,
+    out: str | None = None,
+    engine: Literal["auto", "jax"] = "auto",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    certify: bool = False,
+    prove: str | None = None,
+    tolerance: float | None = None,
+    type_i: float | None = None,
+    type_ii: float | None = None,
+    elbows: str | None = None,
+    json: bool = False,
 ) -> None:
     """Map the workspace: where the machine reaches, what ends it, and how good it is there.
 
@@ -138,6 +90,33 @@ def workspace(
 
     A .zarr grows chunk by chunk: the same command after an interruption goes on with what is left.
     A cluster's workers write to it, so they must reach it by the same path.
+
+    Options
+    -------
+    --index INDEX: What to map: condition, kappa, pressure_angle, ...; may be given several times.
+        [default: the distance to the end of the reach]
+    --slice NAME=VALUE,...: What is held, and what ranges: z=0,phi=0 or z=0,phi=-1:1; m and rad. The
+        rest varies. [default: the plane through the home pose]
+    --points: Along each coordinate that varies. [default: 200 in a plane, 100 in space]
+    --out FILE: A picture (.png .svg .pdf), data (.csv .parquet .npz .zarr), surfaces (.vtk .vtu
+        .ply .stl) or a film (.mp4 .gif).
+    --engine: What computes: jax takes an accelerator.
+    --workers: Processes of this computer that share the work.
+    --certify: Prove how large the workspace is, what ends it, and a cube in it.
+    --prove NAME=LEAST:GREATEST,...: Prove that all poses of a box serve: x=-0.05:0.05,y=0:0.1,z=0;
+        m and rad.
+    --tolerance SHARE: With --certify: greatest undecided share. [default: 0.05]
+    --type-i FLOOR: With a proof: least type-I measure of every leg.
+    --type-ii FLOOR: With a proof: least type-II measure.
+
+    Examples
+    --------
+    pteron workspace delta
+    pteron workspace quadrupteron --index kappa --slice z=0,phi=0 --out kappa.png
+    pteron workspace quadrupteron --index condition --slice phi=0 --out condition.vtk
+    pteron workspace robot.toml --index kappa --slice z=0 --points 400 --out kappa.zarr
+    pteron workspace delta --certify
+    pteron workspace delta --prove x=-0.2:0.2,y=-0.2:0.2,z=-1.0:-0.8
     """
     proofs = Proofs(certify, prove, tolerance, type_i, type_ii)
     maps = {"index": index, "points": points, "out": out, "workers": workers}

@@ -1,0 +1,87 @@
+"""Arguments and options of a subcommand, made from its parameters and its docstring.
+
+A section of the docstring is a panel of the help, and a line in it an option or an argument::
+
+    --speed NUMBERS: Of the joints, m/s or rad/s. [default: the drives']
+
+with the word that stands for its value and, where that is no value, the default. The parameter has
+the same name, with an underscore behind it where Python has another use for the name. Positional
+parameters are arguments, those that are given by keyword only are options.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from inspect import cleandoc, signature
+from typing import Annotated, Any, get_type_hints
+
+from typer import Argument, Context, Option
+
+from pteron.cli import completion
+from pteron.cli.exported_functions import FUNCTIONS
+
+_SECTION = re.compile(r"\n\n(\w+)\n-+\n")
+_LINE = re.compile(r"(\S+?)(?:, (-\w))?(?: (\S+))?: (.*?)(?: \[default: (.*)\])?$")
+
+_OPTIONS = ("Arguments", "Options")
+"""Sections whose options stand in the help's first panels."""
+
+_SHARED = f"""\
+ROBOT: A machine of the catalog (see pteron catalog) or a TOML file.
+--table FILE: Take a .csv or .parquet file's rows; - is CSV on standard input.
+--out FILE: Write the result to a .csv or .parquet file.
+--elbows SIGNS: The working mode, one sign a leg, such as ++-+.
+--on-failure: Stop at a row that fails, or leave its results empty.
+--payload: At the tool's centre point, kg.
+--cycle CYCLE: adept, the standard pick-and-place cycle, or a table of a motion.
+--duration: Of the standard cycle, s. [default: 10 m/s^2 at the tool]
+--scheduler ADDRESS: A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.
+--function NAME: What to write; again for more: {", ".join(FUNCTIONS)}.
+--json: Print data for a program, as JSON.
+"""
+"""Options that several subcommands share, and those whose help is more than text."""
+
+_COMPLETION = {
+    **dict.fromkeys(("ROBOT", "KIND", "FILE", "SPEC", "--robot", "--model"), completion.machines),
+    "--index": completion.indices,
+    "--keep": completion.parameters,
+    "--function": completion.functions,
+}
+
+
+def help_of(command: Callable[..., None]) -> dict[str, str]:
+    """Give a command's parameters their options; return its help and what stands at its end."""
+    text, *sections = _SECTION.split(cleandoc(command.__doc__ or ""))
+    told = dict(zip(sections[::2], sections[1::2], strict=True))
+    examples = told.pop("Examples", "")
+    found: dict[str, dict[str, Any]] = {}
+    for title, lines in [("Options", _SHARED), *told.items()]:
+        for line in re.sub(r"\n +", " ", lines).splitlines():
+            name, about = _read(line)
+            found[name] = about if title in _OPTIONS else about | {"rich_help_panel": title}
+    hints = get_type_hints(command, include_extras=True)
+    for name, parameter in signature(command).parameters.items():
+        key = name.rstrip("_").replace("_", "-")
+        if parameter.kind is parameter.KEYWORD_ONLY:
+            about = dict(found.get(f"--{key}", {}))
+            own = Option(f"--{key}", *about.pop("short", ()), **about)
+            command.__annotations__[name] = Annotated[hints[name], own]
+        elif hints[name] is not Context:
+            own = Argument(**found.get(key, {}))
+            command.__annotations__[name] = Annotated[hints[name], own]
+    paragraphs = (" ".join(part.split()) for part in text.split("\n\n"))
+    end = "\n\n".join(["[bold]Examples[/bold]", *examples.splitlines()])
+    return {"help": "\n\n".join(paragraphs), "epilog": end}
+
+
+def _read(line: str) -> tuple[str, dict[str, Any]]:
+    """Return the name of an argument or option, and what Typer is told of it."""
+    found = _LINE.match(line)
+    assert found is not None, line
+    name, short, metavar, text, default = found.groups()
+    about: dict[str, Any] = {"help": text, "autocompletion": _COMPLETION.get(name)}
+    if not name.startswith("-"):
+        return name.lower().rstrip("."), about | {"metavar": name}
+    about |= {"metavar": metavar, "show_default": default or True}
+    return name, about | ({"short": (short,)} if short else {})
