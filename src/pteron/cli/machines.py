@@ -42,7 +42,7 @@ def catalog(
     _list(json)
 
 
-def _list(*, json: bool) -> None:
+def _list(json: bool) -> None:
     from pteron.manipulator import catalog as names
     from pteron.manipulator import load
 
