@@ -9,8 +9,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from mechanisms import CATALOG, MACHINES, MECHANISMS, NEAREST, gated, states
 
 import pteron

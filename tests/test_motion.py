@@ -6,8 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from differences import along
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from mechanisms import (
     BATCH_SHAPES,
     CATALOG,

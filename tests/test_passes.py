@@ -5,8 +5,7 @@ from fractions import Fraction
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from mechanisms import CATALOG, gated, relative_error, states
 
 from pteron.kernels import RationalField, count_operations, evaluate, program

@@ -9,8 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import sympy
-from hypothesis import assume, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, settings, strategies as st
 from mechanisms import CATALOG, MECHANISMS, random_machine
 from scipy.spatial.transform import Rotation
 

@@ -11,8 +11,7 @@ import pytest
 from test_cli import done, refused, run
 
 import pteron
-from pteron.cli import terminal
-from pteron.cli import workspace as command
+from pteron.cli import terminal, workspace as command
 from pteron.indices import evaluate
 from pteron.maps import load_map
 from pteron.workspace import conditions

@@ -1,11 +1,7 @@
 """Former public names: each answers for one release, with a warning that has the new line.
 
-A name that is renamed gets a line in `RENAMED`, and its package, if it has none yet, the lines
-
-    if not TYPE_CHECKING:
-        __getattr__ = former_names(__name__)
-
-An attribute that is renamed leaves a line in its class: ``old = former_attribute("old", "new")``.
+A name that is renamed gets a line in `RENAMED`. An attribute that is renamed leaves a line in its
+class: ``old = former_attribute("old", "new")``.
 """
 
 from __future__ import annotations

@@ -4,25 +4,23 @@
 `Calibration` its result.
 """
 
-from pteron.calibration.calibrate import calibrate
-from pteron.calibration.measured_log import read_measurements
-from pteron.calibration.measurements import Measurements, Place, Plane, Setup
-from pteron.calibration.observability import Observability
-from pteron.calibration.result import Calibration, Finding, HeldOut, Value, Verdict
-from pteron.calibration.unknowns import TOLERANCES
+from pteron.calibration.calibrate import calibrate as calibrate
+from pteron.calibration.measured_log import read_measurements as read_measurements
+from pteron.calibration.measurements import (
+    Measurements as Measurements,
+    Place as Place,
+    Plane as Plane,
+    Setup as Setup,
+)
+from pteron.calibration.observability import Observability as Observability
+from pteron.calibration.result import (
+    Calibration as Calibration,
+    Finding as Finding,
+    HeldOut as HeldOut,
+    Value as Value,
+    Verdict as Verdict,
+)
+from pteron.calibration.unknowns import TOLERANCES as TOLERANCES
+from pteron.public import publish as _publish
 
-__all__ = [
-    "TOLERANCES",
-    "Calibration",
-    "Finding",
-    "HeldOut",
-    "Measurements",
-    "Observability",
-    "Place",
-    "Plane",
-    "Setup",
-    "Value",
-    "Verdict",
-    "calibrate",
-    "read_measurements",
-]
+_publish(__name__)

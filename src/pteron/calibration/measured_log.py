@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from pteron.calibration.controller_logs import read_controller_log
 from pteron.calibration.measurements import TOOL, Measurements, Setup
-from pteron.calibration.setup_file import joined as joined_setups
-from pteron.calibration.setup_file import read_setup_file
+from pteron.calibration.setup_file import joined as joined_setups, read_setup_file
 from pteron.errors import DataError, UnlikelyValue, shown
 from pteron.kinematics.unlikely_values import unlikely_length, unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator

@@ -61,8 +61,7 @@ def cue(
     pteron cue drive.csv --robot simulator.toml --out cue.csv
     pteron cue flight.csv --robot simulator.toml --scale 0.3 --page cue.html
     """
-    from pteron.motion import Washout, limits_of, peaks
-    from pteron.motion import cue as shown
+    from pteron.motion import Washout, cue as shown, limits_of, peaks
     from pteron.tables import check_output, write_table
 
     machine = load_robot(robot, elbows)

@@ -105,8 +105,7 @@ def identify(
     named = {"robot": "robot", "none": None}
     drawn: Any = named[cad] if cad in named else load_robot(cad)
     with spinner("Opening the logs"):
-        from pteron.identification import Processing, open_log
-        from pteron.identification import identify as identified
+        from pteron.identification import Processing, identify as identified, open_log
         from pteron.report.identification import model_path, numbers, write_identification
         from pteron.report.write import checked_folder
 

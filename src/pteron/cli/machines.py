@@ -43,8 +43,7 @@ def catalog(
 
 
 def _list(json: bool) -> None:
-    from pteron.manipulator import catalog as names
-    from pteron.manipulator import load
+    from pteron.manipulator import catalog as names, load
 
     found = [{**_machine(robot), "legs": len(robot.legs)} for robot in map(load, names())]
     if json:

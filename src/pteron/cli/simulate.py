@@ -83,8 +83,7 @@ def simulate(
     pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv
     """
     machine = load_robot(robot, elbows)
-    from pteron.motion import Sensors
-    from pteron.motion import simulate as simulated
+    from pteron.motion import Sensors, simulate as simulated
 
     if cycles < 1:
         raise DataError(f"--cycles: {cycles} given, 1 or more expected")

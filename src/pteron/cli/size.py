@@ -70,8 +70,7 @@ def size(
     pteron size quadrupteron --cycle motion.csv --out sizing.csv
     """
     machine = load_robot(robot, elbows)
-    from pteron.motion import choose, read_motors
-    from pteron.motion import size as sized
+    from pteron.motion import choose, read_motors, size as sized
 
     with warnings.catch_warnings():  # each motor's are notes below
         warnings.simplefilter("ignore", UnlikelyValue)

@@ -10,6 +10,7 @@ from pteron.closures.turning_loci import TurningLoci
 from pteron.closures.two_loci import TwoLoci
 from pteron.legs.leg import LegEquations
 from pteron.platforms import PlatformEquations
+from pteron.public import publish as _publish
 
 KINDS: tuple[type[Closure], ...] = (ConstantRows, ThreeLoci, TwoLoci, TurningLoci, TiltingLoci)
 """The kinds of closures; the first that fits a machine's legs and platform serves it."""
@@ -24,6 +25,4 @@ def kind_for(
 
 __all__ = ["KINDS", "Closure", "kind_for"]
 
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__)

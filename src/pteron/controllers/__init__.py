@@ -1,13 +1,13 @@
 """Controllers: from the reference motion and the measured joints to the forces of the drives."""
 
-from pteron.arguments import check_arguments
-from pteron.controllers.adaptive import Adaptive
-from pteron.controllers.computed_torque import ComputedTorque
-from pteron.controllers.controller import Controller
-from pteron.controllers.feed_forward_pd import FeedForwardPD
-from pteron.controllers.joint_masses import joint_masses
-from pteron.controllers.law import Law
-from pteron.controllers.pd_gravity import PDGravity
+from pteron.controllers.adaptive import Adaptive as Adaptive
+from pteron.controllers.computed_torque import ComputedTorque as ComputedTorque
+from pteron.controllers.controller import Controller as Controller
+from pteron.controllers.feed_forward_pd import FeedForwardPD as FeedForwardPD
+from pteron.controllers.joint_masses import joint_masses as joint_masses
+from pteron.controllers.law import Law as Law
+from pteron.controllers.pd_gravity import PDGravity as PDGravity
+from pteron.public import publish as _publish
 
 CONTROLLERS: dict[str, Controller] = {
     usual.what: usual
@@ -18,18 +18,4 @@ CONTROLLERS: dict[str, Controller] = {
 }
 """Controllers as they are by default, by the names of their laws."""
 
-__all__ = [
-    "CONTROLLERS",
-    "Adaptive",
-    "ComputedTorque",
-    "Controller",
-    "FeedForwardPD",
-    "Law",
-    "PDGravity",
-    "joint_masses",
-]
-check_arguments(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True)

@@ -3,38 +3,21 @@
 They take a machine and arrays of states, check them, and return arrays.
 """
 
-from pteron.arguments import check_arguments
 from pteron.dynamics.forces import (
-    drive_accelerations,
-    drive_forces,
-    forward_dynamics,
-    inverse_dynamics,
-    regressor,
+    drive_accelerations as drive_accelerations,
+    drive_forces as drive_forces,
+    forward_dynamics as forward_dynamics,
+    inverse_dynamics as inverse_dynamics,
+    regressor as regressor,
 )
 from pteron.dynamics.model import (
-    bias_forces,
-    coriolis_matrix,
-    gravity_forces,
-    kinetic_energy,
-    mass_matrix,
-    potential_energy,
+    bias_forces as bias_forces,
+    coriolis_matrix as coriolis_matrix,
+    gravity_forces as gravity_forces,
+    kinetic_energy as kinetic_energy,
+    mass_matrix as mass_matrix,
+    potential_energy as potential_energy,
 )
+from pteron.public import publish as _publish
 
-__all__ = [
-    "bias_forces",
-    "coriolis_matrix",
-    "drive_accelerations",
-    "drive_forces",
-    "forward_dynamics",
-    "gravity_forces",
-    "inverse_dynamics",
-    "kinetic_energy",
-    "mass_matrix",
-    "potential_energy",
-    "regressor",
-]
-check_arguments(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True)

@@ -4,20 +4,20 @@ Actions are the forces of its drives. `import pteron.environments` registers `pt
 Needs the extra `gymnasium`.
 """
 
-from pteron.extras import install_command
+from pteron.extras import install_command as _install_command
+from pteron.public import publish as _publish
 
 try:
     import gymnasium
 except ImportError:
     raise ImportError(
         "pteron.environments needs Gymnasium, which is not installed; "
-        + install_command("gymnasium")
+        + _install_command("gymnasium")
     ) from None
 
-from pteron.arguments import check_arguments
-from pteron.environments.environment import PteronEnv
-from pteron.environments.vector_environment import PteronVectorEnv
-from pteron.environments.world import World
+from pteron.environments.environment import PteronEnv as PteronEnv
+from pteron.environments.vector_environment import PteronVectorEnv as PteronVectorEnv
+from pteron.environments.world import World as World
 
 REACH = "pteron/Reach-v0"
 """Name of the registered environment: ``gymnasium.make(REACH, robot="delta")``."""
@@ -33,9 +33,4 @@ if REACH not in gymnasium.registry:
         max_episode_steps=EPISODE,
     )
 
-__all__ = ["EPISODE", "REACH", "PteronEnv", "PteronVectorEnv", "World"]
-check_arguments(__name__, classes=("PteronEnv", "PteronVectorEnv"))
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True, classes=("PteronEnv", "PteronVectorEnv"))

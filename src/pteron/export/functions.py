@@ -30,8 +30,8 @@ from pteron.export.descriptions import (
 )
 from pteron.export.identified_parameters import Identified, base_program, read_identified
 from pteron.export.node_names import node_names
-from pteron.kernels import FUNCTIONS as COMPILED
 from pteron.kernels import (
+    FUNCTIONS as COMPILED,
     LOADED,
     REDUCIBLE,
     SELECTED,
@@ -42,8 +42,8 @@ from pteron.kernels import (
     columns_of,
     graph_of,
     program,
+    specialised as with_values,
 )
-from pteron.kernels import specialised as with_values
 from pteron.kernels.functions import TABLE
 from pteron.kernels.graph import CONSTANT
 from pteron.kinematics import inverse_kinematics, random_poses

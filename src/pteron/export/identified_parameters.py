@@ -17,8 +17,15 @@ import casadi as ca
 import numpy as np
 
 from pteron.errors import DataError, ModelError
-from pteron.kernels import Array, Port, Program, columns_of, count_operations, program
-from pteron.kernels import specialised as with_values
+from pteron.kernels import (
+    Array,
+    Port,
+    Program,
+    columns_of,
+    count_operations,
+    program,
+    specialised as with_values,
+)
 from pteron.kernels.passes import optimised
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator

@@ -6,110 +6,83 @@ real bodies, `excitation` makes the motions worth recording. `estimate` takes a 
 robot.
 """
 
-from typing import TYPE_CHECKING
-
-from pteron.arguments import check_arguments
-from pteron.identification import consistency, estimators, excitation, logs, signals
-from pteron.identification.consistency import Bounds, Consistency, consistent_model
-from pteron.identification.drive_gains import DriveGains, identify_drive_gains
-from pteron.identification.errors import LogError
+from pteron.identification import (
+    consistency as consistency,
+    estimators as estimators,
+    excitation as excitation,
+    logs as logs,
+    signals as signals,
+)
+from pteron.identification.consistency import (
+    Bounds as Bounds,
+    Consistency as Consistency,
+    consistent_model as consistent_model,
+)
+from pteron.identification.drive_gains import (
+    DriveGains as DriveGains,
+    identify_drive_gains as identify_drive_gains,
+)
+from pteron.identification.errors import LogError as LogError
 from pteron.identification.estimators import (
-    Essential,
-    Estimate,
-    Reduced,
-    column_errors,
-    essential_parameters,
-    halves,
-    huber,
-    instrumental,
-    maximum_likelihood,
-    ordinary,
-    reduced,
-    total,
-    weighted,
+    Essential as Essential,
+    Estimate as Estimate,
+    Reduced as Reduced,
+    column_errors as column_errors,
+    essential_parameters as essential_parameters,
+    halves as halves,
+    huber as huber,
+    instrumental as instrumental,
+    maximum_likelihood as maximum_likelihood,
+    ordinary as ordinary,
+    reduced as reduced,
+    total as total,
+    weighted as weighted,
 )
 from pteron.identification.excitation import (
-    Excitation,
-    FourierMotion,
-    Limits,
-    optimal_excitation,
-    random_excitation,
+    Excitation as Excitation,
+    FourierMotion as FourierMotion,
+    Limits as Limits,
+    optimal_excitation as optimal_excitation,
+    random_excitation as random_excitation,
 )
-from pteron.identification.faults import FaultIsolation, IsolatedFault
-from pteron.identification.fitting import METHODS
-from pteron.identification.identify import identify
-from pteron.identification.logs import Log, open_log, read_log, write_log
-from pteron.identification.model import Model, Terms, identification_model
-from pteron.identification.observation import Observations, observations_of, stacked
-from pteron.identification.payload import Payload, identify_payload
-from pteron.identification.prediction import Prediction
-from pteron.identification.regressor import Fit, estimate
-from pteron.identification.result import Identification
-from pteron.identification.signals import Preprocessing, Processing, States, preprocessing_of
-from pteron.identification.verdict import Verdict
-from pteron.renamed import former_names
+from pteron.identification.faults import (
+    FaultIsolation as FaultIsolation,
+    IsolatedFault as IsolatedFault,
+)
+from pteron.identification.fitting import METHODS as METHODS
+from pteron.identification.identify import identify as identify
+from pteron.identification.logs import (
+    Log as Log,
+    open_log as open_log,
+    read_log as read_log,
+    write_log as write_log,
+)
+from pteron.identification.model import (
+    Model as Model,
+    Terms as Terms,
+    identification_model as identification_model,
+)
+from pteron.identification.observation import (
+    Observations as Observations,
+    observations_of as observations_of,
+    stacked as stacked,
+)
+from pteron.identification.payload import Payload as Payload, identify_payload as identify_payload
+from pteron.identification.prediction import Prediction as Prediction
+from pteron.identification.regressor import Fit as Fit, estimate as estimate
+from pteron.identification.result import Identification as Identification
+from pteron.identification.signals import (
+    Preprocessing as Preprocessing,
+    Processing as Processing,
+    States as States,
+    preprocessing_of as preprocessing_of,
+)
+from pteron.identification.verdict import Verdict as Verdict
+from pteron.public import publish as _publish
 
-__all__ = [
-    "Bounds",
-    "Consistency",
-    "DriveGains",
-    "Essential",
-    "Estimate",
-    "Excitation",
-    "FaultIsolation",
-    "Fit",
-    "FourierMotion",
-    "Identification",
-    "IsolatedFault",
-    "Limits",
-    "Log",
-    "LogError",
-    "METHODS",
-    "Model",
-    "Observations",
-    "Payload",
-    "Prediction",
-    "Preprocessing",
-    "Processing",
-    "Reduced",
-    "States",
-    "Terms",
-    "Verdict",
-    "column_errors",
-    "consistency",
-    "consistent_model",
-    "essential_parameters",
-    "estimate",
-    "estimators",
-    "excitation",
-    "halves",
-    "huber",
-    "identification_model",
-    "identify",
-    "identify_drive_gains",
-    "identify_payload",
-    "instrumental",
-    "logs",
-    "maximum_likelihood",
-    "observations_of",
-    "open_log",
-    "optimal_excitation",
-    "ordinary",
-    "preprocessing_of",
-    "random_excitation",
-    "read_log",
-    "reduced",
-    "signals",
-    "stacked",
-    "total",
-    "weighted",
-    "write_log",
-]
-check_arguments(__name__, classes=("Bounds", "Terms"))
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(
+    __name__,
+    modules=("consistency", "estimators", "excitation", "logs", "signals"),
+    checked=True,
+    classes=("Bounds", "Terms"),
+)

@@ -1,39 +1,29 @@
 """Performance of a machine at a pose: indices, stiffness, errors and reactions."""
 
-from pteron.arguments import check_arguments
-from pteron.indices.compliance import Stiffness, stiffness
-from pteron.indices.conditioning import GlobalConditioning, global_conditioning
-from pteron.indices.elasticity import ALUMINIUM, STEEL, Elasticity, Material, Section
-from pteron.indices.evaluation import evaluate
-from pteron.indices.index import INDICES, Index, indices_of
-from pteron.indices.joint_reactions import Reactions, reactions
-from pteron.indices.pose_errors import PoseError, Tolerances, pose_error
-from pteron.indices.sensitivities import Sensitivities, geometric_sensitivities
+from pteron.indices.compliance import Stiffness as Stiffness, stiffness as stiffness
+from pteron.indices.conditioning import (
+    GlobalConditioning as GlobalConditioning,
+    global_conditioning as global_conditioning,
+)
+from pteron.indices.elasticity import (
+    ALUMINIUM as ALUMINIUM,
+    STEEL as STEEL,
+    Elasticity as Elasticity,
+    Material as Material,
+    Section as Section,
+)
+from pteron.indices.evaluation import evaluate as evaluate
+from pteron.indices.index import INDICES as INDICES, Index as Index, indices_of as indices_of
+from pteron.indices.joint_reactions import Reactions as Reactions, reactions as reactions
+from pteron.indices.pose_errors import (
+    PoseError as PoseError,
+    Tolerances as Tolerances,
+    pose_error as pose_error,
+)
+from pteron.indices.sensitivities import (
+    Sensitivities as Sensitivities,
+    geometric_sensitivities as geometric_sensitivities,
+)
+from pteron.public import publish as _publish
 
-__all__ = [
-    "ALUMINIUM",
-    "INDICES",
-    "STEEL",
-    "Elasticity",
-    "GlobalConditioning",
-    "Index",
-    "Material",
-    "PoseError",
-    "Reactions",
-    "Section",
-    "Sensitivities",
-    "Stiffness",
-    "Tolerances",
-    "evaluate",
-    "geometric_sensitivities",
-    "global_conditioning",
-    "indices_of",
-    "pose_error",
-    "reactions",
-    "stiffness",
-]
-check_arguments(__name__, classes=("Elasticity", "Tolerances"))
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True, classes=("Elasticity", "Tolerances"))

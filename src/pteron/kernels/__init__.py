@@ -3,73 +3,46 @@
 Batches of states, threads and the cache of compiled code live here and only here.
 """
 
-from pteron.arguments import check_arguments
-from pteron.kernels.bounds import Bounded, bounded, bounds
-from pteron.kernels.choice import numeric
-from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
-from pteron.kernels.functions import FUNCTIONS, needs_of
-from pteron.kernels.graph import Graph, graph_of
-from pteron.kernels.intervals import Enclosure
-from pteron.kernels.kept import Program
-from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
+from pteron.kernels.bounds import Bounded as Bounded, bounded as bounded, bounds as bounds
+from pteron.kernels.choice import numeric as numeric
+from pteron.kernels.fields import (
+    Field as Field,
+    NoSquareRoot as NoSquareRoot,
+    PrimeField as PrimeField,
+    RationalField as RationalField,
+    evaluate as evaluate,
+)
+from pteron.kernels.functions import FUNCTIONS as FUNCTIONS, needs_of as needs_of
+from pteron.kernels.graph import Graph as Graph, graph_of as graph_of
+from pteron.kernels.intervals import Enclosure as Enclosure
+from pteron.kernels.kept import Program as Program
+from pteron.kernels.kernel import (
+    Array as Array,
+    Kernel as Kernel,
+    Port as Port,
+    as_array as as_array,
+    count_operations as count_operations,
+)
 from pteron.kernels.programs import (
-    LOADED,
-    REDUCIBLE,
-    SELECTED,
-    Columns,
-    bare,
-    general_program,
-    program,
-    specialised,
+    LOADED as LOADED,
+    REDUCIBLE as REDUCIBLE,
+    SELECTED as SELECTED,
+    Columns as Columns,
+    bare as bare,
+    general_program as general_program,
+    program as program,
+    specialised as specialised,
 )
 from pteron.kernels.targets import (
-    OTHER_LAYOUT,
-    TARGETS,
-    Selects,
-    columns_of,
-    compile,
-    same_layout,
+    OTHER_LAYOUT as OTHER_LAYOUT,
+    TARGETS as TARGETS,
+    Selects as Selects,
+    columns_of as columns_of,
+    compile as compile,
+    same_layout as same_layout,
 )
+from pteron.public import publish as _publish
 
-__all__ = [
-    "FUNCTIONS",
-    "LOADED",
-    "OTHER_LAYOUT",
-    "REDUCIBLE",
-    "SELECTED",
-    "Selects",
-    "needs_of",
-    "TARGETS",
-    "Array",
-    "Bounded",
-    "Columns",
-    "Enclosure",
-    "Field",
-    "Graph",
-    "Kernel",
-    "NoSquareRoot",
-    "Port",
-    "PrimeField",
-    "Program",
-    "RationalField",
-    "as_array",
-    "bare",
-    "bounded",
-    "bounds",
-    "columns_of",
-    "compile",
-    "count_operations",
-    "evaluate",
-    "general_program",
-    "graph_of",
-    "numeric",
-    "program",
-    "same_layout",
-    "specialised",
-]
 # The others serve the floors above, in inner loops.
-check_arguments(__name__, ("bounded", "bounds", "compile"))
 
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=("bounded", "bounds", "compile"))

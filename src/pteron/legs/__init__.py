@@ -1,42 +1,21 @@
 """Kinds of legs, one file each; `legs.leg` is the page to read before writing another."""
 
-from pteron.legs.cones import Cone
-from pteron.legs.drive import Drive, Stribeck
-from pteron.legs.installed import KINDS
-from pteron.legs.kind import LegKind
-from pteron.legs.prr import PRR
-from pteron.legs.prrr import PRRR
-from pteron.legs.prs import PRS
-from pteron.legs.pss import PSS
-from pteron.legs.reading import Reading
-from pteron.legs.rpr import RPR
-from pteron.legs.rps import RPS
-from pteron.legs.rrr import RRR
-from pteron.legs.rrs import RRS
-from pteron.legs.rss import RSS
-from pteron.legs.rupu import RUPU
-from pteron.legs.ups import UPS
+from pteron.legs.cones import Cone as Cone
+from pteron.legs.drive import Drive as Drive, Stribeck as Stribeck
+from pteron.legs.installed import KINDS as KINDS
+from pteron.legs.kind import LegKind as LegKind
+from pteron.legs.prr import PRR as PRR
+from pteron.legs.prrr import PRRR as PRRR
+from pteron.legs.prs import PRS as PRS
+from pteron.legs.pss import PSS as PSS
+from pteron.legs.reading import Reading as Reading
+from pteron.legs.rpr import RPR as RPR
+from pteron.legs.rps import RPS as RPS
+from pteron.legs.rrr import RRR as RRR
+from pteron.legs.rrs import RRS as RRS
+from pteron.legs.rss import RSS as RSS
+from pteron.legs.rupu import RUPU as RUPU
+from pteron.legs.ups import UPS as UPS
+from pteron.public import publish as _publish
 
-__all__ = [
-    "KINDS",
-    "PRR",
-    "PRRR",
-    "PRS",
-    "PSS",
-    "RPR",
-    "RPS",
-    "RRR",
-    "RRS",
-    "RSS",
-    "RUPU",
-    "UPS",
-    "Cone",
-    "Drive",
-    "LegKind",
-    "Reading",
-    "Stribeck",
-]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__)

@@ -1,39 +1,21 @@
 """A robot as a value: legs, platform and gravity, its TOML files, and the catalog."""
 
-from pteron.arguments import check_arguments
-from pteron.manipulator.files import catalog, load
-from pteron.manipulator.given import RobotLike, as_manipulator
-from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
-from pteron.manipulator.parameters import (
-    parameter_data,
-    parameter_names,
-    parameter_units,
-    parameters,
-    with_parameters,
+from pteron.manipulator.files import catalog as catalog, load as load
+from pteron.manipulator.given import RobotLike as RobotLike, as_manipulator as as_manipulator
+from pteron.manipulator.manipulator import (
+    STANDARD_GRAVITY as STANDARD_GRAVITY,
+    Manipulator as Manipulator,
 )
-from pteron.manipulator.radii import Radii
-from pteron.manipulator.saving import save
-from pteron.manipulator.variants import turned, working_modes
+from pteron.manipulator.parameters import (
+    parameter_data as parameter_data,
+    parameter_names as parameter_names,
+    parameter_units as parameter_units,
+    parameters as parameters,
+    with_parameters as with_parameters,
+)
+from pteron.manipulator.radii import Radii as Radii
+from pteron.manipulator.saving import save as save
+from pteron.manipulator.variants import turned as turned, working_modes as working_modes
+from pteron.public import publish as _publish
 
-__all__ = [
-    "STANDARD_GRAVITY",
-    "Manipulator",
-    "Radii",
-    "RobotLike",
-    "as_manipulator",
-    "catalog",
-    "load",
-    "parameter_data",
-    "parameter_names",
-    "parameter_units",
-    "parameters",
-    "save",
-    "turned",
-    "with_parameters",
-    "working_modes",
-]
-check_arguments(__name__, classes=("Manipulator",))
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True, classes=("Manipulator",))

@@ -3,33 +3,13 @@
 Work is done in chunks, here or on a cluster, and what is finished is never computed twice.
 """
 
-from pteron.arguments import check_arguments
-from pteron.maps.files import load_map, save_map
-from pteron.maps.grid import Axis, Grid, pose_grid
-from pteron.maps.map import Map, Summary
-from pteron.maps.map_index import map_index
-from pteron.maps.surfaces import Surface, surfaces
-from pteron.maps.sweep import Store, cores, sweep
-from pteron.maps.table_store import TableStore
+from pteron.maps.files import load_map as load_map, save_map as save_map
+from pteron.maps.grid import Axis as Axis, Grid as Grid, pose_grid as pose_grid
+from pteron.maps.map import Map as Map, Summary as Summary
+from pteron.maps.map_index import map_index as map_index
+from pteron.maps.surfaces import Surface as Surface, surfaces as surfaces
+from pteron.maps.sweep import Store as Store, cores as cores, sweep as sweep
+from pteron.maps.table_store import TableStore as TableStore
+from pteron.public import publish as _publish
 
-__all__ = [
-    "Axis",
-    "Grid",
-    "Map",
-    "Store",
-    "Summary",
-    "Surface",
-    "TableStore",
-    "cores",
-    "load_map",
-    "map_index",
-    "pose_grid",
-    "save_map",
-    "surfaces",
-    "sweep",
-]
-check_arguments(__name__, classes=("Grid",))
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True, classes=("Grid",))

@@ -10,8 +10,7 @@ from pteron.errors import DataError, OutputError
 from pteron.maps.archive import read_archive, write_archive
 from pteron.maps.map import Map
 from pteron.maps.stores import read_store, save_store
-from pteron.maps.surfaces import ENDINGS as SURFACES
-from pteron.maps.surfaces import checked_surfaces, surface_bytes
+from pteron.maps.surfaces import ENDINGS as SURFACES, checked_surfaces, surface_bytes
 from pteron.maps.table_file import read_map_table, write_map_table
 
 _TABLES = (".csv", ".parquet")

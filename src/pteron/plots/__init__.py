@@ -3,76 +3,53 @@
 Nothing here computes physics or touches pyplot's global state.
 """
 
-from pteron.arguments import check_arguments
-from pteron.plots.canvas import LEG_COLORS, svg, svg_file
+from pteron.plots.canvas import LEG_COLORS as LEG_COLORS, svg as svg, svg_file as svg_file
 from pteron.plots.certainty import (
-    autocorrelation_figure,
-    certainty_figure,
-    correlation_figure,
-    histogram_figure,
+    autocorrelation_figure as autocorrelation_figure,
+    certainty_figure as certainty_figure,
+    correlation_figure as correlation_figure,
+    histogram_figure as histogram_figure,
 )
 from pteron.plots.comparison import (
-    comparison_figure,
-    errors_figure,
-    residual_speed_figure,
-    residual_time_figure,
+    comparison_figure as comparison_figure,
+    errors_figure as errors_figure,
+    residual_speed_figure as residual_speed_figure,
+    residual_time_figure as residual_time_figure,
 )
-from pteron.plots.drives import Ability, force_speed_figure, power_figure
-from pteron.plots.films import Film, film
-from pteron.plots.forces import forces_figure, regularity_figure
-from pteron.plots.front import front_figure
-from pteron.plots.index_maps import map_figure
-from pteron.plots.jacobian_maps import condition_figure, singularities_figure
-from pteron.plots.machine_drawing import grid_step
-from pteron.plots.machine_figures import draw, poses_figure, robot_figure
-from pteron.plots.map_films import map_film
-from pteron.plots.printing import WIDTHS, resized, save_figure
-from pteron.plots.reach import measure_figure, reach_figure
-from pteron.plots.row_figures import operations_figure, parameters_figure
-from pteron.plots.tracking import tracking_figure
-from pteron.plots.trajectories import joints_figure, trajectory_figure
+from pteron.plots.drives import (
+    Ability as Ability,
+    force_speed_figure as force_speed_figure,
+    power_figure as power_figure,
+)
+from pteron.plots.films import Film as Film, film as film
+from pteron.plots.forces import (
+    forces_figure as forces_figure,
+    regularity_figure as regularity_figure,
+)
+from pteron.plots.front import front_figure as front_figure
+from pteron.plots.index_maps import map_figure as map_figure
+from pteron.plots.jacobian_maps import (
+    condition_figure as condition_figure,
+    singularities_figure as singularities_figure,
+)
+from pteron.plots.machine_drawing import grid_step as grid_step
+from pteron.plots.machine_figures import (
+    draw as draw,
+    poses_figure as poses_figure,
+    robot_figure as robot_figure,
+)
+from pteron.plots.map_films import map_film as map_film
+from pteron.plots.printing import WIDTHS as WIDTHS, resized as resized, save_figure as save_figure
+from pteron.plots.reach import measure_figure as measure_figure, reach_figure as reach_figure
+from pteron.plots.row_figures import (
+    operations_figure as operations_figure,
+    parameters_figure as parameters_figure,
+)
+from pteron.plots.tracking import tracking_figure as tracking_figure
+from pteron.plots.trajectories import (
+    joints_figure as joints_figure,
+    trajectory_figure as trajectory_figure,
+)
+from pteron.public import publish as _publish
 
-__all__ = [
-    "Ability",
-    "Film",
-    "LEG_COLORS",
-    "WIDTHS",
-    "autocorrelation_figure",
-    "certainty_figure",
-    "comparison_figure",
-    "condition_figure",
-    "correlation_figure",
-    "draw",
-    "errors_figure",
-    "film",
-    "force_speed_figure",
-    "forces_figure",
-    "front_figure",
-    "grid_step",
-    "histogram_figure",
-    "joints_figure",
-    "map_figure",
-    "map_film",
-    "measure_figure",
-    "operations_figure",
-    "parameters_figure",
-    "poses_figure",
-    "power_figure",
-    "reach_figure",
-    "regularity_figure",
-    "resized",
-    "residual_speed_figure",
-    "residual_time_figure",
-    "robot_figure",
-    "save_figure",
-    "singularities_figure",
-    "svg",
-    "tracking_figure",
-    "trajectory_figure",
-    "svg_file",
-]
-check_arguments(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True)

@@ -1,30 +1,15 @@
 """Base inertial parameters, by three methods, and the dynamic model reduced to them."""
 
-from pteron.arguments import check_arguments
+from pteron.public import publish as _publish
 from pteron.reduction.certificate import (
-    Certificate,
-    ExactCertificate,
-    NumericalCertificate,
+    Certificate as Certificate,
+    ExactCertificate as ExactCertificate,
+    NumericalCertificate as NumericalCertificate,
 )
-from pteron.reduction.cheapest import cheapest_parameters
-from pteron.reduction.find import base_parameters
-from pteron.reduction.forms import FORMS, model_forms
-from pteron.reduction.reduced import base_regressor
-from pteron.reduction.result import BaseParameters
+from pteron.reduction.cheapest import cheapest_parameters as cheapest_parameters
+from pteron.reduction.find import base_parameters as base_parameters
+from pteron.reduction.forms import FORMS as FORMS, model_forms as model_forms
+from pteron.reduction.reduced import base_regressor as base_regressor
+from pteron.reduction.result import BaseParameters as BaseParameters
 
-__all__ = [
-    "FORMS",
-    "BaseParameters",
-    "Certificate",
-    "ExactCertificate",
-    "NumericalCertificate",
-    "base_parameters",
-    "base_regressor",
-    "cheapest_parameters",
-    "model_forms",
-]
-check_arguments(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True)

@@ -15,8 +15,7 @@ from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.html_table import Column, html_table
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
-from pteron.manipulator import parameters as values_of
+from pteron.manipulator import Manipulator, parameters as values_of
 from pteron.reduction.certificate import Certificate, ExactCertificate
 from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.expressions import as_html, as_latex, as_sympy, as_text, terms_of

@@ -3,12 +3,7 @@
 `write_report` has all that Pteron knows of a machine; `write_motion_page` shows one motion of it.
 """
 
-from pteron.arguments import check_arguments
-from pteron.report.write import write_motion_page, write_report
+from pteron.public import publish as _publish
+from pteron.report.write import write_motion_page as write_motion_page, write_report as write_report
 
-__all__ = ["write_motion_page", "write_report"]
-check_arguments(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True)

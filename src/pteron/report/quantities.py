@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pteron.kernels import Array
 from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
-from pteron.platforms.coordinates import SHOWN
-from pteron.platforms.coordinates import coordinate as pose_coordinate
+from pteron.platforms.coordinates import SHOWN, coordinate as pose_coordinate
 from pteron.report.typeset import fixed
 
 _NARROW = "\u202f"

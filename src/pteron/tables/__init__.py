@@ -5,40 +5,21 @@ CSV file are text until a number is asked for, so that columns which Pteron does
 back as they came.
 """
 
-from pteron.tables.csv_file import CsvFile
-from pteron.tables.dialect import Dialect, declaration
+from pteron.public import publish as _publish
+from pteron.tables.csv_file import CsvFile as CsvFile
+from pteron.tables.dialect import Dialect as Dialect, declaration as declaration
 from pteron.tables.files import (
-    ENDINGS,
-    STANDARD_INPUT,
-    check_output,
-    open_table,
-    read_table,
-    table_bytes,
-    whole_table,
-    write_table,
+    ENDINGS as ENDINGS,
+    STANDARD_INPUT as STANDARD_INPUT,
+    check_output as check_output,
+    open_table as open_table,
+    read_table as read_table,
+    table_bytes as table_bytes,
+    whole_table as whole_table,
+    write_table as write_table,
 )
-from pteron.tables.parquet_file import ParquetFile
-from pteron.tables.table import Table, listed
-from pteron.tables.units import in_si
+from pteron.tables.parquet_file import ParquetFile as ParquetFile
+from pteron.tables.table import Table as Table, listed as listed
+from pteron.tables.units import in_si as in_si
 
-__all__ = [
-    "ENDINGS",
-    "STANDARD_INPUT",
-    "CsvFile",
-    "Dialect",
-    "ParquetFile",
-    "Table",
-    "check_output",
-    "declaration",
-    "in_si",
-    "listed",
-    "open_table",
-    "read_table",
-    "table_bytes",
-    "whole_table",
-    "write_table",
-]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__)

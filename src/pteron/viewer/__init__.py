@@ -1,11 +1,6 @@
 """The viewer: a machine in the browser, in space, moved by sliders or by hand, with its forces."""
 
-from pteron.arguments import check_arguments
-from pteron.viewer.view import Viewer, view
+from pteron.public import publish as _publish
+from pteron.viewer.view import Viewer as Viewer, view as view
 
-__all__ = ["Viewer", "view"]
-check_arguments(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True)

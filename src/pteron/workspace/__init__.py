@@ -1,83 +1,71 @@
 """The workspace of a machine: margins, home pose, reach, joints' ranges, and proofs of them."""
 
-from typing import TYPE_CHECKING
+from pteron.kinematics.limits import LimitedJoint as LimitedJoint, limited_joints as limited_joints
+from pteron.public import publish as _publish
+from pteron.workspace.clearance import (
+    Clearance as Clearance,
+    clearance as clearance,
+    interference as interference,
+)
+from pteron.workspace.components import (
+    Component as Component,
+    Components as Components,
+    components as components,
+)
+from pteron.workspace.conditions import Condition as Condition, conditions as conditions
+from pteron.workspace.cube_bound import cube_bound as cube_bound
+from pteron.workspace.free_regions import (
+    FreeRegion as FreeRegion,
+    free_of_singularities as free_of_singularities,
+)
+from pteron.workspace.home import home_pose as home_pose
+from pteron.workspace.inscribed import (
+    Inscribed as Inscribed,
+    largest_cube as largest_cube,
+    largest_cylinder as largest_cylinder,
+)
+from pteron.workspace.margins import (
+    JointRanges as JointRanges,
+    PoseMargins as PoseMargins,
+    joint_ranges as joint_ranges,
+    pose_margins as pose_margins,
+)
+from pteron.workspace.modes import (
+    Contact as Contact,
+    mode_contacts as mode_contacts,
+    mode_pavings as mode_pavings,
+)
+from pteron.workspace.nearest_singularities import (
+    NearestSingularity as NearestSingularity,
+    nearest_singularities as nearest_singularities,
+)
+from pteron.workspace.orientations import (
+    VolumesOverAngles as VolumesOverAngles,
+    over_angles as over_angles,
+)
+from pteron.workspace.paving import Paving as Paving, paving as paving
+from pteron.workspace.proofs import Proof as Proof, prove as prove
+from pteron.workspace.quadrature import (
+    Quadrature as Quadrature,
+    quadrature_volume as quadrature_volume,
+)
+from pteron.workspace.reach import (
+    BEYOND_LIMITS as BEYOND_LIMITS,
+    REACHABLE as REACHABLE,
+    ReachSlice as ReachSlice,
+    reach_slice as reach_slice,
+)
+from pteron.workspace.regions import Box as Box, Cylinder as Cylinder, Region as Region
+from pteron.workspace.tilts import (
+    LargestTilt as LargestTilt,
+    TiltedBall as TiltedBall,
+    largest_ball as largest_ball,
+    largest_tilt as largest_tilt,
+)
+from pteron.workspace.volume import (
+    ReachVolume as ReachVolume,
+    bounding_box as bounding_box,
+    reach_volume as reach_volume,
+)
 
-from pteron.arguments import check_arguments
-from pteron.kinematics.limits import LimitedJoint, limited_joints
-from pteron.renamed import former_names
-from pteron.workspace.clearance import Clearance, clearance, interference
-from pteron.workspace.components import Component, Components, components
-from pteron.workspace.conditions import Condition, conditions
-from pteron.workspace.cube_bound import cube_bound
-from pteron.workspace.free_regions import FreeRegion, free_of_singularities
-from pteron.workspace.home import home_pose
-from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
-from pteron.workspace.margins import JointRanges, PoseMargins, joint_ranges, pose_margins
-from pteron.workspace.modes import Contact, mode_contacts, mode_pavings
-from pteron.workspace.nearest_singularities import NearestSingularity, nearest_singularities
-from pteron.workspace.orientations import VolumesOverAngles, over_angles
-from pteron.workspace.paving import Paving, paving
-from pteron.workspace.proofs import Proof, prove
-from pteron.workspace.quadrature import Quadrature, quadrature_volume
-from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
-from pteron.workspace.regions import Box, Cylinder, Region
-from pteron.workspace.tilts import LargestTilt, TiltedBall, largest_ball, largest_tilt
-from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
-
-__all__ = [
-    "BEYOND_LIMITS",
-    "Box",
-    "Clearance",
-    "Component",
-    "Components",
-    "Condition",
-    "Contact",
-    "Cylinder",
-    "FreeRegion",
-    "Inscribed",
-    "JointRanges",
-    "LargestTilt",
-    "LimitedJoint",
-    "NearestSingularity",
-    "Paving",
-    "Proof",
-    "Quadrature",
-    "REACHABLE",
-    "ReachSlice",
-    "ReachVolume",
-    "Region",
-    "TiltedBall",
-    "PoseMargins",
-    "VolumesOverAngles",
-    "bounding_box",
-    "clearance",
-    "conditions",
-    "free_of_singularities",
-    "components",
-    "cube_bound",
-    "home_pose",
-    "interference",
-    "joint_ranges",
-    "largest_ball",
-    "largest_cube",
-    "largest_cylinder",
-    "largest_tilt",
-    "limited_joints",
-    "nearest_singularities",
-    "mode_contacts",
-    "mode_pavings",
-    "over_angles",
-    "paving",
-    "prove",
-    "quadrature_volume",
-    "reach_slice",
-    "reach_volume",
-    "pose_margins",
-]
-check_arguments(__name__)
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__, checked=True)

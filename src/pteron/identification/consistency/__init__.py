@@ -1,13 +1,10 @@
 """Real bodies for identified base parameters: masses above zero, inertias that a body can have."""
 
-from pteron.identification.consistency.bodies import real_bodies
-from pteron.identification.consistency.bounds import Bounds
-from pteron.identification.consistency.cones import MissingSolver
-from pteron.identification.consistency.consistency import Consistency
-from pteron.identification.consistency.consistent_model import consistent_model
+from pteron.identification.consistency.bodies import real_bodies as real_bodies
+from pteron.identification.consistency.bounds import Bounds as Bounds
+from pteron.identification.consistency.cones import MissingSolver as MissingSolver
+from pteron.identification.consistency.consistency import Consistency as Consistency
+from pteron.identification.consistency.consistent_model import consistent_model as consistent_model
+from pteron.public import publish as _publish
 
-__all__ = ["Bounds", "Consistency", "MissingSolver", "consistent_model", "real_bodies"]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__)

@@ -1,39 +1,33 @@
 """Estimators: each takes observations (regressor and forces) and returns an `Estimate`."""
 
-from collections.abc import Callable
+from collections.abc import Callable as _Callable
 
-from pteron.identification.estimators.essential import Essential, essential_parameters
-from pteron.identification.estimators.estimate import Estimate, Whiteness, whiteness
-from pteron.identification.estimators.instrumental import halves, instrumental
-from pteron.identification.estimators.least_squares import huber, ordinary, weighted
-from pteron.identification.estimators.likelihood import maximum_likelihood
-from pteron.identification.estimators.qr import QrFactor, qr_factor
-from pteron.identification.estimators.reduction import Reduced, reduced
-from pteron.identification.estimators.total import column_errors, total
-from pteron.identification.observation import Observations
+from pteron.identification.estimators.essential import (
+    Essential as Essential,
+    essential_parameters as essential_parameters,
+)
+from pteron.identification.estimators.estimate import (
+    Estimate as Estimate,
+    Whiteness as Whiteness,
+    whiteness as whiteness,
+)
+from pteron.identification.estimators.instrumental import (
+    halves as halves,
+    instrumental as instrumental,
+)
+from pteron.identification.estimators.least_squares import (
+    huber as huber,
+    ordinary as ordinary,
+    weighted as weighted,
+)
+from pteron.identification.estimators.likelihood import maximum_likelihood as maximum_likelihood
+from pteron.identification.estimators.qr import QrFactor as QrFactor, qr_factor as qr_factor
+from pteron.identification.estimators.reduction import Reduced as Reduced, reduced as reduced
+from pteron.identification.estimators.total import column_errors as column_errors, total as total
+from pteron.identification.observation import Observations as _Observations
+from pteron.public import publish as _publish
 
-__all__ = [
-    "ESTIMATORS",
-    "Essential",
-    "Estimate",
-    "QrFactor",
-    "Reduced",
-    "Whiteness",
-    "column_errors",
-    "essential_parameters",
-    "halves",
-    "huber",
-    "instrumental",
-    "maximum_likelihood",
-    "ordinary",
-    "qr_factor",
-    "reduced",
-    "total",
-    "weighted",
-    "whiteness",
-]
-
-ESTIMATORS: dict[str, Callable[[Observations], Estimate]] = {
+ESTIMATORS: dict[str, _Callable[[_Observations], Estimate]] = {
     "ordinary": ordinary,
     "weighted": weighted,
     "huber": huber,
@@ -41,6 +35,4 @@ ESTIMATORS: dict[str, Callable[[Observations], Estimate]] = {
 }
 """The estimators that need nothing but observations, by name."""
 
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__)

@@ -1,16 +1,11 @@
 """Fault isolation: faults of logs or machine that a fit's residuals show, and their effects."""
 
-from typing import TYPE_CHECKING
+from pteron.identification.faults.fault import IsolatedFault as IsolatedFault
+from pteron.identification.faults.isolation import (
+    FaultIsolation as FaultIsolation,
+    delay_of as delay_of,
+    isolate_faults as isolate_faults,
+)
+from pteron.public import publish as _publish
 
-from pteron.identification.faults.fault import IsolatedFault
-from pteron.identification.faults.isolation import FaultIsolation, delay_of, isolate_faults
-from pteron.renamed import former_names
-
-__all__ = ["FaultIsolation", "IsolatedFault", "delay_of", "isolate_faults"]
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__)

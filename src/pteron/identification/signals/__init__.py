@@ -4,50 +4,30 @@ Positions are smoothed and differentiated in joint space, where they were measur
 velocities and accelerations of the platform follow from them by exact kinematics.
 """
 
-from typing import TYPE_CHECKING
-
 from pteron.identification.signals.derivatives import (
-    Derivatives,
-    central_differences,
-    spline_motion,
-    uniform,
+    Derivatives as Derivatives,
+    central_differences as central_differences,
+    spline_motion as spline_motion,
+    uniform as uniform,
 )
 from pteron.identification.signals.filters import (
-    Decimation,
-    cutoff_of,
-    position_noise,
-    smoothed,
-    white_noise,
+    Decimation as Decimation,
+    cutoff_of as cutoff_of,
+    position_noise as position_noise,
+    smoothed as smoothed,
+    white_noise as white_noise,
 )
-from pteron.identification.signals.fourier import FittedSeries, fitted_series
-from pteron.identification.signals.preprocessing import Preprocessing, Processing, preprocessing_of
-from pteron.identification.signals.samples import samples
-from pteron.identification.signals.states import States, start_pose
-from pteron.renamed import former_names
+from pteron.identification.signals.fourier import (
+    FittedSeries as FittedSeries,
+    fitted_series as fitted_series,
+)
+from pteron.identification.signals.preprocessing import (
+    Preprocessing as Preprocessing,
+    Processing as Processing,
+    preprocessing_of as preprocessing_of,
+)
+from pteron.identification.signals.samples import samples as samples
+from pteron.identification.signals.states import States as States, start_pose as start_pose
+from pteron.public import publish as _publish
 
-__all__ = [
-    "Decimation",
-    "Derivatives",
-    "FittedSeries",
-    "Preprocessing",
-    "Processing",
-    "States",
-    "central_differences",
-    "cutoff_of",
-    "fitted_series",
-    "position_noise",
-    "preprocessing_of",
-    "samples",
-    "smoothed",
-    "spline_motion",
-    "start_pose",
-    "uniform",
-    "white_noise",
-]
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+_publish(__name__)

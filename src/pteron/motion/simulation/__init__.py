@@ -1,23 +1,10 @@
 """A machine with its drives, simulated under a controller, under given forces, or free."""
 
-from typing import TYPE_CHECKING
+from pteron.motion.simulation.loop import ControlLaw as ControlLaw
+from pteron.motion.simulation.plant import advance as advance, longest_step as longest_step
+from pteron.motion.simulation.sensors import Sensors as Sensors
+from pteron.motion.simulation.simulate import Controls as Controls, simulate as simulate
+from pteron.motion.simulation.simulation import Simulation as Simulation
+from pteron.public import publish as _publish
 
-from pteron.motion.simulation.loop import ControlLaw
-from pteron.motion.simulation.plant import advance, longest_step
-from pteron.motion.simulation.sensors import Sensors
-from pteron.motion.simulation.simulate import Controls, simulate
-from pteron.motion.simulation.simulation import Simulation
-from pteron.renamed import former_names
-
-__all__ = ["Controls", "ControlLaw", "Sensors", "Simulation", "advance", "longest_step", "simulate"]
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
-
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__)
+_publish(__name__)

@@ -1,0 +1,59 @@
+"""The public names of a package: what its `__init__.py` imports as it is, or defines."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection, Mapping, Sequence
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from pteron.arguments import check_arguments
+from pteron.renamed import former_names
+
+_OTHERS = {"annotations", "TYPE_CHECKING"}
+"""Names that a file imports for itself."""
+
+
+def publish(
+    package: str,
+    *,
+    modules: Sequence[str] = (),
+    later: Mapping[str, Sequence[str]] | None = None,
+    checked: bool | Collection[str] = False,
+    classes: Collection[str] = (),
+) -> None:
+    """List a package's public names, for completion and ``import *``; the last line of its file.
+
+    An import that hands a name on says so to readers and type checkers alike: ``import size as
+    size``. A name with an underscore is the file's own.
+
+    Parameters
+    ----------
+    package : str
+        Its `__name__`.
+    modules : sequence of str
+        Modules inside it that are public; they are imported at their first use.
+    later : mapping of str to sequence of str, optional
+        Names that are imported at their first use, by the module that has them.
+    checked : bool or collection of str
+        Whether the arguments of its functions are checked, or those of which.
+    classes : collection of str
+        Classes whose arguments are checked.
+    """
+    names = vars(sys.modules[package])
+    places = {name: place for place, several in (later or {}).items() for name in several}
+    own = (name for name in names.keys() - _OTHERS if not name.startswith("_"))
+    listed = [name for name in own if not isinstance(names[name], ModuleType)]
+    listed = names.setdefault("__all__", sorted([*listed, *modules, *places]))
+    former = former_names(package)
+
+    def __getattr__(name: str) -> Any:  # noqa: N807
+        if name in modules:
+            return import_module(f"{package}.{name}")
+        return getattr(import_module(places[name]), name) if name in places else former(name)
+
+    names["__getattr__"] = __getattr__
+    names["__dir__"] = lambda: sorted([*listed, *({"__version__"} & names.keys())])
+    if checked or classes:
+        check_arguments(package, None if checked is True else checked or (), classes=classes)
