@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from pteron.arguments import check_arguments
-from pteron.renamed import former_names
+from pteron.renamed import former_name
 
 _OTHERS = {"annotations", "TYPE_CHECKING"}
 """Names that a file imports for itself."""
@@ -46,12 +46,13 @@ def publish(
     own = (name for name in names.keys() - _OTHERS if not name.startswith("_"))
     listed = [name for name in own if not isinstance(names[name], ModuleType)]
     listed = names.setdefault("__all__", sorted([*listed, *modules, *places]))
-    former = former_names(package)
 
     def __getattr__(name: str) -> Any:  # noqa: N807
         if name in modules:
             return import_module(f"{package}.{name}")
-        return getattr(import_module(places[name]), name) if name in places else former(name)
+        if name in places:
+            return getattr(import_module(places[name]), name)
+        return former_name(package, name)
 
     names["__getattr__"] = __getattr__
     names["__dir__"] = lambda: sorted([*listed, *({"__version__"} & names.keys())])

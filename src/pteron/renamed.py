@@ -7,7 +7,6 @@ class: ``old = former_attribute("old", "new")``.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from pkgutil import resolve_name
 from typing import Any
 
@@ -39,19 +38,17 @@ UNTIL = "0.3"
 """The first version without them."""
 
 
-def former_names(package: str) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of a package, which answers to the package's former names.
+def former_name(package: str, name: str) -> Any:
+    """Return what a package's former name is called now, for the package's ``__getattr__``.
+
+    A `DeprecationWarning` has the line to write instead; any other name is an AttributeError.
 
     Parameters
     ----------
     package : str
         Its ``__name__``.
-
-    Returns
-    -------
-    callable
-        It takes a name, and returns what is now called otherwise, with a `DeprecationWarning` that
-        has the line to write instead; AttributeError for any other name.
+    name : str
+        The name that is not there.
 
     Examples
     --------
@@ -64,20 +61,16 @@ def former_names(package: str) -> Callable[[str], Any]:
     pteron.identification.signals.FourierSeries goes with version 0.3; write
     from pteron.identification.signals import FittedSeries
     """
-
-    def __getattr__(name: str) -> Any:  # noqa: N807
-        present = RENAMED.get(package, {}).get(name)
-        if present is None:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module, _, own = present.rpartition(".")
-        warnings.warn(
-            f"{package}.{name} goes with version {UNTIL}; write from {module} import {own}",
-            DeprecationWarning,
-            stacklevel=2,
-        )
-        return resolve_name(present)
-
-    return __getattr__
+    present = RENAMED.get(package, {}).get(name)
+    if present is None:
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+    module, _, own = present.rpartition(".")
+    warnings.warn(
+        f"{package}.{name} goes with version {UNTIL}; write from {module} import {own}",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    return resolve_name(present)
 
 
 def former_attribute(former: str, present: str) -> property:
