@@ -4,10 +4,35 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
+
+from pteron.errors import ModelError, PteronError
+
+
+def of_extra(extra: str, module: str, need: str, error: type[PteronError] = ModelError) -> Any:
+    """Return a module that an extra brings, or say how to install it.
+
+    Parameters
+    ----------
+    extra : str
+        The extra's name.
+    module : str
+        The module's name, with its packages.
+    need : str
+        Who needs what, as the message begins: "the viewer needs viser".
+    error : type of PteronError
+        The error that is raised.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        told = f"{need}, which is not installed; {install_command(extra)}"
+        raise error(told) from None
 
 
 def install_command(extra: str) -> str:

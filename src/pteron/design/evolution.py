@@ -9,22 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.errors import ModelError
-from pteron.extras import install_command
+from pteron.extras import of_extra
 from pteron.kernels import Array
 
 
-def _missing() -> ModelError:
-    return ModelError(f"a search needs pymoo, which is not installed; {install_command('design')}")
+def _pymoo(module: str) -> Any:
+    return of_extra("design", f"pymoo.{module}", "a search needs pymoo")
 
 
 def non_dominated(costs: Array) -> NDArray[np.int_]:
     """Return which rows (N, M) of costs no other row betters in every one, in their order."""
-    try:
-        from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
-    except ImportError:
-        raise _missing() from None
-    found = NonDominatedSorting().do(costs, only_non_dominated_front=True)
+    sorting = _pymoo("util.nds.non_dominated_sorting").NonDominatedSorting()
+    found = sorting.do(costs, only_non_dominated_front=True)
     return np.sort(np.asarray(found, dtype=int))
 
 
@@ -58,15 +54,10 @@ class Evolution:
     """
 
     def __init__(self, first: Array, objectives: int, constraints: int, seed: int) -> None:
-        try:
-            from pymoo.algorithms.moo.nsga2 import NSGA2
-            from pymoo.core.problem import Problem
-        except ImportError:
-            raise _missing() from None
-        self._problem = Problem(
+        self._problem = _pymoo("core.problem").Problem(
             n_var=first.shape[1], n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0
         )
-        self._algorithm: Any = NSGA2(pop_size=len(first), sampling=first)
+        self._algorithm = _pymoo("algorithms.moo.nsga2").NSGA2(pop_size=len(first), sampling=first)
         # The loop that asks decides when to end.
         self._algorithm.setup(self._problem, termination=("n_gen", 1 << 30), seed=seed)
         self._asked: Any = None

@@ -24,7 +24,7 @@ from pteron.design.rows import FAILED, MISSES, columns
 from pteron.design.spec import Spec
 from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
-from pteron.extras import install_command
+from pteron.extras import of_extra
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
 from pteron.shapes import Workers
@@ -221,15 +221,8 @@ def _workers(count: int | None, scheduler: str | None) -> Iterator[str | None]:
     if count is None:
         yield scheduler
         return
-    try:
-        import distributed
-    except ImportError:
-        raise ModelError(
-            "other processes need dask.distributed, which is not installed; "
-            + install_command("cluster")
-        ) from None
     # One for all generations: a process compiles what it needs once.
     options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
-    local: Any = distributed.LocalCluster
-    with local(n_workers=count, silence_logs=50, **options) as cluster:
+    local = of_extra("cluster", "distributed", "other processes need dask.distributed")
+    with local.LocalCluster(n_workers=count, silence_logs=50, **options) as cluster:
         yield str(cluster.scheduler_address)

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from pteron.errors import DataError, ModelError
-from pteron.extras import install_command
+from pteron.errors import DataError
+from pteron.extras import of_extra
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
 from pteron.kernels.kernel import Kernel, unmasked
@@ -68,13 +68,8 @@ class Traced(Kernel):
 
     @cached_property
     def _traced(self) -> Callable[..., Any]:
-        try:
-            import jax
-            from jax import numpy as jnp
-        except ImportError:
-            raise ModelError(
-                f'target: "jax" needs JAX, which is not installed; {install_command("jax")}'
-            ) from None
+        jax = of_extra("jax", "jax", 'target: "jax" needs JAX')
+        jnp = jax.numpy
 
         def stack(*values: Any) -> Any:
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pteron.errors import ModelError
-from pteron.extras import install_command
+from pteron.extras import of_extra
 from pteron.kernels import Array
 from pteron.kernels.choice import guarded
 from pteron.kernels.jax import Traced
@@ -51,13 +50,8 @@ def _function(
     robot: Manipulator, names: tuple[str, ...], places: tuple[int, ...], shape: tuple[int, ...]
 ) -> Callable[..., dict[str, Any]]:
     """Return what takes a pose and the values along each axis, and returns the indices."""
-    try:
-        import jax
-        from jax import numpy as jnp
-    except ImportError:
-        raise ModelError(
-            f'engine: "jax" needs JAX, which is not installed; {install_command("jax")}'
-        ) from None
+    jax = of_extra("jax", "jax", 'engine: "jax" needs JAX')
+    jnp = jax.numpy
     jax.config.update("jax_enable_x64", True)
     kernels = {
         name: guarded(robot, name, Traced) for name in ("standing", *names) if name != MARGIN.name

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.arguments import expect_to_fit
-from pteron.errors import DataError, ModelError, OutputError
-from pteron.extras import install_command
+from pteron.errors import DataError, OutputError
+from pteron.extras import of_extra
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Grid
 from pteron.maps.map import ALL, Map
@@ -319,10 +319,4 @@ def _attributes(path: Path) -> dict[str, Any]:
 
 
 def _zarr() -> Any:
-    try:
-        import zarr
-    except ImportError:
-        raise ModelError(
-            f"a .zarr store needs Zarr, which is not installed; {install_command('cluster')}"
-        ) from None
-    return zarr
+    return of_extra("cluster", "zarr", "a .zarr store needs Zarr")

@@ -19,8 +19,8 @@ from importlib.metadata import version
 from itertools import islice
 from typing import Any, Protocol, TypeVar
 
-from pteron.errors import DataError, ModelError, PteronError
-from pteron.extras import install_command
+from pteron.errors import DataError, PteronError
+from pteron.extras import of_extra
 from pteron.shapes import Workers
 
 _Chunk = TypeVar("_Chunk")
@@ -274,14 +274,7 @@ def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[
 
 def _distributed() -> Any:
     """Return `dask.distributed`, whose functions have no types."""
-    try:
-        import distributed
-    except ImportError:
-        raise ModelError(
-            "other processes need dask.distributed, which is not installed; "
-            + install_command("cluster")
-        ) from None
-    return distributed
+    return of_extra("cluster", "distributed", "other processes need dask.distributed")
 
 
 def cores() -> int:

@@ -15,7 +15,7 @@ from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any
 
 from pteron.errors import DataError, ModelError, shown
-from pteron.extras import install_command
+from pteron.extras import of_extra
 from pteron.viewer.guard import guarded
 
 if TYPE_CHECKING:
@@ -50,12 +50,7 @@ def serve(host: str, port: int, label: str) -> viser.ViserServer:
     ModelError
         If viser is not installed, or is a version that cannot be closed to foreign pages.
     """
-    try:
-        import viser
-    except ImportError:
-        raise ModelError(
-            f"the viewer needs viser, which is not installed; {install_command('viewer')}"
-        ) from None
+    viser = of_extra("viewer", "viser", "the viewer needs viser")
     free = free_port(host, port)
     logging.getLogger("websockets.server").addFilter(_worth_telling)
     with _quiet(), guarded(host) as guards:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse  # type: ignore[import-untyped]
 
 from pteron.errors import ModelError
-from pteron.extras import install_command
+from pteron.extras import of_extra
 from pteron.identification.consistency.bodies import Bodies
 from pteron.kernels import Array
 
@@ -159,12 +159,7 @@ def _solved(
     Of rows @ v + right the first are `equal` to zero, then come those that are not negative, and
     the cones. The caller checks the answer, not the solver.
     """
-    try:
-        import clarabel  # type: ignore[import-untyped]
-    except ImportError:
-        raise MissingSolver(
-            f"consistency needs Clarabel, which is not installed; {install_command('consistency')}"
-        ) from None
+    clarabel = of_extra("consistency", "clarabel", "consistency needs Clarabel", MissingSolver)
     cones = [clarabel.SecondOrderConeT(_CONE)] * len(real.bodies.cones[0])
     solids = [clarabel.PSDTriangleConeT(4)] * len(real.bodies.solids[0])
     others = _CONE * len(cones) + _SOLID * len(solids)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import DataError, PteronError, UnreachablePose
-from pteron.extras import install_command
+from pteron.extras import of_extra
 from pteron.kernels import Array
 from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.evaluate import checked_one, unchecked
@@ -163,7 +163,7 @@ def _lost(text: str) -> UnreachablePose:
 
 def _planned(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> Any:
     """Return Ruckig's trajectory between joint coordinates (n,)."""
-    ruckig = _ruckig()
+    ruckig = of_extra("motion", "ruckig", "motion with limited jerk needs ruckig", PteronError)
     count = len(first)
     asked = ruckig.InputParameter(count)
     asked.current_position, asked.target_position = first.tolist(), last.tolist()
@@ -174,15 +174,3 @@ def _planned(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> A
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise DataError(f"limits: Ruckig finds no motion within them ({result}); give others")
     return planned
-
-
-def _ruckig() -> Any:
-    """Return the library, or say which extra has it."""
-    try:
-        import ruckig
-    except ImportError:
-        raise PteronError(
-            "motion with limited jerk needs ruckig, which is not installed; "
-            + install_command("motion")
-        ) from None
-    return ruckig

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pteron.errors import DataError, ModelError, PteronError
-from pteron.extras import install_command
+from pteron.extras import of_extra
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
@@ -141,7 +141,7 @@ def time_optimal(
             "nothing limits the acceleration: neither a limit given nor the drives' max_force; "
             "give a limit of force or of acceleration"
         )
-    toppra = _toppra()
+    toppra = of_extra("motion", "toppra", "time-optimal motion needs toppra", PteronError)
     check_path(robot, path)
     slow = stretch_times(robot, path, polynomial("quintic"), kept)
     found = [_fastest(robot, path, j, kept, slow[j], step, toppra) for j in range(len(slow))]
@@ -279,16 +279,3 @@ def _solved(toppra: Any, rows: LimitRows, grid: Array, before: Array, ahead: flo
     if rates is None or not np.isfinite(rates).all():
         raise ModelError("TOPP-RA finds no motion along the path; give other limits")
     return np.asarray(rates, dtype=float) ** 2
-
-
-def _toppra() -> Any:
-    """Return the library, or say which extra has it."""
-    try:
-        import toppra
-        import toppra.algorithm
-        import toppra.constraint
-    except ImportError:
-        raise PteronError(
-            "time-optimal motion needs toppra, which is not installed; " + install_command("motion")
-        ) from None
-    return toppra
