@@ -1,8 +1,9 @@
-"""Values as JSON has them."""
+"""Values as JSON has them, and the attributes of objects as such values."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import asdict, is_dataclass
 from typing import Any
 
 
@@ -14,3 +15,21 @@ def json_ready(data: Any) -> Any:
         return [json_ready(value) for value in data]
     data = data.item() if hasattr(data, "item") else data
     return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def picked(owner: object, *names: str) -> dict[str, Any]:
+    """Return attributes of an object as plain data, by their names.
+
+    A name may hold several words, each "attribute" or "key=attribute", where the key is another.
+    Arrays and tuples become lists; what has an `as_dict` is asked for it.
+    """
+    pairs = (name.rpartition("=") for name in " ".join(names).split())
+    return {key or name: _data(getattr(owner, name)) for key, _, name in pairs}
+
+
+def _data(value: Any) -> Any:
+    if hasattr(value, "tolist") or hasattr(value, "as_dict"):
+        return value.tolist() if hasattr(value, "tolist") else value.as_dict()
+    if isinstance(value, list | tuple):
+        return [_data(one) for one in value]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

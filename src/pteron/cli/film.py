@@ -9,6 +9,7 @@ from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.terminal import plain, show, show_json, written
 from pteron.errors import DataError
+from pteron.json_values import picked
 
 
 def film(
@@ -67,11 +68,7 @@ def film(
     data = {
         "robot": machine.name,
         "cycle": cycle,
-        "duration": made.duration,
-        "speed": made.speed,
-        "frames": made.frames,
-        "fps": made.fps,
-        "size": list(made.size),
+        **picked(made, "duration speed frames fps size"),
         "file": str(made.path),
     }
     if json:

@@ -17,6 +17,7 @@ from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import UnlikelyValue
+from pteron.json_values import picked
 
 if TYPE_CHECKING:
     import polars as pl
@@ -151,10 +152,7 @@ def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
             "ratio_unit": f"rad/{found.robot.legs[fit.leg - 1].joint.unit}",
             "least_ratio": fit.span.least if fit.fits else None,
             "greatest_ratio": fit.span.greatest if fit.fits else None,
-            "rated_margin": fit.rated_margin,
-            "peak_margin": fit.peak_margin,
-            "speed_margin": fit.speed_margin,
-            "inertia_ratio": fit.inertia_ratio,
+            **picked(fit, "rated_margin peak_margin speed_margin inertia_ratio"),
         }
         for fit in fits
     ]

@@ -19,6 +19,7 @@ from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations
 from pteron.identification.payload import observations_with_payload
 from pteron.identification.signals import Processing
+from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
@@ -96,15 +97,10 @@ class DriveGains:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the residuals as plain data."""
-        return {
-            "gains": self.gains.tolist(),
-            "standard_deviations": self.deviations.tolist(),
-            "total_least_squares": self.total_least_squares.tolist(),
-            "units": list(self.estimate.units[: len(self.gains)]),
-            "residual": self.residual.tolist(),
-            "condition_number": self.condition,
-            "gap": self.gap,
-            "estimate": self.estimate.as_dict(),
+        units = {"units": list(self.estimate.units[: len(self.gains)])}
+        return picked(self, "gains standard_deviations=deviations total_least_squares") | {
+            **units,
+            **picked(self, "residual condition_number=condition gap estimate"),
         }
 
 

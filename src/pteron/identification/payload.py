@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from pteron.identification.observation import Observations, observations_of, sta
 from pteron.identification.plausibility import CHANCE, left_over, unphysical, unseen
 from pteron.identification.recordings import Recording, recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
+from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
@@ -158,21 +159,11 @@ class Payload:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the payload as plain data, without the other values of the fit."""
-        center = self.center_of_mass
-        return {
-            "mass": self.mass,
-            "first_moment": None if self.first_moment is None else list(self.first_moment),
-            "inertia": self.inertia,
-            "center_of_mass": None if center is None else list(center),
-            "names": list(self.names),
-            "standard_deviations": self.deviations.tolist(),
-            "covariance": self.covariance.tolist(),
-            "felt": self.felt,
-            "real": self.real,
-            "residual": self.residual.tolist(),
-            "trial": self.fault_isolation.as_dict(),
-            "findings": [asdict(one) for one in self.findings],
-        }
+        return picked(
+            self,
+            "mass first_moment inertia center_of_mass names standard_deviations=deviations",
+            "covariance felt real residual trial=fault_isolation findings",
+        )
 
 
 def identify_payload(

@@ -14,6 +14,7 @@ from pteron.identification.model import Model
 from pteron.identification.observation import in_motion
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing, samples
+from pteron.json_values import picked
 from pteron.kernels import Array
 
 _KEPT = 6000
@@ -118,20 +119,14 @@ class Prediction:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the samples as plain data."""
-        return {
-            "source": self.source,
-            "samples": self.samples,
-            "left_out": self.left_out.tolist(),
-            "force_standard_deviation": self.size.tolist(),
-            "rms_error": self.error.tolist(),
-            "rms_error_of_all_samples": self.error_of_all.tolist(),
-            "nrms_percent": self.nrms.tolist(),
-            "robust_nrms_percent": self.robust_nrms.tolist(),
-            "outliers": self.outliers.tolist(),
-            "nrms_percent_without_friction": self.nrms_without_friction.tolist(),
-            "noise_floor_percent": self.floor.tolist(),
-            "unexplained_percent": self.unexplained.tolist(),
-        }
+        return picked(
+            self,
+            "source samples left_out force_standard_deviation=size rms_error=error",
+            "rms_error_of_all_samples=error_of_all nrms_percent=nrms",
+            "robust_nrms_percent=robust_nrms outliers",
+            "nrms_percent_without_friction=nrms_without_friction",
+            "noise_floor_percent=floor unexplained_percent=unexplained",
+        )
 
 
 def predict(

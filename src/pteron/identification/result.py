@@ -18,6 +18,7 @@ from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Preprocessing
 from pteron.identification.unknowns import Unknowns
 from pteron.identification.verdict import Verdict
+from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
@@ -167,12 +168,17 @@ class Identification:
     def as_dict(self) -> dict[str, Any]:
         """Return everything but samples and residuals as plain data."""
         consistency, base = self.consistency, self.model.base
+        bodies = consistency and {
+            **picked(consistency, "feasible distance p_value at_border cad_feasible"),
+            **picked(consistency, "cad_violations"),
+            "share_of_residual": self.consistency_share,
+            **picked(consistency, "parameters"),
+            "summary": consistency.summary().splitlines(),
+        }
         return {
             "robot": self.robot.name,
-            "verdict": self.verdict.as_dict(),
-            "expressions": list(self.model.expressions),
-            "kinds": list(self.model.kinds),
-            "left_out": list(self.model.left_out),
+            **picked(self, "verdict"),
+            **picked(self.model, "expressions kinds left_out"),
             "base_parameters": {
                 "names": list(base.names),
                 "expressions": list(base.expressions(digits=12)),
@@ -188,43 +194,13 @@ class Identification:
                 }
                 for friction, inertia in zip(self.friction, self._per_joint("rotor"), strict=True)
             ],
-            "estimate": self.estimate.as_dict(),
-            "unknowns": self.unknowns.as_dict(),
-            "essential": {
-                "names": list(self.essential.names),
-                "dropped": list(self.essential.dropped),
-                "p_value": self.essential.p_value,
-                "level": self.essential.level,
-                "values": self.essential.estimate.values.tolist(),
-                "standard_deviations": self.essential.estimate.deviations.tolist(),
-            },
-            "unseen": list(self.unseen),
-            "real_bodies": None
-            if consistency is None
-            else {
-                "feasible": consistency.feasible,
-                "distance": consistency.distance,
-                "p_value": consistency.p_value,
-                "at_border": list(consistency.at_border),
-                "cad_feasible": consistency.cad_feasible,
-                "cad_violations": list(consistency.cad_violations),
-                "share_of_residual": self.consistency_share,
-                "parameters": consistency.parameters.tolist(),
-                "summary": consistency.summary().splitlines(),
-            },
-            "trial": self.fault_isolation.as_dict(),
-            "fitted": [prediction.as_dict() for prediction in self.fitted],
-            "held_out": [prediction.as_dict() for prediction in self.held_out],
-            "preprocessing": [
-                {
-                    key: value.tolist() if isinstance(value, np.ndarray) else value
-                    for key, value in vars(one).items()
-                }
-                for one in self.preprocessing
-            ],
-            "findings": [
-                {"kind": f.kind, "row": f.row, "column": f.column, "message": f.message}
-                for f in self.findings
-            ],
-            "notes": list(self.notes),
+            **picked(self, "estimate unknowns"),
+            "essential": picked(self.essential, "names dropped p_value level")
+            | picked(self.essential.estimate, "values standard_deviations=deviations"),
+            **picked(self, "unseen"),
+            "real_bodies": bodies,
+            **picked(self, "trial=fault_isolation fitted held_out"),
+            "preprocessing": [picked(one, *vars(one)) for one in self.preprocessing],
+            "findings": [picked(one, "kind row column message") for one in self.findings],
+            **picked(self, "notes"),
         }

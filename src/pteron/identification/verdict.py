@@ -14,6 +14,7 @@ from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction, predict
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing
+from pteron.json_values import picked
 from pteron.kernels import Array
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
@@ -93,11 +94,7 @@ class Verdict:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the verdict as plain data."""
-        return {
-            "grade": self.grade,
-            "reasons": list(self.reasons),
-            "next_steps": list(self.next_steps),
-        }
+        return picked(self, "grade reasons next_steps")
 
 
 @dataclass

@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.atomic import write_text, write_texts
 from pteron.errors import OutputError, shown
+from pteron.json_values import picked
 from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
     from pteron.playback import Given
     from pteron.report.contents import Report
+
+_WAY = "across up turn"
+"""Attributes of a standard cycle, which other motions have not."""
 
 _PAGES = (".html", ".htm")
 """Endings of pages."""
@@ -156,67 +160,41 @@ def checked_folder(path: str | Path) -> Path:
 
 def numbers(report: Report) -> dict[str, Any]:
     """Return the numbers of a report as plain data in SI units and radians."""
-    robot, cycle, ranges = report.robot, report.cycle, report.joints
-    standard = report.standard
+    robot, cycle, sizing = report.robot, report.cycle, report.sizing
+    standard, volume = report.standard, report.volume
     orientations = report.orientations
     return {
         "robot": robot.name,
         "motion": robot.platform.motion,
-        "coordinates": list(robot.coordinates),
+        **picked(robot, "coordinates"),
         "joints": [vars(leg.joint) for leg in robot.legs],
         "drives": [asdict(leg.drive) if leg.drive else None for leg in robot.legs],
         "elbows": [leg.elbow for leg in robot.legs],
-        "gravity": list(robot.gravity),
-        "tool": list(robot.platform.tool),
-        "doubts": list(report.doubts),
+        **picked(robot, "gravity"),
+        **picked(robot.platform, "tool"),
+        **picked(report, "doubts"),
         "home": {
             "pose": report.home.tolist(),
-            "type_i": report.reserve.type_i.tolist(),
-            "type_ii": float(report.reserve.type_ii),
-            "clearances": report.reserve.joints.tolist(),
-            "reserve": float(report.reserve.least),
+            **picked(report.reserve, "type_i type_ii clearances=joints reserve=least"),
             "passive_joints": [vars(joint) for joint in report.passive],
-            "jacobian": report.jacobian.matrix.tolist(),
-            "condition_number": report.jacobian.condition,
+            **picked(report.jacobian, "jacobian=matrix condition_number=condition"),
             "condition_radius": report.jacobian.radius,
         },
         "singular_orientations": None if orientations is None else orientations.singular.tolist(),
-        "reach": None
-        if report.volume is None
-        else {
-            "volume": report.volume.volume,
-            "standard_error": report.volume.standard_error,
-            "unit": report.volume.unit,
-            "samples": report.volume.count,
-            "box": report.volume.box.tolist(),
-        },
+        "reach": volume and picked(volume, "volume standard_error unit samples=count box"),
         "largest_tilt": report.tilt,
         "cycle": {
             "standard": standard is not None,
             "source": report.source or None,
             "scale": None if standard is None else standard.scale,
             "duration": cycle.duration,
-            "across": None if standard is None else standard.across.tolist(),
-            "up": None if standard is None else standard.up.tolist(),
-            "turn": None if standard is None else standard.turn,
-            "time": cycle.time.tolist(),
-            "pose": cycle.pose.tolist(),
-            "velocity": cycle.velocity.tolist(),
-            "acceleration": cycle.acceleration.tolist(),
-            "forces": report.forces.tolist(),
-            "with_drives": report.driven,
-            "overloads": list(report.sizing.overloads),
-            "peak_forces": report.sizing.peak_forces.tolist(),
-            "rms_forces": report.sizing.rms_forces.tolist(),
-            "peak_speeds": report.sizing.peak_speeds.tolist(),
-            "joints": {
-                "least": ranges.least.tolist(),
-                "greatest": ranges.greatest.tolist(),
-                "limits": [None if limits is None else list(limits) for limits in ranges.limits],
-                "within": ranges.within.tolist(),
-            },
+            **(picked(standard, _WAY) if standard else dict.fromkeys(_WAY.split())),
+            **picked(cycle, "time pose velocity acceleration"),
+            **picked(report, "forces with_drives=driven"),
+            **picked(sizing, "overloads peak_forces rms_forces peak_speeds"),
+            "joints": picked(report.joints, "least greatest limits within"),
         },
-        "motors": report.sizing.table().to_dicts(),
+        "motors": sizing.table().to_dicts(),
         "base_parameters": {
             "rank": report.base.rank,
             "of": len(report.base.columns),

@@ -14,6 +14,7 @@ from scipy.stats import chi2, f  # type: ignore[import-untyped]
 from pteron.identification.estimators.covariance import noise_of
 from pteron.identification.estimators.qr import QrFactor
 from pteron.identification.observation import Observations
+from pteron.json_values import picked
 from pteron.kernels import Array
 
 _LAGS = 20
@@ -147,27 +148,14 @@ class Estimate:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the residuals as plain data."""
-        low, high = self.intervals()
         return {
-            "method": self.method,
-            "names": list(self.names),
-            "units": list(self.units),
-            "values": self.values.tolist(),
-            "standard_deviations": self.deviations.tolist(),
-            "relative_deviations": self.relative_deviations.tolist(),
-            "intervals_95": [low.tolist(), high.tolist()],
-            "correlation": self.correlation.tolist(),
-            "noise": self.noise.tolist(),
-            "residuals": {
-                "white": self.whiteness.white,
-                "autocorrelation": self.whiteness.autocorrelation.tolist(),
-                "p_values": self.whiteness.p_values.tolist(),
-                "correlated": self.correlated,
-            },
-            "condition_number": self.condition,
-            "equations": self.rows,
-            "iterations": self.iterations,
-            "converged": self.converged,
+            **picked(self, "method names units values standard_deviations=deviations"),
+            **picked(self, "relative_deviations"),
+            "intervals_95": [end.tolist() for end in self.intervals()],
+            **picked(self, "correlation noise"),
+            "residuals": picked(self.whiteness, "white autocorrelation p_values")
+            | {"correlated": self.correlated},
+            **picked(self, "condition_number=condition equations=rows iterations converged"),
         }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from pteron.identification.excitation.motion_files import motion_paths, write_mo
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.excitation.search_program import Criterion
 from pteron.identification.logs import Description, write_description
+from pteron.json_values import picked
 from pteron.kinematics import assembly_mode
 from pteron.tables import write_table
 
@@ -210,25 +211,15 @@ class Excitation:
         motion = self.motion
         return {
             "robot": motion.robot.name,
-            "criterion": self.criterion,
-            "seed": self.seed,
-            "seconds": self.seconds,
-            "interrupted": self.interrupted,
-            "conditioning": asdict(self.conditioning),
-            "random": asdict(self.random),
-            "draws": self.draws,
-            "gain": self.gain,
-            "limits": asdict(self.limits),
-            "margins": [asdict(margin) for margin in self.margins],
-            "starts": [asdict(start) for start in self.starts],
+            **picked(self, "criterion seed seconds interrupted conditioning random draws gain"),
+            **picked(self, "limits"),
+            **picked(self.margins, "margins=each"),
+            **picked(self, "starts"),
             "motion": {
-                "space": motion.space,
-                "period": motion.period,
+                **picked(motion, "space period"),
                 "lead": self.lead._asdict(),
                 "assembly_mode": _mode_of(motion),
-                "center": motion.center.tolist(),
-                "cosines": motion.cosines.tolist(),
-                "sines": motion.sines.tolist(),
+                **picked(motion, "center cosines sines"),
             },
         }
 

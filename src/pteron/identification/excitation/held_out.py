@@ -14,6 +14,7 @@ from pteron.identification.excitation.margins import Margins, margins
 from pteron.identification.excitation.movement import FullMotion, motion_of_platform
 from pteron.identification.excitation.random_motions import is_clear, sizes
 from pteron.identification.signals.states import home
+from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import pick_and_place
@@ -86,15 +87,8 @@ class RepeatedCycle:
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the machine as plain data."""
         cycle = self.cycle
-        return {
-            "count": self.count,
-            "length": self.length,
-            "scale": cycle.scale,
-            "around": cycle.around.tolist(),
-            "across": cycle.across.tolist(),
-            "up": cycle.up.tolist(),
-            "turn": cycle.scale * cycle.turn,
-        }
+        more = picked(cycle, "scale around across up") | {"turn": cycle.scale * cycle.turn}
+        return picked(self, "count length") | more
 
 
 def held_out_cycle(

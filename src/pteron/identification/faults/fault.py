@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pteron.json_values import picked
 from pteron.kernels import Array
 
 FaultName = Literal[
@@ -121,16 +122,10 @@ class IsolatedFault:
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {
-            "fault": self.fault,
-            "message": self.message,
-            "labels": list(self.labels),
-            "sizes": self.sizes.tolist(),
-            "standard_deviations": self.deviations.tolist(),
-            "chance": self.chance,
-            "shift": self.shift,
-            "matters": self.matters,
+            **picked(self, "fault message labels sizes standard_deviations=deviations chance"),
+            **picked(self, "shift matters"),
             "cycle_percent": [None if np.isnan(v) else float(v) for v in self.cycle],
-            "speeds": None if self.speeds is None else self.speeds.tolist(),
+            **picked(self, "speeds"),
         }
 
     def _sentence(self) -> str:

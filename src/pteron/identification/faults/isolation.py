@@ -28,6 +28,7 @@ from pteron.identification.signals import (
     samples,
 )
 from pteron.identification.signals.preprocessing import LATEST
+from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
 
@@ -97,11 +98,7 @@ class FaultIsolation:
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.off}
-        return {
-            "tried": list(self.tried),
-            "why_not": self.why_not,
-            "cannot_be_told": list(self.hidden),
-            "faults": [one.as_dict() for one in self.faults],
+        return picked(self, "tried why_not cannot_be_told=hidden faults") | {
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
                 for name, values in shares.items()
