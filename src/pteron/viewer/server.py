@@ -50,15 +50,15 @@ def serve(host: str, port: int, label: str) -> viser.ViserServer:
     ModelError
         If viser is not installed, or is a version that cannot be closed to foreign pages.
     """
-    viser = of_extra("viewer", "viser", "the viewer needs viser")
+    package = of_extra("viewer", "viser", "the viewer needs viser")
     free = free_port(host, port)
     logging.getLogger("websockets.server").addFilter(_worth_telling)
     with _quiet(), guarded(host) as guards:
-        server = viser.ViserServer(host=host, port=free, label=label, verbose=False)
+        server: viser.ViserServer = package.ViserServer(host=host, port=free, label=label, verbose=False)
     if not guards:
         stop(server)
         raise ModelError(
-            f"viser {viser.__version__} gives no hold to keep foreign pages out, so the viewer is "
+            f"viser {package.__version__} gives no hold to keep foreign pages out, so the viewer is "
             'not opened; pip install "viser==1.1.1"'
         )
     # Any page that a browser shows could ask for a tunnel to the world; there is to be none.
