@@ -54,12 +54,14 @@ def serve(host: str, port: int, label: str) -> viser.ViserServer:
     free = free_port(host, port)
     logging.getLogger("websockets.server").addFilter(_worth_telling)
     with _quiet(), guarded(host) as guards:
-        server: viser.ViserServer = package.ViserServer(host=host, port=free, label=label, verbose=False)
+        server: viser.ViserServer = package.ViserServer(
+            host=host, port=free, label=label, verbose=False
+        )
     if not guards:
         stop(server)
         raise ModelError(
-            f"viser {package.__version__} gives no hold to keep foreign pages out, so the viewer is "
-            'not opened; pip install "viser==1.1.1"'
+            f"viser {package.__version__} gives no hold to keep foreign pages out, so the viewer "
+            'is not opened; pip install "viser==1.1.1"'
         )
     # Any page that a browser shows could ask for a tunnel to the world; there is to be none.
     refused: Any = server
