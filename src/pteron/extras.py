@@ -7,14 +7,15 @@ import sys
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-from pteron.errors import ModelError, PteronError
+if TYPE_CHECKING:
+    from pteron.errors import PteronError
 
 
-def of_extra(extra: str, module: str, need: str, error: type[PteronError] = ModelError) -> Any:
+def of_extra(extra: str, module: str, need: str, error: type[PteronError] | None = None) -> Any:
     """Return a module that an extra brings, or say how to install it.
 
     Parameters
@@ -25,14 +26,17 @@ def of_extra(extra: str, module: str, need: str, error: type[PteronError] = Mode
         The module's name, with its packages.
     need : str
         Who needs what, as the message begins: "the viewer needs viser".
-    error : type of PteronError
-        The error that is raised.
+    error : type of PteronError, optional
+        The error that is raised, by default `ModelError`.
     """
     try:
         return import_module(module)
     except ImportError:
+        # Where nothing of Pteron is installed, this file still runs for its command.
+        from pteron.errors import ModelError
+
         told = f"{need}, which is not installed; {install_command(extra)}"
-        raise error(told) from None
+        raise (error or ModelError)(told) from None
 
 
 def install_command(extra: str) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from importlib.resources import files
+from tomllib import loads
 
 from pteron.equations.control import MEMORY
 from pteron.export.command_units import NAMES, Output, told_meaning
@@ -11,38 +13,7 @@ from pteron.kernels import Port
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import has_readings
 
-SUMMARIES = {
-    "inverse_kinematics": "Joint coordinates of a pose.",
-    "direct_kinematics": "Every pose that the joint coordinates allow, one a row; NaN where it is "
-    "not real or not in reach.",
-    "closure_poses": "Every pose that the joint coordinates allow, one a row, in reach or not.",
-    "direct_step": "The pose of the joint coordinates next to a given one, such as the last one "
-    "of a motion, by Newton's method; NaN where it does not converge, or comes to another side of "
-    "the singularities: the type-II measure has another sign, or a leg is bent the other way.",
-    "jacobian": "Jacobian: joint rates = J velocity.",
-    "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
-    "forward_dynamics": "Acceleration of the platform under actuator forces; no friction.",
-    "drive_forces": "What the drives must give: actuator forces, friction by the sign of the "
-    "joint's rate, the motors' inertia.",
-    "feed_forward": "What the drives must give: actuator forces, friction, which is smooth where a "
-    "joint rests, the motors' inertia.",
-    "joint_feed_forward": "What the drives must give, as feed_forward, from the motion of the "
-    "joints: also the pose that they have, for the next call to begin with; NaN where Newton's "
-    "method does not lead there from the pose given, such as the last one.",
-    "drive_accelerations": "Acceleration of the platform under what the drives give, friction and "
-    "the motors' inertia included.",
-    "regressor": "Regressor: actuator forces = regressor parameters.",
-    "pd_gravity": "PD control with gravity compensation at the measured pose: what the drives are "
-    "to give until the next sample.",
-    "feed_forward_pd": "Feed-forward of the wanted motion, plus PD control: what the drives are to "
-    "give until the next sample.",
-    "computed_torque": "Computed torque: what the drives are to give until the next sample so that "
-    "the joints' errors go as the gains say.",
-    "adaptive": "Slotine and Li's adaptive control in base parameters: what the drives are to give "
-    "until the next sample, and what is learnt at this one.",
-    "adaptive_drives": "Slotine and Li's adaptive control in base parameters and in those of the "
-    "drives: what the drives are to give until the next sample, and what is learnt at this one.",
-}
+SUMMARIES = loads((files("pteron.export") / "summaries.toml").read_text(encoding="utf-8"))
 """Summaries of functions; the others have that of the library's function of the same name."""
 
 MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
