@@ -68,6 +68,22 @@ def write_files(files: Mapping[Path, bytes]) -> list[Path]:
     return list(written)
 
 
+def checked_file(path: str | Path, example: str = "") -> Path:
+    """Return a path after a check, before the work begins, that a file may be there.
+
+    Raises
+    ------
+    OutputError
+        If it is a folder, or its folder is missing.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise OutputError(f"{path}: is a folder; name a file in it{example}")
+    if not target.parent.is_dir():
+        raise OutputError(f"{path}: there is no folder {target.parent}; make it first")
+    return target
+
+
 def make_folder(path: str | Path) -> Path:
     """Return the folder `path`, made if it is missing, after a check that it can be written.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from typer import Option
 
+from pteron.atomic import checked_file
 from pteron.cli.arguments import load_robot
 from pteron.cli.certify import Proofs
 from pteron.cli.completion import indices
@@ -194,7 +195,7 @@ def _checked_out(out: str | None) -> str:
     """Return the ending of a file after a check, before the work begins, that it can be written."""
     if out is None:
         return ""
-    target, ending = Path(out), Path(out).suffix.lower()
+    ending = Path(out).suffix.lower()
     if ending in _FILMS:
         from pteron.plots.films import checked_film
 
@@ -206,10 +207,8 @@ def _checked_out(out: str | None) -> str:
     elif ending not in _PICTURES:
         every = " ".join((*_PICTURES, *_DATA, *_SURFACES, *_FILMS))
         raise OutputError(f"{out}: {ending or 'no'} ending; give one of {every}")
-    elif target.is_dir():
-        raise OutputError(f"{out}: is a folder; name a file in it")
-    elif not target.parent.is_dir():
-        raise OutputError(f"{out}: there is no folder {target.parent}; make it first")
+    else:
+        checked_file(out)
     return ending
 
 

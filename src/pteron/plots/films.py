@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.atomic import write_bytes
+from pteron.atomic import checked_file, write_bytes
 from pteron.errors import DataError, OutputError, shown
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -213,13 +213,9 @@ def checked_film(path: str | Path) -> Path:
     PteronError
         If what writes such files is not there.
     """
-    target = Path(path)
-    if target.is_dir():
-        raise OutputError(f"{path}: is a folder; name a file in it, such as cycle.mp4")
+    target = checked_file(path, ", such as cycle.mp4")
     if target.suffix.lower() not in ENCODERS:
         raise OutputError(f"{path}: {target.suffix or 'no'} ending, .mp4 or .gif expected")
-    if not target.parent.is_dir():
-        raise OutputError(f"{path}: there is no folder {target.parent}; make it first")
     checked_encoder(target)
     return target
 

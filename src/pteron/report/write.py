@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.atomic import write_text, write_texts
+from pteron.atomic import checked_file, write_text, write_texts
 from pteron.errors import OutputError, shown
 from pteron.json_values import picked
 from pteron.manipulator import RobotLike, as_manipulator
@@ -132,10 +132,7 @@ def checked_page(path: str | Path) -> Path:
             f"{shown(str(path), bare=True) or 'the name is empty'}: a page is written, whose name "
             "ends in .html"
         )
-    if target.is_dir():
-        raise OutputError(f"{target}: is a folder; name a file in it")
-    if not target.parent.is_dir():
-        raise OutputError(f"{target}: there is no folder {target.parent}; make it first")
+    checked_file(target)
     try:
         with tempfile.TemporaryFile(dir=target.parent):
             return target

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import polars as pl
 
-from pteron.atomic import write_bytes
+from pteron.atomic import checked_file, write_bytes
 from pteron.errors import DataError, OutputError, shown
 from pteron.tables.csv_file import CsvFile
 from pteron.tables.dialect import PLAIN, Dialect
@@ -151,13 +151,9 @@ def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
         If its ending is unknown, its folder is missing, or it is a folder; if a dialect is given
         for a file that has none.
     """
-    file = Path(path)
-    if file.is_dir():
-        raise OutputError(f"{path}: is a folder; name a file in it")
+    file = checked_file(path)
     if file.suffix.lower() not in ENDINGS:
         raise OutputError(f"{path}: {_unknown(file, 'table')}")
-    if not file.parent.is_dir():
-        raise OutputError(f"{path}: there is no folder {file.parent}; make it first")
     if dialect is not None and file.suffix.lower() != ".csv":
         raise OutputError(f"{path}: only a CSV file has a separator and a decimal sign")
     return file
