@@ -13,6 +13,7 @@ from pteron.cli.pose_ranges import pose_ranges, pose_text, span_text
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, percent, plain, show, show_json, table
 from pteron.errors import DataError, ModelError
+from pteron.json_values import picked
 
 if TYPE_CHECKING:
     from pteron.kernels import Array
@@ -195,16 +196,12 @@ def _certified(
         "robot": robot.name,
         "held": _angles(robot, pose),
         "floors": floors,
-        "inner": found.inner_volume,
-        "outer": found.outer_volume,
-        "unit": found.unit,
+        **picked(found, "inner=inner_volume outer=outer_volume unit"),
         "gap": found.gap if found.inner_volume else None,
         "complete": found.complete,
         "boxes": {"inner": len(found.inner), "undecided": len(found.boundary)},
         "boundary": shares,
-        "cube": None
-        if cube is None
-        else {"edge": cube.edge, "center": cube.center.tolist(), "proved": True},
+        "cube": cube and {**picked(cube, "edge center"), "proved": True},
     }
 
 

@@ -14,6 +14,7 @@ from pteron.cli.arguments import load_robot, signs
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import complain, note, plain, show, show_json, table, write
 from pteron.errors import ModelError, OutputError, PteronError
+from pteron.json_values import picked
 
 if TYPE_CHECKING:
     from pteron.legs import LegKind
@@ -183,14 +184,11 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     return {
         "type": leg.type,
         "joint": leg.joint.noun,
-        "axis": leg.joint_axis and list(leg.joint_axis),
+        **picked(leg, "axis=joint_axis"),
         "lengths": {q.name: q.value[0] for q in leg.quantities if q.role == "length"},
-        "elbow": leg.elbow,
-        "limits": list(leg.limits) if leg.limits else None,
-        "unit": leg.joint.unit,
-        "force_unit": leg.joint.force_unit,
-        "drive": asdict(leg.drive) if leg.drive else None,
-        "reading": asdict(leg.reading) if leg.reading else None,
+        **picked(leg, "elbow limits"),
+        **picked(leg.joint, "unit force_unit"),
+        **picked(leg, "drive reading"),
     }
 
 

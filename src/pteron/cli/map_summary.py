@@ -10,6 +10,7 @@ import rich.table
 from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
+from pteron.json_values import picked
 
 if TYPE_CHECKING:
     from pteron.maps import Map
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
 _ALIKE = 1e-9
 """Relative difference below which the best and the worst value are one."""
 
-_AXIS = ("name", "unit", "least", "greatest", "count")
+_AXIS = "name unit least greatest count"
 """Keys of an axis in the data."""
 
-_SUMMARY = ("best", "best_pose", "worst", "worst_pose", "mean", "median")
+_SUMMARY = "best best_pose worst worst_pose mean median"
 """Keys of an index in the data."""
 
 
@@ -33,18 +34,11 @@ def map_data(
     return {
         "robot": found.robot,
         "held": grid.held,
-        "varies": [{key: getattr(axis, key) for key in _AXIS} for axis in grid.axes],
+        "varies": [picked(axis, _AXIS) for axis in grid.axes],
         "poses": grid.size,
         "in_reach": found.share,
         "causes": found.causes,
-        "reach": None
-        if volume is None
-        else {
-            "box": volume.box.tolist(),
-            "volume": volume.volume,
-            "standard_error": volume.standard_error,
-            "unit": volume.unit,
-        },
+        "reach": volume and picked(volume, "box volume standard_error unit"),
         "indices": [_index_data(found, index.name) for index in found.indices],
         "warnings": warnings,
         **({"files": [out]} if out is not None else {}),
@@ -55,15 +49,18 @@ def _index_data(found: Map, name: str) -> dict[str, Any]:
     from pteron.maps.map import ALL
 
     index = ALL[name]
-    about = {"index": name, "title": index.title, "unit": index.unit, "better": index.better}
+    about = picked(index, "index=name title unit better")
     try:
         summary = found.summary(name)
     except DataError:
         undetermined = int(found.reachable.sum())
-        return {**about, **dict.fromkeys(_SUMMARY), "poses": 0, "undetermined": undetermined}
-    values = {key: getattr(summary, key) for key in _SUMMARY}
-    poses = {key: pose.tolist() for key, pose in values.items() if key.endswith("pose")}
-    return {**about, **values, **poses, "poses": summary.count, "undetermined": summary.infinite}
+        return {
+            **about,
+            **dict.fromkeys(_SUMMARY.split()),
+            "poses": 0,
+            "undetermined": undetermined,
+        }
+    return about | picked(summary, _SUMMARY, "poses=count undetermined=infinite")
 
 
 def map_rows(data: Mapping[str, Any]) -> Any:

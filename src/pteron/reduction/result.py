@@ -14,6 +14,7 @@ from markupsafe import Markup
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.html_table import Column, html_table
+from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameters as values_of
 from pteron.reduction.certificate import Certificate, ExactCertificate
@@ -249,9 +250,7 @@ class BaseParameters:
         """Return everything as plain data, fractions as text."""
         return {
             "robot": self.robot.name,
-            "rank": self.rank,
-            "names": list(self.names),
-            "columns": list(self.columns),
+            **picked(self, "rank names columns"),
             "expressions": list(self.expressions(digits=12)),
             "grouping": self.grouping.tolist(),
             "shares": {

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.html_table import Column, html_table
+from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
@@ -231,16 +232,12 @@ class Sizing:
         turning = np.array([drive.ratio is not None for drive in self.drives])
         rms, peak = self.motor_torques
         numbers = {
-            "peak_force": self.peak_forces,
-            "rms_force": self.rms_forces,
-            "peak_speed": self.peak_speeds,
-            "rms_speed": self.rms_speeds,
-            "peak_power": self.peak_power,
-            "mean_power": self.mean_power,
-            "peak_braking": self.peak_braking,
-            "mean_braking": self.mean_braking,
-            "given_energy": self.given_energy,
-            "braked_energy": self.braked_energy,
+            **picked(
+                self,
+                "peak_force=peak_forces rms_force=rms_forces peak_speed=peak_speeds",
+                "rms_speed=rms_speeds peak_power mean_power peak_braking mean_braking",
+                "given_energy braked_energy",
+            ),
             "least_load_inertia": self.load_inertia[0],
             "greatest_load_inertia": self.load_inertia[1],
             "rotor_inertia": np.where(self.rotor_inertia > 0.0, self.rotor_inertia, np.nan),
