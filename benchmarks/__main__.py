@@ -41,7 +41,7 @@ _SCRIPTS = {
     "Nearest singular poses": "nearest_singularities.py",
     "All poses of hexapods": "direct_position.py",
     "Singular machines and poses": "singular.py",
-    "Platforms that tilt": "tilting.py",
+    "Platforms that tilt": "platforms_that_tilt.py",
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",
     "Maps of eight million poses": "maps.py",

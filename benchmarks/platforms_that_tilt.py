@@ -14,9 +14,10 @@ import os
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from measuring import Array, quick
+from measuring import States, quick
 
 import pteron
 
@@ -33,7 +34,7 @@ _FEWEST = _STATES // 2
 """States of a machine: one that reaches less of its surroundings is drawn anew."""
 
 _BOUNDS = {"loops": 1e-13, "J": 1e-10, "MuJoCo": 1e-8, "Lagrange": 1e-8, "forward": 1e-10}
-_METHODS = ("exact", "svd", "qr")
+_METHODS: tuple[Literal["exact", "svd", "qr"], ...] = ("exact", "svd", "qr")
 _COUNTS = {
     "3T3R UPS": 28,
     "3T3R PSS": 22,
@@ -103,7 +104,7 @@ def look(motion: str, kind: str, seed: int, worst: Worst) -> None:
     worst.states += len(states[0])
     compare(robot, states, worst)
     oracle, forces = lagrange.Lagrange(robot), pteron.inverse_dynamics(robot, *states)
-    back = pteron.forward_dynamics(robot, *states[:2], forces)
+    back = pteron.forward_dynamics(robot, states[0], states[1], forces)
     worst.take(
         Lagrange=relative_error(oracle.forces(*states), forces),
         J=relative_error(oracle.jacobian(states[0]), pteron.jacobian(robot, states[0])),
@@ -114,7 +115,7 @@ def look(motion: str, kind: str, seed: int, worst: Worst) -> None:
             compare(mode, tilting.states(mode, home, 10, seed), worst)
 
 
-def compare(robot: pteron.Manipulator, states: tuple[Array, ...], worst: Worst) -> None:
+def compare(robot: pteron.Manipulator, states: States, worst: Worst) -> None:
     """Compare one working mode with MuJoCo, where it reaches."""
     if not len(states[0]):
         return
