@@ -24,9 +24,9 @@ import pteron
 os.environ.setdefault("PTERON_KERNELS", "vm")  # each machine is asked a few times
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-import lagrange
-import tilting
-import trees
+import lagrange  # type: ignore[import-not-found]
+import tilting  # type: ignore[import-not-found]
+import trees  # type: ignore[import-not-found]
 from mechanisms import relative_error
 
 _MACHINES, _STATES = (1, 20) if quick() else (10, 200)
