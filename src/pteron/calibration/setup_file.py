@@ -47,7 +47,7 @@ class MeasuredTable(Table):
     """`[measured]`: how exactly."""
 
     noise: Annotated[NoiseTable, BeforeValidator(_named)] = Field(
-        NoiseTable(),
+        default_factory=NoiseTable,
         description="standard deviation: one number for all that was measured, or one by kind",
     )
 
@@ -87,11 +87,11 @@ class MeasuredLog(Table):
     """The whole file; each table may be left out."""
 
     csv: Dialect | None = None
-    measured: MeasuredTable = MeasuredTable()
+    measured: MeasuredTable = Field(default_factory=MeasuredTable)
     marks: dict[str, PlaceTable] = Field(default_factory=dict)
     planes: dict[str, PlaneTable] = Field(default_factory=dict)
     anchors: dict[str, PlaceTable] = Field(default_factory=dict)
-    instrument: InstrumentTable = InstrumentTable()
+    instrument: InstrumentTable = Field(default_factory=InstrumentTable)
 
     def setup(self) -> Setup:
         """Return what the measurements refer to."""
@@ -145,5 +145,6 @@ def joined(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
                         f"{source}: {part}.{shown(name, bare=True)}: another than in an earlier "
                         "log; make them one, or rename one"
                     )
-            whole = replace(whole, **{part: {**old, **new}})
+            changed: dict[str, Any] = {part: {**old, **new}}
+            whole = replace(whole, **changed)
     return whole
