@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import lru_cache
 
 import casadi as ca
@@ -12,6 +13,7 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import JOINED, OWN
 from pteron.equations.machine import Machine, State
 from pteron.equations.virtual_work import inverse_dynamics
+from pteron.errors import ModelError
 from pteron.kernels import Array, Port, count_operations, program
 from pteron.kernels.graph import graph_of
 from pteron.kernels.hoisting import hoisted
@@ -75,8 +77,11 @@ def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
         # The columns of a platform that tilts are too many to exchange one by one.
         tilts = robot.platform.tilts
         found.add(start if tilts else _improved(model, grouping, start, [*own, *others]))
-    best = min(found, key=lambda kept: (_final_cost(robot, kept), kept))
-    return base_parameters(robot, keep=[columns[k].name for k in best])
+    for kept in sorted(found, key=lambda kept: (_final_cost(robot, kept), kept)):
+        # Of a machine that is nearly symmetric floats may keep columns that exactness finds zero.
+        with suppress(ModelError):
+            return base_parameters(robot, keep=[columns[k].name for k in kept])
+    return base
 
 
 def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
