@@ -49,6 +49,8 @@ class RowKind(NamedTuple):
     anchor: str | None
     origin: str
     """The mark of the row that its distance is from."""
+    level: float | None = None
+    """The height of all rows over the plane, where it is the same: m."""
 
 
 def exact_rank(
@@ -133,7 +135,7 @@ class _Drawn:
     def rows(self, kind: RowKind) -> Matrix:
         """Return the rows of a random pose."""
         robot, p = self.start.robot, self.prime
-        state = self._state()
+        state = self._state(kind)
         point, moved = self._mark(kind.mark, state)
         found: Matrix = []
         own = self.geometry.frame
@@ -201,11 +203,14 @@ class _Drawn:
         ]
         return _combined(weights, apart)
 
-    def _state(self) -> _State:
+    def _state(self, kind: RowKind | None = None) -> _State:
+        """Return a random state; where the kind's heights are all the same, one at that height."""
         p, rng, robot = self.prime, self.rng, self.start.robot
         for _ in range(_ATTEMPTS):
             pose = [rng.randrange(p) for _ in range(robot.freedom)]
             try:
+                if kind is not None and kind.level is not None:
+                    pose = self._levelled(pose, kind)
                 squares = evaluate(self.deltas, self.field, [self.vector, pose])[0]
                 if not all(is_square(delta, p) for delta in squares):
                     continue
@@ -214,6 +219,31 @@ class _Drawn:
             except (NoSquareRoot, ZeroDivisionError):
                 continue
         raise ZeroDivisionError
+
+    def _levelled(self, pose: list[int], kind: RowKind) -> list[int]:
+        """Return a pose moved along one of its lengths to the height that all rows have."""
+        robot, p = self.start.robot, self.prime
+        plane = self.start.planes[kind.plane]
+        lengths = robot.platform.directions @ plane[:3]
+        if not len(lengths):
+            return pose
+        own = [name in "xyz" for name in robot.coordinates]
+        along = self._numbers(lengths)
+        at = int(np.abs(lengths).argmax())
+        values = evaluate(self.program, self.field, [self.vector, pose])
+        place, turned = values[4], [[values[5][3 * i + j] for j in range(3)] for i in range(3)]
+        if not robot.platform.tilts:
+            _, turned, place = self._turning(pose)
+        mark = self._numbers(self.start.marks[kind.mark])
+        arm = [sum(a * b for a, b in zip(row, mark, strict=True)) for row in turned]
+        normal = self._numbers(self.geometry.frame @ plane[:3])
+        point = (a + b for a, b in zip(place, arm, strict=True))
+        height = sum(a * b for a, b in zip(normal, point, strict=True))
+        (wanted,) = self._numbers(np.array([plane[3] + (kind.level or 0.0)]))
+        moved = list(pose)
+        number = [k for k, length in enumerate(own) if length][at]
+        moved[number] = (pose[number] + (wanted - height) * pow(along[at], -1, p)) % p
+        return moved
 
     def _solved(self, pose: list[int], values: list[list[int]]) -> _State:
         p, robot = self.prime, self.start.robot

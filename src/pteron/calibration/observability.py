@@ -100,7 +100,11 @@ def observability_of(
     sizes, axes = _spectrum(slopes, count)
     relative = sizes / max(float(sizes[0]), 1e-300)
     here = int((relative > _ROUNDING).sum())
-    kinds = tuple(sorted({_kind(given, i) for i in range(len(given))}, key=repr))
+    levels = {
+        name: np.unique(given.heights[[plane == name for plane in given.planes]])
+        for name in set(given.planes)
+    }
+    kinds = tuple(sorted({_kind(given, i, levels) for i in range(len(given))}, key=repr))
     rank, primes, rows = exact_rank(start, blocks, kinds, seed)
     unknowns = [unknown for block in blocks for unknown in block.unknowns]
     tolerances = np.array([u.tolerance if np.isfinite(u.tolerance) else 1.0 for u in unknowns])
@@ -132,7 +136,7 @@ def _spectrum(slopes: Array, count: int) -> tuple[Array, Array]:
     return sizes, axes
 
 
-def _kind(given: Measurements, i: int) -> RowKind:
+def _kind(given: Measurements, i: int, levels: dict[str, Array]) -> RowKind:
     return RowKind(
         tuple((~np.isnan(given.positions[i])).tolist()),
         tuple((~np.isnan(given.angles[i])).tolist()),
@@ -142,4 +146,5 @@ def _kind(given: Measurements, i: int) -> RowKind:
         given.planes[i] if ~np.isnan(given.heights[i]) else "",
         given.anchors[i] if given.origins[i] < 0 else None,
         given.marks[given.origins[i]] if given.origins[i] >= 0 else "",
+        float(given.heights[i]) if len(levels[given.planes[i]]) == 1 else None,
     )

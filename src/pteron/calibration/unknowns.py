@@ -24,6 +24,8 @@ TOLERANCES: dict[str, float] = {
     "zeros, rad": 0.0087,
     "scales": 1e-3,
     "tool": 1e-3,
+    "radius": 1e-3,
+    "angles": 0.0035,
 }
 """Ordinary tolerances, as standard deviations about the drawing: 1 mm, 0.2 degrees; zeros of 2 mm
 and 0.5 degrees; 0.1 % of scale."""
@@ -126,9 +128,8 @@ def _default(measured: Measurements) -> list[str]:
 
 
 def _tolerance(name: str, group: str, unit: str, given: Mapping[str, float]) -> float:
-    ordinary = {**TOLERANCES, "radius": np.inf, "angles": np.inf}
     where = f"{group}, rad" if group == "zeros" and unit == "rad" else group
-    return float(given.get(name, given.get(where, given.get(group, ordinary[where]))))
+    return float(given.get(name, given.get(where, given.get(group, TOLERANCES[where]))))
 
 
 def _three(name: str, tolerance: float, group: str = "setup") -> list[Unknown]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess
+from pteron.calibration.variations import AXIAL
 
 Array = NDArray[np.float64]
 
@@ -145,6 +146,8 @@ def _rigid(
             if block.kind == "geometry":
                 for k, change in enumerate(block.changes):
                     leg = start.robot.legs[change.leg]
+                    if change.group in AXIAL:
+                        continue
                     if change.key == "guide_point":
                         moved = np.cross(along, leg.guide_point) if turn else along
                         part[k] = moved[change.axis or 0]
@@ -165,6 +168,9 @@ def _size(start: Guess, blocks: Sequence[Block]) -> Array:
             value = 0.0
             if block.kind == "geometry":
                 change = block.changes[k]
+                if change.group in AXIAL:
+                    found.append(_radius(start) if change.group == "radius" else 0.0)
+                    continue
                 held = getattr(start.robot.legs[change.leg], change.key)
                 if unknown.unit == "m":
                     value = held if change.axis is None else held[change.axis]
@@ -176,6 +182,11 @@ def _size(start: Guess, blocks: Sequence[Block]) -> Array:
                 value = start.scales[block.legs[k]]
             found.append(float(value))
     return np.array(found)
+
+
+def _radius(start: Guess) -> float:
+    point, axis = np.array(start.robot.legs[0].guide_point), np.array(start.robot.platform.axis)
+    return float(np.linalg.norm(np.cross(axis, point)))
 
 
 def _length(start: Guess, block: Block, k: int) -> float:
