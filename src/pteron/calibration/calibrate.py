@@ -28,6 +28,9 @@ _EVERY = 5
 _PER_VALUE = 1.5
 """Numbers measured for each that can be seen, below which every row is needed for the fit."""
 
+_TRIED_ROWS = 5000
+"""Most rows of the fit that is judged; more say little more."""
+
 _RANK_ROWS = 400
 """Rows, evenly spread, at which the singular values are taken."""
 
@@ -103,14 +106,15 @@ def calibrate(
     kept = np.ones(len(measurements), dtype=bool)
     if held_out is None and _enough(measurements, blocks):
         kept[_EVERY // 2 :: _EVERY] = False
-    judged = None
-    begin = start
+    judged = partial = None
     if held_out is not None or not kept.all():
-        rows = measurements.rows(kept)
+        fitted = np.zeros_like(kept)
+        fitted[np.flatnonzero(kept)[:: -(-int(kept.sum()) // _TRIED_ROWS)]] = True
+        rows = measurements.rows(fitted)
         partial = Fitter(rows, blocks, start, starting_poses(start, rows)).run()
         other = held_out if held_out is not None else measurements.rows(~kept)
         judged = _held_out(start, partial, blocks, other)
-    fit = Fitter(measurements, blocks, begin, poses).run()
+    fit = Fitter(measurements, blocks, start, poses).run(partial)
     slopes = _scaled_slopes(start, fit, blocks, measurements)
     shown = observability_of(start, measurements, blocks, slopes, seed)
     findings = residual_faults(fit, blocks, measurements)

@@ -33,7 +33,7 @@ _CHUNK = 4096
 """Rows at a time."""
 
 _STEPS = 30
-_SETTLED = 1e-7
+_SETTLED = 1e-4
 """Share of an interval within which a step of all unknowns ends the search."""
 
 _DOUBTED = 0.99
@@ -128,8 +128,8 @@ class Fitter:
         self.kind_of = np.array([*["position"] * 3, *["angle"] * k, "height", "distance"])
         self.readings_noise = given.setup.noise.get("readings", 0.0)
 
-    def run(self) -> Fit:
-        """Return what is found.
+    def run(self, before: Fit | None = None) -> Fit:
+        """Return what is found; another fit, as of some of the rows, may tell where to begin.
 
         Raises
         ------
@@ -142,6 +142,8 @@ class Fitter:
         kept = np.ones(len(self.given), dtype=bool)
         guess, poses = self.begin, self.begin_poses
         total = np.zeros(len(self.prior))
+        if before is not None:
+            guess, total, noise = before.guess, before.total, dict(before.noise)
         steps = 0
         for _ in range(_ROUNDS):
             guess, total, sums, taken = self._settled(guess, total, poses, noise, kept)

@@ -137,14 +137,15 @@ def _spectrum(slopes: Array, count: int) -> tuple[Array, Array]:
 
 
 def _kind(given: Measurements, i: int, levels: dict[str, Array]) -> RowKind:
+    over = bool(~np.isnan(given.heights[i]))
     return RowKind(
         tuple((~np.isnan(given.positions[i])).tolist()),
         tuple((~np.isnan(given.angles[i])).tolist()),
-        bool(~np.isnan(given.heights[i])),
+        over,
         bool(~np.isnan(given.distances[i])),
         given.marks[i],
         given.planes[i] if ~np.isnan(given.heights[i]) else "",
         given.anchors[i] if given.origins[i] < 0 else None,
         given.marks[given.origins[i]] if given.origins[i] >= 0 else "",
-        float(given.heights[i]) if len(levels[given.planes[i]]) == 1 else None,
+        float(given.heights[i]) if len(levels[given.planes[i]]) == 1 and over else None,
     )

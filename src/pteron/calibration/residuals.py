@@ -204,9 +204,11 @@ class MachineSlopes:
                     for shift in shifts:
                         found[:, :6] += shift @ matrix[self._columns[0]]
                 else:
-                    own = matrix[self._columns[self._owner], np.arange(len(self._owner))[:, None]]
-                    against = np.einsum("nvc,vc->nv", raw[:, self._owner], own)
-                    found = -by_joint[:, :, self._owner] * against[:, None, :]
+                    found = np.empty((len(at), by_joint.shape[1], len(self._owner)))
+                    for i, part in enumerate(self._columns):
+                        mine = self._owner == i
+                        against = raw[:, i] @ matrix[part][:, mine]
+                        found[:, :, mine] = -by_joint[:, :, i, None] * against[:, None]
                 slopes[:, :, block.where] = found
             elif block.kind in ("zeros", "scales"):
                 found = by_joint[:, :, list(block.legs)]

@@ -6,6 +6,7 @@ arithmetic tells what of it measurements show.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import accumulate
 
 import casadi as ca
@@ -34,8 +35,7 @@ def slopes_program(robot: RobotLike) -> Program:
 
 def slopes_kernel(robot: RobotLike) -> Adaptive:
     """Return the kernel of that function."""
-    layout = bare(robot)
-    return adaptive(_key(layout), lambda: _built(layout))
+    return _kernel(bare(robot))
 
 
 def slope_columns(robot: Manipulator) -> list[range]:
@@ -50,6 +50,11 @@ def slope_columns(robot: Manipulator) -> list[range]:
         return [range(total)] * len(sizes)
     starts = (min(start, total - most) for start in accumulate(sizes[:-1], initial=0))
     return [range(start, start + most) for start in starts]
+
+
+@lru_cache(maxsize=16)
+def _kernel(layout: Manipulator) -> Adaptive:
+    return adaptive(_key(layout), lambda: _built(layout))
 
 
 def _key(layout: Manipulator) -> tuple[str, Manipulator]:
