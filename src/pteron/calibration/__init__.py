@@ -1,7 +1,7 @@
 """Calibration of a machine's geometry from measurements, with what they cannot show said aloud.
 
-`read_measurements` reads logs, `calibrate` does all the rest; `Measurements` are its data,
-`Calibration` its result.
+`plan` chooses the poses to measure, `read_measurements` reads what was measured, and `calibrate`
+finds the geometry: a `Calibration`.
 """
 
 from pteron.calibration.calibrate import calibrate as calibrate
@@ -13,6 +13,7 @@ from pteron.calibration.measurements import (
     Setup as Setup,
 )
 from pteron.calibration.observability import Observability as Observability
+from pteron.calibration.plan import Plan as Plan, plan as plan
 from pteron.calibration.result import (
     Calibration as Calibration,
     Finding as Finding,

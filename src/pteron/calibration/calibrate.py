@@ -11,7 +11,8 @@ from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import observability_of
-from pteron.calibration.residual_faults import raw_faults, residual_faults
+from pteron.calibration.raw_faults import raw_fault
+from pteron.calibration.residual_faults import residual_faults
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Calibration, HeldOut, calibrated, values_of
 from pteron.calibration.start import placed, starting_poses
@@ -99,10 +100,10 @@ def calibrate(
     _check(robot.joint_count, measurements)
     blocks = blocks_of(robot, measurements, free, prior)
     start = Guess.drawn(robot, measurements)
+    if fault := raw_fault(measurements, blocks, start):
+        raise DataError(fault)
     poses = starting_poses(start, measurements)
     start = placed(start, measurements, poses)
-    if fault := raw_faults(start, measurements, poses):
-        raise DataError(fault)
     kept = np.ones(len(measurements), dtype=bool)
     if held_out is None and _enough(measurements, blocks):
         kept[_EVERY // 2 :: _EVERY] = False
@@ -117,7 +118,7 @@ def calibrate(
     fit = Fitter(measurements, blocks, start, poses).run(partial)
     slopes = _scaled_slopes(start, fit, blocks, measurements)
     shown = observability_of(start, measurements, blocks, slopes, seed)
-    findings = residual_faults(fit, blocks, measurements)
+    findings = residual_faults(start, fit, blocks, measurements)
     return Calibration(
         robot,
         calibrated(fit.guess),

@@ -87,6 +87,12 @@ class Fit:
     steps: int
 
 
+def _kinds(given: Measurements) -> list[str]:
+    """Return the kinds of measurements that there are."""
+    parts = given.positions, given.angles, given.heights, given.distances
+    return [kind for kind, part in zip(KINDS, parts, strict=True) if not np.isnan(part).all()]
+
+
 @dataclass
 class _Sums:
     """The normal equations of a guess."""
@@ -138,7 +144,8 @@ class Fitter:
         """
         setup = self.given.setup.noise
         noise = {kind: max(setup.get(kind, _START[kind]), _FLOOR) for kind in KINDS}
-        sought = [kind for kind in KINDS if kind not in setup]
+        seen = _kinds(self.given)
+        sought = [kind for kind in seen if kind not in setup]
         kept = np.ones(len(self.given), dtype=bool)
         guess, poses = self.begin, self.begin_poses
         total = np.zeros(len(self.prior))
@@ -153,6 +160,8 @@ class Fitter:
             scaled = sums.distances * (noise[sought[0]] / found[sought[0]] if sought else 1.0)
             limits = chi2.isf(_OUTLYING / len(kept), np.maximum(sums.measured.sum(axis=1), 1))
             fine = scaled**2 <= limits
+            if 2 * fine.sum() < len(fine):  # no rows are the faultless ones
+                fine[:] = True
             alike = all(abs(found[k] / noise[k] - 1.0) < 0.01 for k in sought)
             if alike and (fine == kept).all():
                 break
@@ -236,7 +245,7 @@ class Fitter:
             chosen = np.arange(start, min(start + _CHUNK, rows))
             at = self.slopes.rows(guess, self.given, found, chosen)
             residuals[chosen], measured[chosen] = at.residuals, at.measured
-            r, slopes = self._whitened(at, guess, noise)
+            r, slopes = self.whitened(at, guess, noise)
             squares = np.einsum("nk,nk->n", r, r)
             distances[chosen] = np.sqrt(squares)
             limit = np.sqrt(chi2.ppf(_DOUBTED, np.maximum(at.measured.sum(axis=1), 1)))
@@ -254,7 +263,7 @@ class Fitter:
             raise ValueError
         return _Sums(matrix, right, cost, found, residuals, measured, distances)
 
-    def _whitened(self, at: Rows, guess: Guess, noise: dict[str, float]) -> tuple[Array, Array]:
+    def whitened(self, at: Rows, guess: Guess, noise: dict[str, float]) -> tuple[Array, Array]:
         """Return residuals and slopes in standard deviations, independent within a row."""
         sizes = np.array([noise[kind] for kind in self.kind_of])
         if not self.readings_noise:

@@ -1,28 +1,213 @@
-"""Faults that measurements show: before a fit in what the drawing misses, after it in residuals."""
+"""Faults that residuals show after a fit: rows that do not fit, zeros that slipped, and more.
+
+Each fault would add a value to those that are sought. Its column of slopes tells, without another
+fit, by how much the squared residuals fell if it were sought too (a score test).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
-from pteron.calibration.fit import Fit
-from pteron.calibration.guess import Block, Guess
+from pteron.calibration.fit import Fit, Fitter
+from pteron.calibration.guess import Block, Guess, Unknown
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.result import Finding
 
 Array = NDArray[np.float64]
 
+_ROWS = 3000
+"""Most rows that are looked at, evenly spread."""
 
-def raw_faults(start: Guess, given: Measurements, poses: Array) -> str | None:
-    """Return what is wrong with measurements as such, or None."""
-    return None
+_CHANCE = 1e-6
+"""Probability, over the number of faults tried, of a finding without a fault."""
+
+_SHARE = 0.2
+"""Least share of the squared residuals that a fault explains."""
+
+_NOISY = 4.0
+"""Mean square along one leg's coordinate, in variances, from which on its model is doubted."""
+
+_LISTED = 8
+"""Most rows named that do not fit."""
 
 
-def residual_faults(fit: Fit, blocks: Sequence[Block], given: Measurements) -> tuple[Finding, ...]:
-    """Return the faults that residuals show."""
-    return tuple(
-        Finding("outlier", f"{given.places[i]} does not fit: {fit.distances[i]:.3g} deviations.")
-        for i in np.flatnonzero(~fit.kept)
-    )
+class _Score(NamedTuple):
+    improvement: float
+    amounts: Array
+    finding: str
+    kind: str
+    tried: int
+
+
+def residual_faults(
+    start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
+) -> tuple[Finding, ...]:
+    """Return the faults that residuals show, the one that explains most first."""
+    outliers = _outliers(fit, given)
+    scores = sorted(_scores(start, fit, blocks, given), reverse=True, key=lambda s: s.improvement)
+    scores = scores or list(_bad_leg(start, fit, blocks, given))
+    if not scores:
+        return outliers
+    best = scores[0]
+    finding = Finding(best.kind, best.finding, best.improvement)
+    return (finding,) if (~fit.kept).sum() > _LISTED else (finding, *outliers)
+
+
+def _outliers(fit: Fit, given: Measurements) -> tuple[Finding, ...]:
+    rows = np.flatnonzero(~fit.kept)
+    if not len(rows):
+        return ()
+    worst = rows[np.argsort(-fit.distances[rows])][:_LISTED]
+    named = ", ".join(f"{given.places[i]} ({_size(fit, i)})" for i in worst)
+    more = f" and {len(rows) - len(worst)} more" if len(rows) > len(worst) else ""
+    text = f"Left out, as {'they do' if len(rows) > 1 else 'it does'} not fit: {named}{more}."
+    return (Finding("outlier", text, float((fit.distances[rows] ** 2).sum())),)
+
+
+def _size(fit: Fit, row: int) -> str:
+    left = fit.residuals[row]
+    k = int(np.abs(left).argmax())
+    angle = 3 <= k < len(left) - 2
+    return f"off by {1e3 * abs(left[k]):.3g} {'mrad' if angle else 'mm'}"
+
+
+def _scores(
+    start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
+) -> Iterator[_Score]:
+    """Yield the faults that explain what noise does not."""
+    joints, names = len(start.robot.legs), start.robot.joint_names
+    count = blocks[-1].where.stop
+    whole = _extended(blocks, given, joints)
+    fitter = Fitter(given, whole, start, fit.poses)
+    chosen = np.unique(np.linspace(0, len(given) - 1, min(len(given), _ROWS)).astype(int))
+    at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
+    r, slopes = fitter.whitened(at, fit.guess, fit.noise)
+    own, more = slopes[..., :count], slopes[..., count:]
+    flat = own.reshape(-1, count)
+    covariance = np.linalg.inv(flat.T @ flat + np.diag(fitter.prior[:count]))
+    left = r - (own @ (covariance @ (flat.T @ r.reshape(-1))))
+    # Noise that was found has the fault in it: a middle row's is nearer the truth.
+    squares = np.einsum("nk,nk->n", left, left) / np.maximum(at.measured.sum(axis=1), 1)
+    variance = max(float(np.median(squares)) / 0.6, 1e-12)
+    total = float(squares.sum())
+
+    def score(columns: Array) -> tuple[float, Array]:
+        """Return how the squared residuals fall with columns (N, K, c), and their amounts."""
+        wide = columns.reshape(-1, columns.shape[-1])
+        across = flat.T @ wide
+        square = wide.T @ wide - across.T @ covariance @ across
+        right = wide.T @ left.reshape(-1)
+        size = np.sqrt(np.maximum(np.diag(wide.T @ wide), 1e-300))
+        scaled = square / np.outer(size, size)
+        inverse = np.linalg.pinv(scaled, rcond=1e-6, hermitian=True)
+        amounts = -(inverse @ (right / size)) / size
+        return float(-right @ amounts) / variance, amounts
+
+    tests: list[tuple[str, str, int, float, Array]] = []
+    later = np.arange(len(chosen))
+    for i in range(joints):
+        column = more[..., i : i + 1]
+        unit = 1e3
+        told = "mrad" if start.robot.legs[i].joint.unit == "rad" else "mm"
+        for t in range(3, len(chosen) - 3, max(1, len(chosen) // 200)):
+            found, amount = score(column * (later >= t)[:, None, None])
+            text = (
+                f"The zero of joint {i + 1} ({names[i]}) slipped by {unit * amount[0]:+.3g} {told} "
+                f"before {given.places[chosen[t]]}: home it again, and measure anew from there."
+            )
+            tests.append(("slipped zero", text, 1, found, amount))
+        steps = np.sign(np.diff(given.readings[chosen, i], prepend=given.readings[chosen[0], i]))
+        found, amount = score(column * steps[:, None, None])
+        tests.append(
+            (
+                "backlash",
+                f"Joint {i + 1} ({names[i]}) stops {2 * unit * abs(amount[0]):.3g} {told} apart by "
+                "its direction of approach: approach every pose from one side, or take up its play.",
+                1,
+                found,
+                amount,
+            )
+        )
+    times = given.times[chosen] if given.times is not None else chosen.astype(float)
+    span = np.ptp(times)
+    if span > 0.0:
+        along = (times - times.mean()) / span
+        found, amount = score(more[..., :joints] * along[:, None, None])
+        tests.append(
+            (
+                "drift",
+                "The readings drift from the first row to the last, by up to "
+                f"{1e3 * np.abs(amount).max():.3g} mm or mrad, as a machine's do that grows warm: "
+                "let it warm up, and measure quickly.",
+                joints,
+                found,
+                amount,
+            )
+        )
+    place = joints
+    for name in sorted({given.marks[i] for i in chosen}):
+        columns = more[..., place : place + 3]
+        place += 3
+        for t in range(3, len(chosen) - 3, max(1, len(chosen) // 60)):
+            found, amount = score(columns * (later >= t)[:, None, None])
+            tests.append(
+                (
+                    "moved mark",
+                    f"The mark {name or 'tool'} moved by {1e3 * np.linalg.norm(amount):.3g} mm "
+                    f"before {given.places[chosen[t]]}: fix it, and measure anew from there.",
+                    3,
+                    found,
+                    amount,
+                )
+            )
+    for kind, text, freedom, found, amount in tests:
+        limit = chi2.isf(_CHANCE / len(tests), freedom)
+        if found > limit and found * variance > _SHARE * total:
+            yield _Score(found - chi2.isf(0.5, freedom), amount, text, kind, len(tests))
+
+
+def _bad_leg(
+    start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
+) -> Iterator[_Score]:
+    """Yield the leg whose coordinate alone explains residuals that are not noise."""
+    if not set(given.setup.noise) - {"readings"}:
+        return  # noise that was found explains everything
+    names = start.robot.joint_names
+    fitter = Fitter(given, blocks, start, fit.poses)
+    kept = np.flatnonzero(fit.kept)
+    chosen = kept[np.unique(np.linspace(0, len(kept) - 1, min(len(kept), _ROWS)).astype(int))]
+    at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
+    sizes = np.array([fit.noise[kind] for kind in fitter.kind_of])
+    r, columns = at.residuals / sizes, at.by_reading / sizes[:, None]
+    along = np.einsum("nki,nk->ni", columns, r)
+    squares = along**2 / np.maximum(np.einsum("nki,nki->ni", columns, columns), 1e-300)
+    mean = squares.mean(axis=0)
+    first, second = np.argsort(-mean)[:2]
+    if mean[first] > _NOISY and mean[first] > 2.0 * mean[second]:
+        text = (
+            f"Leg {first + 1} ({names[first]}) does not move as its model says, by "
+            f"{np.sqrt(mean[first]):.2g} times the noise: look for play, bending, or joints whose "
+            "axes do not meet."
+        )
+        yield _Score(float(squares[:, first].sum()), np.zeros(1), text, "wrong model", 1)
+
+
+def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> tuple[Block, ...]:
+    """Return the blocks with a zero for each joint and every mark once more."""
+    start = blocks[-1].where.stop
+    zeros = tuple(Unknown("", "zeros", "", np.inf) for _ in range(joints))
+    found = [
+        *blocks,
+        Block("zeros", "", slice(start, start + joints), zeros, (), tuple(range(joints))),
+    ]
+    start += joints
+    for name in sorted(set(given.marks)):
+        where = slice(start, start + 3)
+        found.append(Block("mark", name, where, (Unknown("", "tool", "m", np.inf),) * 3))
+        start += 3
+    return tuple(found)

@@ -192,7 +192,7 @@ class MachineSlopes:
         by_joint = np.swapaxes(
             _solved(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
         )
-        slopes = np.zeros((len(at), len(moves[0]) if len(moves) else 0, self.count))
+        slopes = np.zeros((*moves.shape[:2], self.count))
         matrix = slope_matrix(robot, self._changes, self._terms, geometry)
         for block in self.blocks:
             if block.kind == "geometry":

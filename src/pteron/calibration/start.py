@@ -54,7 +54,8 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
     poses = slopes.poses(guess, joints, begin)
     told = seen.all(axis=-1) & given.setup.frame_known & ~np.isnan(places).any(axis=-1)
-    sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
+    with np.errstate(invalid="ignore"):  # of a pose that was not found
+        sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
     far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
     other = np.isnan(poses).any(axis=-1)
     other |= np.where(told, far.any(axis=-1), sides != side)

@@ -1,0 +1,163 @@
+"""Faults of measurements that the drawing shows before any fit: units, order, frame, marks.
+
+What is measured lies within noise and tolerances of what the machine as drawn would give; where it
+does not, each likely mistake is undone, to see if it then does.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations, permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.calibration.guess import Block, Guess
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.residuals import MachineSlopes
+from pteron.calibration.start import placed, starting_poses
+from pteron.errors import DataError, UnlikelyValue
+
+Array = NDArray[np.float64]
+
+_FAR = 25.0
+"""Squared residuals of a middle row, in variances of noise and tolerances, that ask for a fault."""
+
+_NEAR = 9.0
+"""The same that a fault leaves which explains it."""
+
+_ROWS = 60
+"""Rows looked at, evenly spread."""
+
+_NOISE = 1e-4
+"""Noise assumed, m and rad: small beside what tolerances do."""
+
+
+def raw_fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> str | None:
+    """Return the mistake that explains measurements which the drawing cannot; else None."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
+        return _fault(given, blocks, robot_guess)
+
+
+def _fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> str | None:
+    some = np.zeros(len(given), dtype=bool)
+    some[np.unique(np.linspace(0, len(given) - 1, min(len(given), _ROWS)).astype(int))] = True
+    rows = given.rows(some)
+    now = _misfit(rows, blocks, robot_guess)
+    if now < _FAR:
+        return None
+    found = []
+    for text, mended in _mistakes(rows, robot_guess):
+        left = _misfit(mended, blocks, robot_guess)
+        if left < _NEAR and left < 0.1 * now:
+            found.append((left, text))
+    return min(found)[1] if found else None
+
+
+def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
+    """Return a middle row's squared residuals over their number, in variances; inf: no pose."""
+    try:
+        poses = starting_poses(guess, rows)
+    except DataError:
+        return np.inf
+    start = placed(guess, rows, poses)
+    slopes = MachineSlopes(guess.robot, blocks)
+    at = slopes.rows(start, rows, poses, np.arange(len(rows)))
+    tolerances = np.array([min(u.tolerance, 1.0) for block in blocks for u in block.unknowns])
+    scaled = at.slopes * tolerances
+    width = at.residuals.shape[1]
+    covariance = scaled @ np.swapaxes(scaled, -1, -2) + _NOISE**2 * np.eye(width)
+    whitened = np.linalg.solve(covariance, at.residuals[..., None])[..., 0]
+    squares = np.einsum("nk,nk->n", at.residuals, whitened)
+    counts = np.maximum(at.measured.sum(axis=1), 1)
+    return float(np.median(squares / counts))
+
+
+def _mistakes(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield likely mistakes, and the measurements with each of them undone."""
+    setup = given.setup
+    linear = np.array([leg.joint.unit == "m" for leg in guess.robot.legs])
+    for factor, text in ((1e-3, "in millimetres"), (1e3, "1000 times too small, as of km for m")):
+        if not np.isnan(given.positions).all():
+            yield (
+                f"the positions are {text}: give them in metres",
+                replace(given, positions=factor * given.positions),
+            )
+        if not np.isnan(given.heights).all():
+            yield (
+                f"the heights are {text}: give them in metres",
+                replace(given, heights=factor * given.heights),
+            )
+        if not np.isnan(given.distances).all():
+            yield (
+                f"the distances are {text}: give them in metres",
+                replace(given, distances=factor * given.distances),
+            )
+        if linear.any():
+            yield (
+                f"the readings are {text}: give them in metres",
+                replace(given, readings=np.where(linear, factor, 1.0) * given.readings),
+            )
+        kinds = given.positions, given.heights, given.distances
+        if sum(not np.isnan(kind).all() for kind in kinds) + linear.any() < 2:
+            continue
+        yield (
+            f"all lengths are {text}: give them in metres",
+            replace(
+                given,
+                readings=np.where(linear, factor, 1.0) * given.readings,
+                positions=factor * given.positions,
+                heights=factor * given.heights,
+                distances=factor * given.distances,
+            ),
+        )
+    if not linear.all():
+        read = np.where(linear, given.readings, np.radians(given.readings))
+        yield "the readings are in degrees: give them in radians", replace(given, readings=read)
+    if not np.isnan(given.angles).all():
+        yield (
+            "the measured angles are in degrees: give them in radians",
+            replace(given, angles=np.radians(given.angles)),
+        )
+    names = guess.robot.joint_names
+    for i, j in combinations(range(len(names)), 2):
+        order = list(range(len(names)))
+        order[i], order[j] = j, i
+        yield (
+            f"the readings of legs {i + 1} and {j + 1} ({names[i]} and {names[j]}) are swapped: "
+            "exchange the columns",
+            replace(given, readings=given.readings[:, order]),
+        )
+    if setup.frame_known and not np.isnan(given.positions).all():
+        for turn in _quarter_turns():
+            # Rows of `turn` say where the instrument's x, y and z point.
+            told = ", ".join(
+                f"{'xyz'[k]} along {'-' if row.sum() < 0 else ''}{'xyz'[int(np.abs(row).argmax())]}"
+                for k, row in enumerate(turn)
+            )
+            if np.isnan(given.positions).any():
+                continue
+            yield (
+                f"the instrument's frame is turned: its {told} of the base; turn the positions, or "
+                'say [instrument] frame = "unknown"',
+                replace(given, positions=given.positions @ turn),
+            )
+    used = sorted(set(given.marks))
+    for a, b in combinations(used, 2):
+        other = {a: b, b: a}
+        yield (
+            f"the marks {a or 'tool'} and {b or 'tool'} are swapped: exchange their names",
+            replace(given, marks=tuple(other.get(name, name) for name in given.marks)),
+        )
+
+
+def _quarter_turns() -> Iterator[Array]:
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            turn = np.zeros((3, 3))
+            turn[range(3), order] = signs
+            if np.linalg.det(turn) > 0.0 and not np.array_equal(turn, np.eye(3)):
+                yield turn
