@@ -12,6 +12,7 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import chi2
@@ -22,6 +23,9 @@ from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from calibrated import printer
 
 MACHINES = (
     *("quadrupteron", "quadrupteron-oblique", "tripteron", "delta", "linear-delta", "orthoglide"),
@@ -125,22 +129,6 @@ def heights(name, repetitions):
     return np.sqrt(np.mean(np.square(held))), max(held), far / values, farther, np.mean(sideways)
 
 
-def printer(radius, arm):
-    """Return a linear Delta with upright towers at a radius, m."""
-    base, legs = pteron.load("linear-delta"), []
-    for angle, leg in zip(np.radians([210.0, 330.0, 90.0]), base.legs, strict=True):
-        x, y = np.cos(angle), np.sin(angle)
-        changes = {
-            "guide_point": (radius * x, radius * y, 0.0),
-            "slider_direction": (0.0, 0.0, 1.0),
-            "bar_direction": (-y, x, 0.0),
-            "platform_point": (0.0, 0.0, 0.0),
-        }
-        legs.append(replace(leg, lower_length=arm, elbow=-1, limits=None, **changes))
-    platform = replace(base.platform, tool=(0.0, 0.0, 0.0))
-    return replace(base, name="printer", legs=tuple(legs), platform=platform)
-
-
 def trap(seed):
     """Return rods' greatest error and the heights' rms, mm: by nine free factors, and by all.
 
@@ -153,7 +141,9 @@ def trap(seed):
     poses = np.column_stack([places, 1e-4 * rng.standard_normal(len(places))])
     joints = pteron.inverse_kinematics(printer(0.1442, 0.2881), poses)
     robot = printer(0.1447, 0.2878)
-    given = Measurements.of(robot, joints + [3e-4, -2e-4, 1e-4], heights=np.zeros(len(poses)))
+    given = Measurements.of(
+        robot, joints + np.array([3e-4, -2e-4, 1e-4]), heights=np.zeros(len(poses))
+    )
     nine = ["zeros", "lengths", "radius", "legs[1].angle", "legs[2].angle"]
     loose = dict.fromkeys(("zeros", "lengths", "radius", "angles"), 10.0)
     found = []
@@ -170,15 +160,15 @@ if __name__ == "__main__":
     for seed in range(6):
         (nine, fell), (own, left) = trap(seed)
         print(
-            f"trap {seed}: nine free factors, rods off by {nine:.1f} mm, heights {fell:.3f} mm rms; "
-            f"with tolerances {own:.2f} mm, {left:.3f} mm rms",
+            f"trap {seed}: nine free, rods off by {nine:.1f} mm, heights {fell:.3f} mm rms; with"
+            f"  tolerances {own:.2f} mm, {left:.3f} mm rms",
             flush=True,
         )
     for name in ("delta", "linear-delta"):
         held, worst, far, farther, sideways = heights(name, repetitions)
         print(
-            f"{name} by 30 heights: held out {held:.3f} (most {worst:.3f}) times the noise; lengths over "
-            f"3 deviations off {100 * far:.2f} %, over 5: {farther}; x and y within 95 %: "
+            f"{name} by 30 heights: held out {held:.3f} (most {worst:.3f}) times the noise; "
+            f"lengths over 3 deviations off {100 * far:.2f} %, over 5: {farther}; x and y within 95 %: "
             f"{100 * sideways:.1f} %",
             flush=True,
         )
@@ -187,8 +177,9 @@ if __name__ == "__main__":
     for name in MACHINES if "heights" not in sys.argv else ():
         ratio, cover, joint, region, spent = recovery(name, repetitions)
         covers.append(cover)
+        shares = "".join(f"{100 * share:7.1f}%" for share in (cover, joint, region))
         print(
-            f"{name:22}{ratio:12.0f}x{100 * cover:7.1f}%{100 * joint:7.1f}%{100 * region:7.1f}%{spent:8.2f}",
+            f"{name:22}{ratio:12.0f}x{shares}{spent:8.2f}",
             flush=True,
         )
     if covers:

@@ -1,0 +1,390 @@
+"""Calibration: slopes, ranks, recovery, printers' published values, faults by name, plans."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import tilting
+from calibrated import GEOMETRY, PRINTERS, measured, off_drawing, printer, tool_places
+from mechanisms import NIGHTLY
+from scipy.spatial.transform import Rotation
+
+import pteron
+from pteron.calibration import Measurements, Place, Plane, Setup, calibrate, plan
+from pteron.calibration.exact_rank import RowKind, exact_rank
+from pteron.calibration.fit import Fitter
+from pteron.calibration.guess import Guess
+from pteron.calibration.residuals import MachineSlopes
+from pteron.calibration.unknowns import blocks_of
+from pteron.errors import DataError
+
+COUNTS = {
+    "quadrupteron": 18,
+    "quadrupteron-oblique": 22,
+    "tripteron": 9,
+    "tripteron-oblique": 11,
+    "five-bar": 10,
+    "stewart": 42,
+    "delta": 24,
+    "linear-delta": 18,
+    "orthoglide": 18,
+    "par4": 40,
+    "3-rrr": 21,
+    "hexaglide": 54,
+    "hexa": 66,
+}
+"""What whole poses in known frames show."""
+
+GATE = ("quadrupteron-oblique", "delta", "five-bar", "par4")
+
+
+def poses_seen(robot, poses):
+    """Return measurements of whole poses without noise."""
+    tool = np.array(robot.platform.tool or (0.0, 0.0, 0.0))
+    joints = pteron.inverse_kinematics(robot, poses)
+    return Measurements.of(robot, joints, poses=poses, positions=tool_places(robot, poses, tool))
+
+
+def ranks(robot, given, poses):
+    """Return the exact rank of geometry and zeros, and that of singular values."""
+    blocks, start = blocks_of(robot, given, GEOMETRY), Guess.drawn(robot, given)
+    rows = MachineSlopes(robot, blocks).rows(start, given, poses, np.arange(len(poses)))
+    slopes = rows.slopes.reshape(-1, blocks[-1].where.stop)[rows.measured.reshape(-1)]
+    size = np.linalg.norm(slopes, axis=0)
+    sizes = np.linalg.svd(slopes / np.where(size > 0.0, size, 1.0), compute_uv=False)
+    # Directions of files have nine digits: what is special is met to 1e-8 of it.
+    numerical = int((sizes > 1e-7 * sizes[0]).sum())
+    level = float(given.heights[0]) if np.ptp(given.heights) == 0.0 else None
+    over = not np.isnan(given.heights[0])
+    seen = tuple((~np.isnan(given.positions[0])).tolist())
+    angles = tuple((~np.isnan(given.angles[0])).tolist())
+    kind = RowKind(seen, angles, over, False, "", "", None, "", level)
+    return exact_rank(start, blocks, [kind], 0)[0], numerical
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in GATE else pytest.param(name, marks=NIGHTLY) for name in COUNTS]
+)
+def test_whole_poses_show_as_much_as_the_literature_counts(name):
+    robot = pteron.load(name)
+    poses = pteron.random_poses(robot, 120)
+    assert ranks(robot, poses_seen(robot, poses), poses) == (COUNTS[name], COUNTS[name])
+
+
+@pytest.mark.parametrize("name", ["linear-delta", pytest.param("hexa", marks=NIGHTLY)])
+def test_a_turned_machine_shows_as_much(name):
+    robot = pteron.turned(pteron.load(name), Rotation.from_rotvec([0.3, -0.5, 0.7]).as_matrix())
+    poses = pteron.random_poses(robot, 120)
+    assert ranks(robot, poses_seen(robot, poses), poses) == (COUNTS[name], COUNTS[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "equal", "count"),
+    [("linear-delta", False, 15), ("delta", True, 20), ("delta", False, 21)],
+)
+def test_heights_over_an_unknown_plane_show_less(name, equal, count):
+    robot = pteron.load(name)
+    poses = pteron.random_poses(robot, 300)
+    if equal:
+        poses[:, 2] = pteron.workspace.home_pose(robot)[2]
+        joints = pteron.inverse_kinematics(robot, poses, on_failure="nan")
+        poses = poses[np.isfinite(joints).all(axis=1)][:150]
+    level = poses[0, 2]
+    setup = Setup(planes={"": Plane(offset=level, known=False)})
+    joints = pteron.inverse_kinematics(robot, poses)
+    given = Measurements.of(robot, joints, heights=poses[:, 2] - level, setup=setup)
+    assert ranks(robot, given, poses) == (count, count)
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        pteron.load("quadrupteron-oblique"),
+        tilting.machine("1T2R", ("PRS", "RRS", "RPS"), 3)[0],
+        pytest.param(tilting.machine("3T3R", ("UPS", "PSS", "RSS"), 5)[0], marks=NIGHTLY),
+        pytest.param(pteron.load("3-rrr"), marks=NIGHTLY),
+    ],
+    ids=lambda robot: robot.platform.motion,
+)
+@pytest.mark.parametrize("frame_known", [True, False])
+def test_slopes_are_those_of_differences(robot, frame_known):
+    count, rng = 6, np.random.default_rng(4)
+    _, _, poses, readings = off_drawing(robot, 0, count)
+    angular = robot.platform.angular
+    start = Guess.drawn(robot, Measurements.of(robot, readings))
+    slopes = MachineSlopes(robot, ())
+    poses = slopes.poses(start, readings, poses)
+    setup = Setup(
+        marks={"a": Place((0.05, 0.02, 0.03), known=False)},
+        planes={"p": Plane((0.6, 0.0, 0.8), 0.1, known=False)},
+        anchors={"w": Place((0.5, 0.4, 0.3), known=False)},
+        frame_known=frame_known,
+    )
+    origins = np.where(np.arange(count) < 3, -1, 1)
+    names = ("a",) * count, ("p",) * count, ("w",) * count, ("",) * count
+    given = Measurements(
+        readings,
+        rng.normal(size=(count, 3)),
+        poses[:, angular],
+        np.full(count, 0.2),
+        np.full(count, 0.3),
+        origins,
+        *names,
+        None,
+        setup,
+    )
+    blocks = blocks_of(robot, given, [*GEOMETRY, "scales"])
+    guess = Guess.drawn(robot, given)
+    slopes, chosen = MachineSlopes(robot, blocks), np.arange(count)
+    rows = slopes.rows(guess, given, poses, chosen)
+    step = 1e-6
+    for k in range(blocks[-1].where.stop):
+        ends = []
+        for sign in (step, -step):
+            change = np.zeros(blocks[-1].where.stop)
+            change[k] = sign
+            moved = guess.moved(blocks, change)
+            there = slopes.poses(moved, moved.joints(readings), poses)
+            ends.append(slopes.rows(moved, given, there, chosen).residuals)
+        difference = (ends[0] - ends[1]) / (2.0 * step)
+        size = 1.0 + np.abs(rows.slopes[..., k]).max()
+        assert np.abs(difference - rows.slopes[..., k]).max() < 1e-6 * size
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["quadrupteron", "stewart", *(pytest.param(n, marks=NIGHTLY) for n in ("3-rrr", "ball-table"))],
+)
+def test_a_machine_off_its_drawing_is_found(name):
+    robot = pteron.load(name)
+    _, steps, poses, readings = off_drawing(robot, 1, 100)
+    given = measured(robot, 1, 100).rows(np.arange(100) < 60)
+    result = calibrate(robot, given, free=GEOMETRY)
+    assert result.verdict.grade == "trustworthy"
+    assert result.misfit(steps) < 2.0 * len(steps)
+    deviations = np.array([value.deviation for value in result.values])
+    assert np.mean(np.abs(result.fit.total - steps) < 1.96 * deviations) > 0.8
+    held = np.arange(60, 100)
+    before, after = result.errors(poses[held])
+    assert np.nanmax(np.abs(before)) > 20.0 * np.nanmax(after)
+    # The machine that is written takes readings to where the truth is.
+    read = pteron.inverse_kinematics(result.robot, poses[held])
+    for i, leg in enumerate(result.robot.legs):
+        if leg.reading is not None:
+            read[:, i] = (read[:, i] - leg.reading.zero) / leg.reading.scale
+    missed = (read - readings[held] + np.pi) % (2.0 * np.pi) - np.pi
+    assert np.abs(missed).max() < 3e-4
+
+
+def steps_of(name, radius, arm, end_stop):
+    """Return a printer, and what its stable positions measure."""
+    data = PRINTERS[name]
+    steps = np.array(data["stable"]) / data["steps_per_mm"] / 1000.0
+    robot = printer(radius, arm)
+    readings = end_stop + np.sqrt(arm**2 - radius**2) - steps
+    heights = np.full(len(steps), data["height_mm"] / 1000.0)
+    return robot, Measurements.of(robot, readings, heights=heights)
+
+
+@pytest.mark.parametrize("name", ["flsun", "large-delta"])
+def test_six_free_values_of_a_printer_are_those_that_its_firmware_found(name):
+    radius, arm, end_stop = {"flsun": (0.14, 0.28, 0.373), "large-delta": (0.17, 0.34, 0.331)}[name]
+    robot, given = steps_of(name, radius, arm, end_stop)
+    six = ["radius", "legs[1].angle", "legs[2].angle", "zeros"]
+    loose = dict.fromkeys(("radius", "angles", "zeros"), np.inf)
+    result = calibrate(robot, given, free=six, prior=loose)
+    towers = np.array([leg.guide_point for leg in result.fit.guess.robot.legs])
+    radii = 1e3 * np.hypot(towers[:, 0], towers[:, 1])
+    angles = np.degrees(np.arctan2(towers[:, 1], towers[:, 0])) % 360.0
+    height = np.sqrt(arm**2 - radius**2) - np.sqrt(arm**2 - (1e-3 * radii) ** 2)
+    ends = 1e3 * (end_stop + height + result.fit.guess.zeros)
+    want = PRINTERS[name].get("saved") or PRINTERS[name]["our_fit"]
+    digits = 1e-4 if name == "flsun" else 5e-4  # of the second three digits are told
+    assert np.abs(radii - want.get("delta_radius", want.get("radius"))).max() < digits
+    assert np.abs(angles - want.get("angle", want.get("angles"))).max() < digits
+    assert np.abs(ends - want["position_endstop"]).max() < digits
+    rms = 1e3 * np.sqrt(np.mean(result.fit.residuals[:, 3] ** 2))
+    assert rms == pytest.approx(PRINTERS[name].get("rms_mm") or want["rms_mm"], abs=5e-5)
+
+
+def test_seven_heights_leave_rods_at_the_drawing_and_say_so():
+    result = calibrate(*steps_of("flsun", 0.14, 0.28, 0.373))
+    rods = [value for value in result.values if "lower_length" in value.name]
+    assert all(value.origin == "tolerance" for value in rods)
+    assert max(abs(value.found - 0.28) for value in rods) < 1e-3
+    assert result.observability.at_poses == 7
+    assert "No rows were left for a check" in result.verdict.reasons[0]
+
+
+def test_free_factors_without_tolerance_bend_rods_and_tolerances_hold_them():
+    rng = np.random.default_rng(4)
+    rings = ((0.0425, 6), (0.085, 9))
+    angles = [(r, 2.0 * np.pi * k / count) for r, count in rings for k in range(count)]
+    places = [(0.0, 0.0), *((r * np.cos(t), r * np.sin(t)) for r, t in angles)]
+    uneven = np.column_stack([places, 1e-4 * rng.standard_normal(16)])
+    joints = pteron.inverse_kinematics(printer(0.1442, 0.2881), uneven)
+    robot = printer(0.1447, 0.2878)
+    given = Measurements.of(robot, joints + np.array([3e-4, -2e-4, 1e-4]), heights=np.zeros(16))
+    nine = ["zeros", "lengths", "radius", "legs[1].angle", "legs[2].angle"]
+    loose = dict.fromkeys(("zeros", "lengths", "radius", "angles"), 10.0)
+    trapped, held = (
+        calibrate(robot, given, free=free, prior=prior)
+        for free, prior in ((nine, loose), (None, None))
+    )
+    off = [
+        max(abs(leg.lower_length - 0.2881) for leg in result.fit.guess.robot.legs)
+        for result in (trapped, held)
+    ]
+    rms = [np.sqrt(np.mean(result.fit.residuals[:, 3] ** 2)) for result in (trapped, held)]
+    assert off[0] > 0.018  # m
+    assert off[1] < 0.001
+    assert rms[0] < rms[1] < 1e-4  # the deviation that falls is no measure of the rods
+
+
+def faulty(given, kind):
+    """Return measurements with a fault."""
+    readings, positions = given.readings.copy(), given.positions.copy()
+    if kind == "swapped":
+        readings[:, [0, 1]] = readings[:, [1, 0]]
+    elif kind == "millimetres":
+        positions *= 1e3
+    elif kind == "turned":
+        positions = positions[:, [1, 0, 2]] * [1.0, -1.0, 1.0]
+    elif kind == "row":
+        positions[17, 0] += 5e-3
+    elif kind == "slipped":
+        readings[33:, 1] += 1e-3
+    elif kind == "backlash":
+        readings[:, 0] += 2e-4 * np.sign(np.diff(readings[:, 0], prepend=readings[0, 0]))
+    elif kind == "drift":
+        readings += np.linspace(0.0, 5e-4, len(readings))[:, None]
+    elif kind == "moved":
+        positions[33:] += [0.0, 4e-4, 3e-4]
+    return replace(given, readings=readings, positions=positions)
+
+
+@pytest.mark.parametrize("told", [True, False])
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("row", "row 18 (off by"),
+        ("slipped", "zero of joint 2 (theta2) slipped by -"),
+        ("backlash", "Joint 1 (theta1) stops 0.4"),
+        ("drift", "readings drift from the first row to the last"),
+        ("moved", "mark tool moved by 0.5"),
+    ],
+)
+def test_a_fault_that_residuals_show_is_named(kind, words, told):
+    robot = pteron.load("delta")
+    result = calibrate(robot, faulty(measured(robot, 0, 60, told), kind), free=GEOMETRY)
+    assert words in result.findings[0].text
+    assert result.verdict.grade != "trustworthy"
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("swapped", "readings of legs 1 and 2 (theta1 and theta2) are swapped"),
+        ("millimetres", "the positions are in millimetres"),
+        ("turned", "its x along -y, y along x, z along z of the base"),
+    ],
+)
+def test_a_mistake_that_the_drawing_shows_is_one_line(kind, words):
+    robot = pteron.load("delta")
+    with pytest.raises(DataError) as told:
+        calibrate(robot, faulty(measured(robot), kind), free=GEOMETRY)
+    assert words in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_swapped_marks_are_told():
+    robot = pteron.load("stewart")
+    truth, _, poses, readings = off_drawing(robot)
+    marks = {"a": (0.3, 0.0, 0.1), "b": (-0.2, 0.2, 0.1)}
+    names = tuple("ab"[i % 2] for i in range(60))
+    places = np.array(
+        [
+            tool_places(truth.robot, poses[i : i + 1], np.array(marks[n]))[0]
+            for i, n in enumerate(names)
+        ]
+    )
+    setup = Setup(marks={name: Place(at) for name, at in marks.items()})
+    given = replace(Measurements.of(robot, readings, positions=places, setup=setup), marks=names)
+    assert calibrate(robot, given, free=GEOMETRY).verdict.grade == "trustworthy"
+    other = replace(given, marks=tuple("ba"["ab".index(name)] for name in names))
+    with pytest.raises(DataError, match="marks a and b are swapped"):
+        calibrate(robot, other, free=GEOMETRY)
+
+
+def test_an_unknown_frame_and_distances_find_the_same_machine():
+    robot = pteron.load("linear-delta")
+    truth, _, poses, readings = off_drawing(robot, 2, 80)
+    turn = Rotation.from_rotvec([0.4, 1.2, -2.0])
+    places = tool_places(truth.robot, poses, truth.marks[""])
+    given = Measurements.of(
+        robot,
+        readings,
+        positions=turn.apply(places) + np.array([3.0, -1.0, 0.5]),
+        setup=Setup(noise={"position": 1e-6}, frame_known=False),
+    )
+    anchor = np.array([0.2, 0.1, -0.4])
+    bar = Setup(noise={"distance": 1e-6}, anchors={"": Place((0.19, 0.11, -0.39), known=False)})
+    lengths = Measurements.of(robot, readings, setup=bar)
+    lengths = replace(lengths, distances=np.linalg.norm(places - anchor, axis=1))
+    for seen in (given, lengths):
+        result = calibrate(robot, seen, free=["zeros", "lengths"])
+        slopes = MachineSlopes(robot, result.blocks)
+        found = slopes.poses(result.fit.guess, result.fit.guess.joints(readings), poses)
+        assert result.held_out is not None
+        assert np.ptp(np.linalg.norm(found - poses, axis=1)) < 5e-3
+        if seen is given:
+            assert any("own frame stands" in line for line in result.observability.unseen) is False
+            assert len(result.observability.unseen) == 0
+
+
+def test_readings_noise_is_carried_to_what_is_measured():
+    robot = pteron.load("five-bar")
+    _, steps, poses, readings = off_drawing(robot, 3, 60)
+    rng = np.random.default_rng(0)
+    noisy = readings + 1e-4 * rng.standard_normal(readings.shape)
+    setup = Setup(noise={"position": 1e-6, "readings": 1e-4})
+    given = Measurements.of(robot, noisy, poses=poses, setup=setup)
+    result = calibrate(robot, given, free=GEOMETRY)
+    assert result.fit.kept.all()
+    assert np.median(result.fit.distances) < 3.0
+    assert result.misfit(steps) < 3.0 * len(steps)
+
+
+@pytest.mark.parametrize("measure", ["positions", "heights", "distances"])
+def test_planned_poses_tell_more_than_random_ones_of_the_same_box(measure):
+    robot = pteron.load("linear-delta")
+    chosen = plan(robot, 20, measure, free=GEOMETRY)
+    assert chosen.region.holds(chosen.poses).all()
+    assert pteron.workspace.prove(robot, chosen.region).holds
+    assert chosen.after < chosen.before
+    assert tuple(chosen.columns()) == (*robot.coordinates, *robot.joint_names)
+    if measure == "positions":
+        low, high = chosen.region.box
+        random = np.random.default_rng(0).uniform(low, high, (20, 3))
+        volumes = []
+        for poses in (chosen.poses, random):
+            given = poses_seen(robot, poses)
+            blocks = blocks_of(robot, given, GEOMETRY)
+            setup = Setup(noise={"position": 2e-5})
+            fitter = Fitter(replace(given, setup=setup), blocks, Guess.drawn(robot, given), poses)
+            volumes.append(np.linalg.slogdet(fitter.run().covariance)[1])
+        assert volumes[0] < volumes[1] - 1.0
+
+
+def test_wrong_names_and_numbers_are_one_line():
+    robot = pteron.load("delta")
+    given = measured(robot)
+    for given_free, prior, words in (
+        (["length"], None, "'length': no group or value of this machine"),
+        (None, {"lengths": -1.0}, "lengths = -1: a standard deviation above 0 expected"),
+        ([], None, "nothing is free"),
+    ):
+        with pytest.raises(DataError, match=words):
+            calibrate(robot, given, free=given_free, prior=prior)
+    with pytest.raises(DataError, match=r"readings: shape \(60, 2\) given"):
+        calibrate(robot, replace(given, readings=given.readings[:, :2]))
