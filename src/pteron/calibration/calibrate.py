@@ -191,14 +191,14 @@ def _scaled_slopes(start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Mea
     """Return slopes at the measured poses on the machine as drawn, by noise and tolerance."""
     slopes = MachineSlopes(start.robot, blocks)
     chosen = np.unique(np.linspace(0, len(given) - 1, min(len(given), _RANK_ROWS)).astype(int))
-    at = slopes.rows(
-        start, given, slopes.poses(start, start.joints(given.readings), fit.poses), chosen
-    )
+    poses = slopes.poses(start, start.joints(given.readings), fit.poses)
+    chosen = chosen[np.isfinite(poses[chosen]).all(axis=1)]
+    at = slopes.rows(start, given, poses, chosen)
     k = given.angles.shape[1]
     kinds = [*["position"] * 3, *["angle"] * k, "height", "distance"]
     sizes = np.array([fit.noise[kind] for kind in kinds])
     tolerances = np.array([u.tolerance for block in blocks for u in block.unknowns])
     tolerances[~np.isfinite(tolerances)] = 1.0
-    more = np.sqrt(len(given) / len(chosen))
+    more = np.sqrt(len(given) / max(len(chosen), 1))
     flat = (more * at.slopes / sizes[:, None] * tolerances).reshape(-1, len(tolerances))
     return np.asarray(flat[at.measured.reshape(-1)])

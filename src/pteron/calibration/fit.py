@@ -26,8 +26,8 @@ KINDS = ("position", "angle", "height", "distance")
 _START = {"position": 1e-4, "angle": 1e-4, "height": 1e-4, "distance": 1e-4}
 """Noise that is assumed before any is found, m and rad."""
 
-_FLOOR = 1e-12
-"""Least noise: measurements without any still have rounding."""
+_FLOOR = 1e-7
+"""Least noise, m and rad: with less, rounding hides what the tolerances say of the rest."""
 
 _CHUNK = 4096
 """Rows at a time."""
