@@ -13,9 +13,10 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2  # type: ignore[import-untyped]
 
 import pteron
 from pteron.calibration import Measurements, Plane, Setup, calibrate, plan
@@ -39,7 +40,7 @@ POSES, HELD = 60, 200
 class Twin:
     """A machine off its drawing, its blocks, and poses that both reach."""
 
-    def __init__(self, name, seed, count, heights=False):
+    def __init__(self, name: str, seed: int, count: int) -> None:
         self.robot = robot = pteron.load(name)
         self.rng = np.random.default_rng(seed)
         empty = Measurements.of(robot, np.zeros((1, len(robot.legs))))
@@ -56,7 +57,7 @@ class Twin:
         good = np.isfinite(joints).all(axis=1) & (np.abs(there - poses).max(axis=1) < 0.5)
         self.poses, self.readings = poses[good][:count], readings[good][:count]
 
-    def measured(self, part):
+    def measured(self, part: slice) -> Measurements:
         """Return the measurements of some rows: whole poses with noise."""
         robot, poses = self.robot, self.poses[part]
         place, axes = self.truth.robot.platform.at(poses)
@@ -72,7 +73,7 @@ class Twin:
         return replace(given, angles=noisy, setup=Setup(noise=noise))
 
 
-def recovery(name, repetitions):
+def recovery(name: str, repetitions: int) -> tuple[Any, ...]:
     """Return ratio of the greatest errors, cover, joint cover and CPU time of one machine."""
     ratios, inside, joint, region, spent = [], [], [], [], 0.0
     for seed in range(repetitions):
@@ -95,7 +96,7 @@ def recovery(name, repetitions):
     return min(ratios), np.mean(inside), np.mean(joint), np.mean(region), spent / repetitions
 
 
-def heights(name, repetitions):
+def heights(name: str, repetitions: int) -> tuple[Any, ...]:
     """Return what 30 heights over a bed, at planned places, make of a Delta."""
     robot = pteron.load(name)
     places = plan(robot, 30, "heights", seed=1)
@@ -129,7 +130,7 @@ def heights(name, repetitions):
     return np.sqrt(np.mean(np.square(held))), max(held), far / values, farther, np.mean(sideways)
 
 
-def trap(seed):
+def trap(seed: int) -> list[tuple[float, float]]:
     """Return rods' greatest error and the heights' rms, mm: by nine free factors, and by all.
 
     A bed that is uneven by 0.1 mm is probed at 16 places. The nine have no tolerance, all have.
@@ -149,7 +150,7 @@ def trap(seed):
     found = []
     for free, prior in ((nine, loose), (None, None)):
         result = calibrate(robot, given, free=free, prior=prior)
-        rods = np.array([leg.lower_length for leg in result.fit.guess.robot.legs])
+        rods = np.array([leg.metres["lower_length"][0] for leg in result.fit.guess.robot.legs])
         heights = result.fit.residuals[:, 3]
         found.append((1e3 * np.abs(rods - 0.2881).max(), 1e3 * np.sqrt(np.mean(heights**2))))
     return found
@@ -168,8 +169,8 @@ if __name__ == "__main__":
         held, worst, far, farther, sideways = heights(name, repetitions)
         print(
             f"{name} by 30 heights: held out {held:.3f} (most {worst:.3f}) times the noise; "
-            f"lengths over 3 deviations off {100 * far:.2f} %, over 5: {farther}; x and y within 95 %: "
-            f"{100 * sideways:.1f} %",
+            f"lengths over 3 deviations off {100 * far:.2f} %, over 5: {farther}; "
+            f"x and y within 95 %: {100 * sideways:.1f} %",
             flush=True,
         )
     print(f"{'machine':22}{'error falls':>13}{'cover':>8}{'joint':>8}{'linear':>8}{'CPU s':>8}")

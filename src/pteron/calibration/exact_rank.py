@@ -82,7 +82,7 @@ def exact_rank(
 
 
 class _State(NamedTuple):
-    place: Matrix
+    place: list[int]
     turned: Matrix
     twists: Matrix
     """(6, m)."""

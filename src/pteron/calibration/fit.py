@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import chi2
+from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
+from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.calibration.guess import Block, Guess
 from pteron.calibration.measurements import Measurements
@@ -181,7 +181,12 @@ class Fitter:
         )
 
     def _settled(
-        self, guess: Guess, total: Array, poses: Array, noise: dict[str, float], kept: Array
+        self,
+        guess: Guess,
+        total: Array,
+        poses: Array,
+        noise: dict[str, float],
+        kept: NDArray[np.bool_],
     ) -> tuple[Guess, Array, _Sums, int]:
         sums = self._sums(guess, total, poses, noise, kept)
         for taken in range(1, _STEPS + 1):
@@ -212,8 +217,11 @@ class Fitter:
         return guess, total, sums, taken
 
     def cost(self, guess: Guess, total: Array, fit: Fit) -> float:
-        """Return the squared residuals, in variances, and tolerances of a guess."""
-        return self._sums(guess, total, fit.poses, fit.noise, fit.kept).cost
+        """Return the squared residuals, in variances, and tolerances of a guess; inf: no pose."""
+        try:
+            return float(self._sums(guess, total, fit.poses, fit.noise, fit.kept).cost)
+        except ValueError:
+            return float(np.inf)
 
     def _covariance(self, information: Array) -> Array:
         matrix = information + np.diag(self.prior)
@@ -226,10 +234,16 @@ class Fitter:
                 "the measurements leave open what has no tolerance: free less, or give `prior` "
                 "finite standard deviations"
             ) from None
-        return np.asarray(cho_solve(factor, np.eye(len(size)))) / np.outer(size, size)
+        inverse: Array = np.asarray(cho_solve(factor, np.eye(len(size)))) / np.outer(size, size)
+        return inverse
 
     def _sums(
-        self, guess: Guess, total: Array, poses: Array, noise: dict[str, float], kept: Array
+        self,
+        guess: Guess,
+        total: Array,
+        poses: Array,
+        noise: dict[str, float],
+        kept: NDArray[np.bool_],
     ) -> _Sums:
         count, rows = len(self.prior), len(self.given)
         width = len(self.kind_of)
@@ -278,7 +292,7 @@ class Fitter:
     def _noise(
         self,
         sums: _Sums,
-        kept: Array,
+        kept: NDArray[np.bool_],
         covariance: Array,
         guess: Guess,
         noise: dict[str, float],

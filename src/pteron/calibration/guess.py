@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.calibration.measurements import TOOL, Measurements, Place, Plane
 from pteron.calibration.variations import Variation, varied

@@ -21,7 +21,7 @@ from pteron.workspace import Box, home_pose, prove
 Array = NDArray[np.float64]
 
 Measure = Literal["poses", "positions", "heights", "distances"]
-"""What is to be measured: all coordinates, the tool's place, its height, its distance to a point."""
+"""What is to be measured: all coordinates, the tool's place, its height, or a distance to it."""
 
 Criterion = Literal["D", "worst"]
 """Least volume of the joint region of all values; or the least of the tool's greatest error."""
@@ -32,7 +32,8 @@ _CANDIDATES = 1500
 _TO_THE_EDGE = 1.0 / 3.0
 """Power of random numbers between 0 and 1 that crowds candidates towards a box's faces."""
 
-_FLOORS = {"type_i": 0.1, "type_ii": 0.05}
+_TYPE_I = 0.1
+_TYPE_II = 0.05
 """Margins to singularities that are proved: the machine is not quite as drawn."""
 
 _MOST = 20_000
@@ -211,7 +212,7 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
     for _ in range(_HALVINGS):
         share = 0.5 * (least + most)
         box = Box(tuple(center - share * sides), tuple(center + share * sides + thin))
-        if prove(robot, box, **_FLOORS, most=_MOST).holds:
+        if prove(robot, box, type_i=_TYPE_I, type_ii=_TYPE_II, most=_MOST).holds:
             least, found = share, box
         else:
             most = share
@@ -234,7 +235,7 @@ def _widened(robot: Manipulator, box: Box, sides: Array) -> Box:
                 break
             low[k], high[k] = low[k] - 0.5 * more, high[k] + 0.5 * more
             wider = Box(tuple(low), tuple(high))
-            if not prove(robot, wider, **_FLOORS, most=_MOST // 4).holds:
+            if not prove(robot, wider, type_i=_TYPE_I, type_ii=_TYPE_II, most=_MOST // 4).holds:
                 break
             box = wider
     return box

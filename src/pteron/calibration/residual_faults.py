@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, Unknown
@@ -127,7 +127,7 @@ def _scores(
             (
                 "backlash",
                 f"Joint {i + 1} ({names[i]}) stops {2 * unit * abs(amount[0]):.3g} {told} apart by "
-                "its direction of approach: approach every pose from one side, or take up its play.",
+                "its direction of approach: approach poses from one side, or take up its play.",
                 1,
                 found,
                 amount,

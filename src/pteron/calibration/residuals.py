@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.calibration.guess import Block, Guess, across
 from pteron.calibration.measurements import Measurements, length_columns
@@ -21,6 +21,7 @@ from pteron.kernels.geometry_slopes import slope_columns, slopes_kernel
 from pteron.manipulator import Manipulator
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]
 
 _STEPS = 12
 """Newton's steps to a pose; from a measured or an earlier one two or three do."""
@@ -108,7 +109,7 @@ class MachineSlopes:
         turned = (missed + np.pi) % (2.0 * np.pi) - np.pi
         return np.where(self._round, turned, missed)
 
-    def rows(self, guess: Guess, given: Measurements, poses: Array, chosen: Array) -> Rows:
+    def rows(self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers) -> Rows:
         """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
         robot, setup = guess.robot, given.setup
         place, turned, slopes, by_joint = self._platform(guess, given, poses, chosen)
@@ -169,7 +170,7 @@ class MachineSlopes:
         return Rows(residuals, rows, pushed, measured)
 
     def _platform(
-        self, guess: Guess, given: Measurements, poses: Array, chosen: Array
+        self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers
     ) -> tuple[Array, Array, Array, Array]:
         """Return P, its axes' matrix, and slopes (N, 6 + k, p) and (N, 6 + k, n).
 
@@ -221,7 +222,7 @@ class MachineSlopes:
         self,
         guess: Guess,
         given: Measurements,
-        chosen: Array,
+        chosen: Numbers,
         place: Array,
         turned: Array,
         slopes: Array,
@@ -243,7 +244,7 @@ class MachineSlopes:
         guess: Guess,
         given: Measurements,
         poses: Array,
-        chosen: Array,
+        chosen: Numbers,
         out: tuple[Array, Array, Array],
     ) -> None:
         """Fill in the residuals of angles, and their slopes against an unknown frame."""
@@ -279,7 +280,7 @@ class MachineSlopes:
         guess: Guess,
         given: Measurements,
         poses: Array,
-        chosen: Array,
+        chosen: Numbers,
         here: tuple[Array, Array, Array],
         out: tuple[Array, ...],
     ) -> None:

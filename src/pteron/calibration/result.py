@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm
+from scipy.stats import norm  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block, Guess, Unknown

@@ -59,10 +59,10 @@ def unseen_combinations(
         left = rest[1:] @ left
         lines.setdefault(text, []).append(whose)
     told_lines = []
-    for text, whose in lines.items():
-        owners = list(dict.fromkeys(filter(None, whose)))
+    for text, all_of in lines.items():
+        owners = list(dict.fromkeys(filter(None, all_of)))
         of = f", of {', '.join(owners)}" if owners else ""
-        told_lines.append(f"{text}{of} ({len(whose)})")
+        told_lines.append(f"{text}{of} ({len(all_of)})")
     names = [unknown.name for block in blocks for unknown in block.unknowns]
     return (*told_lines, *(told(row * tolerances, names) for row in _sparse(left)))
 
@@ -117,9 +117,9 @@ def _known(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Ar
                 f"leg {i}",
                 vector(**parts, **{zero: 1.0}),
             )
-    for axis in "xyz":
-        parts = {f"legs[{i + 1}].platform_point.{axis}": 1.0 for i in range(len(robot.legs))}
-        parts |= {name: 1.0 for name in place if name.endswith(f".{axis}") and _on_platform(name)}
+    for letter in "xyz":
+        parts = {f"legs[{i + 1}].platform_point.{letter}": 1.0 for i in range(len(robot.legs))}
+        parts |= {name: 1.0 for name in place if name.endswith(f".{letter}") and _on_platform(name)}
         if all(name in place for name in parts):
             text = "tool and platform points show against each other only, as P is none of them"
             yield text, "", vector(**parts)

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.errors import ModelError
 from pteron.legs import LegKind
@@ -146,9 +146,9 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
         elif change.axis is None:
             fields[change.key] = getattr(leg, change.key) + amount
         else:
-            point = list(fields.get(change.key, getattr(leg, change.key)))
-            point[change.axis] += amount
-            fields[change.key] = tuple(point)
+            moved_point = list(fields.get(change.key, getattr(leg, change.key)))
+            moved_point[change.axis] += amount
+            fields[change.key] = tuple(moved_point)
     for (i, key), turn in turns.items():
         matrix = Rotation.from_rotvec(turn).as_matrix()
         for name in turning_with(robot.legs[i], key):
