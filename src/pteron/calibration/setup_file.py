@@ -47,7 +47,7 @@ class MeasuredTable(Table):
     """`[measured]`: how exactly."""
 
     noise: Annotated[NoiseTable, BeforeValidator(_named)] = Field(
-        default_factory=NoiseTable,
+        default_factory=lambda: NoiseTable(),
         description="standard deviation: one number for all that was measured, or one by kind",
     )
 
@@ -91,7 +91,7 @@ class MeasuredLog(Table):
     marks: dict[str, PlaceTable] = Field(default_factory=dict)
     planes: dict[str, PlaneTable] = Field(default_factory=dict)
     anchors: dict[str, PlaceTable] = Field(default_factory=dict)
-    instrument: InstrumentTable = Field(default_factory=InstrumentTable)
+    instrument: InstrumentTable = Field(default_factory=lambda: InstrumentTable())
 
     def setup(self) -> Setup:
         """Return what the measurements refer to."""

@@ -53,7 +53,8 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
         at = np.flatnonzero(~robot.platform.angular)
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
     poses = slopes.poses(guess, joints, begin)
-    told = seen.all(axis=-1) & given.setup.frame_known & ~np.isnan(places).any(axis=-1)
+    whole = seen.all(axis=-1) & ~np.isnan(places).any(axis=-1)
+    told = whole if given.setup.frame_known else np.zeros_like(whole)
     with np.errstate(invalid="ignore"):  # of a pose that was not found
         sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
     far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
