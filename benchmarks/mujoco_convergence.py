@@ -6,6 +6,7 @@ to the edge of their reach in a fifth of a second. One motion is by `pteron.forw
 SciPy's DOP853, the other by MuJoCo on the exported MJCF, whose loops are held by soft constraints.
 MuJoCo shares with Pteron the bodies and where their loops close; the passive joints' motion and the
 constraint forces are its own. Its constraints pull gaps back at a rate of a fifth of 1 / step.
+Names of machines, if given, are those that move.
 """
 
 from __future__ import annotations
@@ -22,9 +23,14 @@ from scipy.integrate import solve_ivp  # type: ignore[import-untyped]
 import pteron
 from pteron.export import Tree, coordinates, mjcf, tree
 from pteron.kernels import numeric
+from pteron.legs.kind import LegKind
+from pteron.legs.ram import RamLeg
 
 MACHINES = ("quadrupteron", "delta", "par4", "five-bar")
-TILTING = ("stewart", "hexaglide", "reachy-mini", "sprint-z3", "ball-table", "wrist", "ankle")
+TILTING = (
+    *("stewart", "rubin-camera-hexapod", "rubin-m2-hexapod", "hexaglide", "hexa"),
+    *("reachy-mini", "sprint-z3", "ball-table", "wrist", "ankle"),
+)
 STEPS = (1e-3, 5e-4, 2.5e-4, 1.25e-4)
 DURATION, SAMPLE = 0.5, 0.01
 """s; errors are taken at each sample."""
@@ -33,10 +39,14 @@ LEAST_MARGIN = 0.05
 """Least margin of the reach, as a share of the sum of a leg's links."""
 
 SPEED = 0.15
-"""Standard deviation of the initial velocities, m/s and, ten times that, rad/s."""
+"""Standard deviation of the initial velocities, m/s; of angles ten times that, rad/s, or so that
+platform points further than 0.1 m from P are as fast, where a platform tilts."""
 
-RAMS = ("UPS", "RPS", "RPR")
-"""Legs that have limits: a motion ends at them."""
+LONGER = 0.3
+"""Share by which rams may be shorter and longer than in the file; a motion ends there."""
+
+MOMENT = 1e-3
+"""Between the poses, s, from which the rates at the beginning are taken."""
 
 GOAL = 1e-4
 """m or rad."""
@@ -59,8 +69,9 @@ def main() -> None:
 
     count, steps = (2, STEPS[1:3]) if quick() else (20, STEPS)
     print(f"MuJoCo {mujoco.__version__}, Runge-Kutta 4; free motion from {count} random states")
-    print(f"{'':<14}{'whole':>7}{'mean s':>8}{'step':>10}{'platform m':>12}{'rad':>9}{'gap m':>9}")
-    for name in (*MACHINES, *(TILTING[-1:] if quick() else TILTING)):
+    print(f"{'':<21}{'whole':>7}{'mean s':>8}{'step':>10}{'platform m':>12}{'rad':>9}{'gap m':>9}")
+    chosen = [name for name in sys.argv[1:] if not name.startswith("-")]
+    for name in chosen or (*MACHINES, *(TILTING[-1:] if quick() else TILTING)):
         robot = freed(pteron.load(name))
         pair = tree(robot), tree(replace(robot, gravity=(0.0, 0.0, 0.0)))
         motions = [free_motion(pair[seed % 2].robot, seed) for seed in range(count)]
@@ -70,8 +81,8 @@ def main() -> None:
         for step in steps:
             all_errors = [errors(pair[k % 2], one, step) for k, one in enumerate(motions)]
             found = np.array(all_errors).max(axis=0)
-            print(f"{name:<14}{whole:>7}{lasted.mean():>8.2f}{step:>10g}", end="")
-            print("".join(f"{x:>{n}.0e}" for x, n in zip(found, (12, 9, 9), strict=True)))
+            cells = "".join(f"{x:>{n}.0e}" for x, n in zip(found, (12, 9, 9), strict=True))
+            print(f"{name:<21}{whole:>7}{lasted.mean():>8.2f}{step:>10g}{cells}", flush=True)
             off.append(float(found[:2].max()))
             name = whole = ""
         if not off[-1] < GOAL:
@@ -81,11 +92,15 @@ def main() -> None:
 
 
 def freed(robot: pteron.Manipulator) -> pteron.Manipulator:
-    """Return the machine without drives, and without limits, which MuJoCo would keep; but rams."""
-    legs = tuple(
-        replace(leg, drive=None, limits=leg.limits if leg.type in RAMS else None)
-        for leg in robot.legs
-    )
+    """Return the machine without drives and limits, which MuJoCo would keep; rams become longer."""
+
+    def limits(leg: LegKind) -> tuple[float, float] | None:
+        if not isinstance(leg, RamLeg):
+            return None
+        shortest, longest = leg.limits
+        return (1.0 - LONGER) * shortest, (1.0 + LONGER) * longest
+
+    legs = tuple(replace(leg, drive=None, limits=limits(leg)) for leg in robot.legs)
     return replace(robot, legs=legs, platform=replace(robot.platform, limits=None))
 
 
@@ -109,10 +124,12 @@ def free_motion(robot: pteron.Manipulator, seed: int) -> Free:
     room.terminal = True  # type: ignore[attr-defined]
     while True:
         pose = pteron.random_poses(robot, 1, seed=rng, type_i=0.3, type_ii=0.1)[0]
-        if room(0.0, pose) > (LEAST_MARGIN if np.isinf(low).all() else 0.5 * LEAST_MARGIN):
+        if room(0.0, pose) > LEAST_MARGIN:
             break
     velocity = SPEED * rng.normal(size=m)
-    velocity[len(robot.platform.lengths) :] *= 10.0
+    arms = np.linalg.norm([leg.platform_point for leg in robot.legs], axis=-1)
+    arm = max(0.1, arms.mean()) if robot.platform.tilts else 0.1
+    velocity[len(robot.platform.lengths) :] /= arm
     times = np.arange(0.0, DURATION + SAMPLE / 2, SAMPLE)
     found = solve_ivp(
         rates,
@@ -133,11 +150,11 @@ def errors(opened: Tree, motion: Free, step: float) -> tuple[float, float, float
 
     model: Any = mujoco.MjModel.from_xml_string(mjcf(opened, step=step))
     data: Any = mujoco.MjData(model)
-    ahead, now, back = coordinates(
-        opened, motion.start + 1e-6 * np.array([[1.0], [0.0], [-1.0]]) * motion.velocity
-    )
-    data.qpos[:] = now
-    data.qvel[:] = (np.remainder(ahead - back + np.pi, 2.0 * np.pi) - np.pi) / 2e-6
+    instants = MOMENT * np.arange(-2.0, 3.0)[:, None]
+    rows = coordinates(opened, motion.start + instants * motion.velocity)
+    data.qpos[:] = rows[2]
+    turns = np.remainder(rows - rows[2] + np.pi, 2.0 * np.pi) - np.pi
+    data.qvel[:] = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) @ turns / (12.0 * MOMENT)
     lengths, names = len(opened.robot.platform.lengths), [j.name for j in opened.joints]
     places = [names.index(name) for name in opened.robot.coordinates]
     off, turned, gap = 0.0, 0.0, 0.0

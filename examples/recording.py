@@ -8,6 +8,7 @@ encoders 20 bits a turn (1 um on sliders), and its forces 1 % of noise.
 """
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -28,7 +29,13 @@ built = pteron.with_parameters(
     drawn, pteron.parameters(drawn) * [factors[owner] for owner in owners]
 )
 n = drawn.freedom
-coulomb, viscous, offset = 2.0 + np.arange(n), 1.0 + 0.1 * np.arange(n), 0.2 * np.arange(n)
+
+# Friction is a share of what the joints carry, whichever way the machine hangs.
+home, rest = pteron.workspace.home_pose(drawn), np.zeros(n)
+hung = [replace(drawn, gravity=tuple(pull)) for pull in 9.81 * np.eye(3)]
+load = np.sqrt(np.mean([pteron.inverse_dynamics(one, home, rest, rest) ** 2 for one in hung]))
+k = np.arange(n)
+coulomb, viscous, offset = load * np.array([0.12 + 0.06 * k, 0.06 + 0.006 * k, 0.012 * k])
 
 # The motion that it follows.
 if motion == "random":
@@ -50,4 +57,4 @@ steps = np.array([2.0 * np.pi / 2**20 if leg.joint.unit == "rad" else 1e-6 for l
 columns = dict(zip(drawn.joint_names, (np.round(joints / steps) * steps).T, strict=True))
 columns |= dict(zip(drawn.force_names, forces.T, strict=True))
 pl.DataFrame({"t": time, **columns}).write_csv(log)
-print(f"{log}: {len(time)} samples, forces up to {np.abs(forces).max():.1f}")
+print(f"{log}: {len(time)} samples, forces up to {np.abs(forces).max():.3g}")

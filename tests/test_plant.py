@@ -24,6 +24,7 @@ FOLDER = Path(__file__).parent.parent / "benchmarks" / "identification"
 FRICTION = {
     "tripteron": ((6.0, 7.0, 8.0), (4.0, 5.0, 6.0), (0.1, 0.2, 0.3)),
     "delta": ((4.0, 3.0, 5.0), (1.0, 1.5, 1.2), (0.5, -0.3, 0.0)),
+    "ball-table": ((0.015, 0.016, 0.017), (3e-3, 3.3e-3, 3.6e-3), (0.0, 1e-3, 2e-3)),
     "par4": ((0.2, 0.15, 0.25, 0.3), (0.05, 0.06, 0.04, 0.07), (0.02, -0.01, 0.0, 0.03)),
 }
 
@@ -52,7 +53,10 @@ def recorded(name, duration):
 
 @pytest.mark.parametrize(
     ("name", "duration"),
-    several([("tripteron", 2.5), ("delta", 0.5), ("par4", 0.5)], [("delta", 0.5)]),
+    several(
+        [("tripteron", 2.5), *((name, 0.5) for name in ("delta", "par4", "ball-table"))],
+        [("delta", 0.5)],
+    ),
 )
 def test_its_forces_are_those_of_the_model(name, duration):
     _, built, friction, recording = recorded(name, duration)

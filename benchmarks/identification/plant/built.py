@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import pteron
-from pteron.bodies.inertia import PointMass
+from pteron.bodies.inertia import PointMass, SpatialInertia
 
 __all__ = ["as_built"]
 
@@ -17,7 +17,8 @@ def as_built(robot: pteron.Manipulator, seed: int = 0, spread: float = 0.2) -> p
     """Return the machine with the inertia it really has: that of its drawings, off at random.
 
     Each body's mass, the coordinates of its centre of mass and its moment of inertia about that
-    centre are multiplied by factors of their own, uniform between 1 - spread and 1 + spread.
+    centre are multiplied by factors of their own, uniform between 1 - spread and 1 + spread; all
+    moments of inertia of a platform that tilts by one, so that it stays a body.
     """
     rng = np.random.default_rng(seed)
 
@@ -28,10 +29,10 @@ def as_built(robot: pteron.Manipulator, seed: int = 0, spread: float = 0.2) -> p
         if isinstance(body, PointMass):
             return PointMass(body.mass * factor())
         center = np.array(body.center_of_mass)
-        about_center = body.inertia - body.mass * float(center @ center)
+        about_center = np.array(body.inertia) - body.mass * _second_moment(body, center)
         mass, center = factor() * body.mass, center * [factor() for _ in center]
-        inertia = factor() * about_center + mass * float(center @ center)
-        return body.of_body(mass, center.tolist(), inertia)
+        inertia = factor() * about_center + mass * _second_moment(body, center)
+        return body.of_body(mass, center.tolist(), inertia.tolist())
 
     legs = tuple(
         leg.with_bodies({letter: built(body) for letter, body in leg.bodies.items()})
@@ -46,3 +47,10 @@ def as_built(robot: pteron.Manipulator, seed: int = 0, spread: float = 0.2) -> p
         ),
     )
     return replace(robot, legs=legs, platform=platform)
+
+
+def _second_moment(body: Any, center: Any) -> Any:
+    """Return the moment of inertia of a unit mass at a centre, or six where the body tilts."""
+    if isinstance(body, SpatialInertia):
+        return np.array(list(body.shares_of_point(*center).values())[4:])
+    return center @ center

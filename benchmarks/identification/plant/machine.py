@@ -190,7 +190,8 @@ class _Plant:
         m, self.at = machine.robot.freedom, actuated_coordinates(machine)
         self.guides = Guides(friction, model, data, self.at, loop_rows(machine))
         self.damping = friction.joints * joint_damping(machine) if friction.joints else None
-        self.poses = data.qpos[:m]  # a view: MuJoCo's arrays stay where they are
+        names = [joint.name for joint in machine.joints]
+        self.places = [names.index(name) for name in machine.robot.coordinates]
         self.forces = np.zeros(m)
         self.sites = [
             [data.site(f"leg{i}_{side}").id for i in range(1, m + 1)] for side in ("end", "seat")
@@ -220,7 +221,8 @@ class _Plant:
         leg, platform = (self.data.site_xpos[sites] for sites in self.sites)
         gap = float(np.linalg.norm(leg - platform, axis=-1).max())
         guides = self.guides
-        state = guides.joints, guides.rates, guides.accelerations, self.forces, self.poses
+        poses = self.data.qpos[self.places]
+        state = guides.joints, guides.rates, guides.accelerations, self.forces, poses
         joints, rates, accelerations, forces, poses = (column.copy() for column in state)
         return joints, rates, accelerations, forces, poses, gap
 

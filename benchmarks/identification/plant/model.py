@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import pteron
 from pteron.export import Tree, mjcf, tree
+from pteron.legs.ram import RamLeg
 
 __all__ = ["Array", "actuated_coordinates", "joint_damping", "loop_rows", "mujoco_model", "opened"]
 
@@ -25,8 +26,14 @@ _PARALLEL = 1.0 - 1e-12
 
 
 def opened(robot: pteron.Manipulator) -> Tree:
-    """Return the machine with its loops cut, without drives and limits: the plant has its own."""
-    legs = tuple(replace(leg, drive=None, limits=None) for leg in robot.legs)
+    """Return the machine with its loops cut, without drives: the plant has its own.
+
+    Limits are left out, but for strokes of rams, within which a motion has to stay.
+    """
+    legs = tuple(
+        replace(leg, drive=None, limits=leg.limits if isinstance(leg, RamLeg) else None)
+        for leg in robot.legs
+    )
     return tree(replace(robot, legs=legs, platform=replace(robot.platform, limits=None)))
 
 
@@ -34,15 +41,15 @@ def mujoco_model(machine: Tree, step: float) -> Any:
     """Return the model: its coordinates are the pose, what gears turn, where bars are, the legs.
 
     Each leg has three: slider, R1 and R2; or crank, and the angles of the universal joint between
-    it and its rod; or the shaft's two angles and its length. Its constraints are first the loops',
-    three rows for each leg, then three for each bar's hinge and one for each gear, then those that
-    can hold an actuated joint that sticks, which are not active.
+    it and its rod; or two angles of a shaft or a ram and its length. A crank and its link under a
+    platform that tilts are two. Its constraints are first the loops', three rows for each leg, then
+    three for each bar's hinge and one for each gear, then those that can hold an actuated joint
+    that sticks, which are not active.
 
     Parameters
     ----------
     machine : Tree
-        The machine, with its real inertia; of P-R-R-R or R-S-S legs, and a shaft that turns the
-        platform one to one.
+        The machine, with its real inertia; a shaft turns its platform one to one.
     step : float
         Step of the integration, s.
 
@@ -84,7 +91,9 @@ def loop_rows(machine: Tree) -> int:
 
 
 def joint_damping(machine: Tree) -> Array:
-    """Return C: passive joints with a unit coefficient load the coordinates with -C q'; no shaft.
+    """Return C: passive joints with a unit coefficient load the coordinates with -C q'.
+
+    It is for P-R-R-R and R-S-S legs, no shaft, and a platform that does not tilt.
 
     What is beyond the constraints is told by what is before them. R3 of a P-R-R-R leg turns at
     -theta_l', or at phi' - theta_l' about d where d is parallel to k and no R4 follows; every R4

@@ -89,8 +89,12 @@ def fourier_reference(
     """
     rng = np.random.default_rng(seed)
     spread = np.ones((robot.freedom, harmonics))
-    if robot.platform.turns:
-        spread[-1] *= 6.0  # rad for m
+    # rad for m
+    if robot.platform.tilts:
+        arms = np.linalg.norm([leg.platform_point for leg in robot.legs], axis=-1)
+        spread[robot.platform.angular] /= arms.mean()
+    elif robot.platform.turns:
+        spread[-1] *= 6.0
     a, b = rng.normal(size=(2, *spread.shape)) * spread
     center = tuple(pteron.workspace.home_pose(robot).tolist())
     time = np.linspace(0.0, period, 100 * harmonics, endpoint=False)
