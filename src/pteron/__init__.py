@@ -95,6 +95,7 @@ Leg = PRRR
 
 if TYPE_CHECKING:
     from pteron import (
+        calibration as calibration,
         controllers as controllers,
         design as design,
         environments as environments,
@@ -122,8 +123,8 @@ __version__ = "0.2.0"
 _publish(
     __name__,
     modules=(
-        *("controllers", "design", "environments", "export", "identification", "indices"),
-        *("maps", "motion", "plots", "report", "viewer", "workspace"),
+        *("calibration", "controllers", "design", "environments", "export"),
+        *("identification", "indices", "maps", "motion", "plots", "report", "viewer", "workspace"),
     ),
     later={
         "pteron.export": ("export_c", "export_st"),

@@ -24,4 +24,4 @@ from pteron.calibration.result import (
 from pteron.calibration.unknowns import TOLERANCES as TOLERANCES
 from pteron.public import publish as _publish
 
-_publish(__name__)
+_publish(__name__, checked=True)

@@ -10,7 +10,17 @@ from rich.table import Table
 
 from pteron.cli.arguments import load_robot
 from pteron.cli.progress import Times, spinner, stages
-from pteron.cli.terminal import is_terminal, note, plain, show, show_json, table, written
+from pteron.cli.terminal import (
+    GRADE_COLORS,
+    ascii_number,
+    is_terminal,
+    note,
+    plain,
+    show,
+    show_json,
+    table,
+    written,
+)
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -21,9 +31,6 @@ if TYPE_CHECKING:
 
 _NARROW = 56
 """Columns of a terminal below which tables are shortened: the page has them whole."""
-
-_COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trustworthy": "red"}
-"""Colours of the grades of a verdict."""
 
 _TERMS = ("coulomb", "viscous", "offset")
 """Terms of the model that `--without` may leave out."""
@@ -206,7 +213,7 @@ def _show(result: Identification, files: Written) -> None:
     """Print a verdict, the errors, the values, what was found in the logs, and the files."""
     verdict = result.verdict
     worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
-    color = _COLORS[verdict.grade]
+    color = GRADE_COLORS[verdict.grade]
     show(
         f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}], "
         f"held-out error up to {worst:.3g} %",
@@ -245,8 +252,10 @@ def _values(result: Identification) -> Table:
     made = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
     for row in parameter_rows(result):
-        value, half = map(_ascii, measured(row.value, row.half))
-        relative = ">999" if row.relative >= 9.995 else _ascii(significant(100.0 * row.relative, 2))
+        value, half = map(ascii_number, measured(row.value, row.half))
+        relative = (
+            ">999" if row.relative >= 9.995 else ascii_number(significant(100.0 * row.relative, 2))
+        )
         rest = () if _narrow() else (relative, row.unit)
         made.add_row(plain(row.name), value, half, *rest, marks[row.status])
     return made
@@ -254,11 +263,6 @@ def _values(result: Identification) -> Table:
 
 def _narrow() -> bool:
     return get_terminal_size().columns < _NARROW
-
-
-def _ascii(number: str) -> str:
-    """Return a number with the minus that every terminal has."""
-    return number.replace("\u2212", "-").replace("\u221e", "inf")
 
 
 def _bodies(result: Identification) -> tuple[str, ...]:

@@ -29,6 +29,14 @@ _ANY_WIDTH = 10_000
 """Columns of a table for a file or a pipe: wider than any screen."""
 
 
+GRADE_COLORS = {
+    "trustworthy": "green",
+    "usable with care": "yellow",
+    "not trustworthy": "red",
+}
+"""Colours of the grades of a verdict."""
+
+
 def is_terminal() -> bool:
     """Say whether a person reads standard output."""
     return sys.stdout.isatty()
@@ -115,6 +123,11 @@ def written(*paths: object) -> list[str]:
 def percent(share: float) -> str:
     """Return a share in percent; a small one is not rounded to zero."""
     return "under 0.1 %" if 0.0 < share < 1e-3 else f"{100.0 * share:.3g} %"
+
+
+def ascii_number(text: str) -> str:
+    """Return a typeset number with the minus that every terminal has."""
+    return text.replace("\u2212", "-").replace("\u221e", "inf")
 
 
 def note(message: str) -> None:

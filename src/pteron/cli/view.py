@@ -7,6 +7,7 @@ import sys
 import webbrowser
 from contextlib import suppress
 from threading import Event
+from typing import Any
 
 from typer import echo
 
@@ -23,6 +24,8 @@ def view(
     *,
     motion: str | None = None,
     payload: float = 0.0,
+    compare: str | None = None,
+    enlarge: float | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
     no_browser: bool = False,
@@ -39,6 +42,8 @@ def view(
     -------
     --motion CYCLE: Play adept, the standard pick-and-place cycle, or a file: a motion, a simulation
         or a log.
+    --compare ROBOT: Another machine with such legs, in grey in the same pose.
+    --enlarge TIMES: How often the compared machine's differences are taken. [default: well seen]
     --host: The address to serve at; by default this machine alone.
     --port: Its port, or the next one that is free; 0 is any.
     --no-browser: Print the address, and open no browser.
@@ -48,13 +53,15 @@ def view(
     pteron view delta
     pteron view quadrupteron --motion adept --payload 0.5
     pteron view robot.toml --motion log.csv --port 9000 --no-browser
+    pteron view calibrated/robot.toml --compare robot.toml --enlarge 50
     """
     machine = load_robot(robot, elbows)
     with spinner(f"Preparing {machine.name}"):
         from pteron.viewer import view as opened
         from pteron.viewer.guard import is_here
 
-        viewer = opened(machine, host=host, port=port, motion=motion, payload=payload)
+        shown: Any = {"motion": motion, "payload": payload, "compare": compare, "enlarge": enlarge}
+        viewer = opened(machine, host=host, port=port, **shown)
     # Ctrl-C is the usual way to end it.
     with viewer, suppress(KeyboardInterrupt):
         if port not in (0, viewer.port):

@@ -37,6 +37,9 @@ _TILT = 0.5
 _SEEN = 1000
 """Poses that tell how often limits are kept."""
 
+_PARALLEL = 1e-3
+"""Squared angle, about, between guides that count as parallel."""
+
 _SELDOM = 0.1
 """Share of poses up to which a passive joint that keeps its limits is named in a message."""
 
@@ -221,5 +224,6 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
         reach = max(reach, float(np.linalg.norm(leg.platform_point)) + bound.radius)
     directions = robot.platform.directions
     normal, right = directions @ normal @ directions.T, directions @ right
-    center = np.linalg.lstsq(normal, right, rcond=None)[0]
+    # Guides that are parallel but for tolerances meet nowhere near the machine.
+    center = np.linalg.lstsq(normal, right, rcond=_PARALLEL)[0]
     return np.asarray(center, dtype=float), 1.5 * reach

@@ -3,6 +3,11 @@
 Nothing here computes physics or touches pyplot's global state.
 """
 
+from pteron.plots.calibration import (
+    differences_figure as differences_figure,
+    row_residuals_figure as row_residuals_figure,
+    tool_errors_figure as tool_errors_figure,
+)
 from pteron.plots.canvas import LEG_COLORS as LEG_COLORS, svg as svg, svg_file as svg_file
 from pteron.plots.certainty import (
     autocorrelation_figure as autocorrelation_figure,

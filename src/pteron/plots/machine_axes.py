@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.figure import Figure
 
 from pteron.kernels import Array
 from pteron.plots.canvas import FONT_SIZE, PAPER, SMALL
@@ -26,6 +27,7 @@ class MachineAxes(ABC):
         """Begin with nothing; `small` axes have thinner lines and smaller letters."""
         axes.patch.set_alpha(0.0)
         self.axes = axes
+        self.figure: Figure = axes.figure
         self._weight = SMALL if small else 1.0
         self._font = FONT_SIZE - 2.0 if small else FONT_SIZE
         self.things: list[Artist] = []

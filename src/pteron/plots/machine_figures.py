@@ -15,6 +15,7 @@ from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points
 from pteron.plots.canvas import FONT_SIZE, INK, blank
+from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.machine_drawing import (
     Scene,
     draw_directions,
@@ -122,18 +123,27 @@ def robot_figure(
     stands, in words, beside the platform frame's x axis.
     """
     scene = scene_of(points, guides, gravity)
-    height = _SPACE
-    if scene.plane is not None:
-        height = float(np.clip(0.6 + (_WIDTH - 0.6) * scene.aspect, 2.6, 5.6))
-    figure = blank(_WIDTH, height)
-    sheet = scene.sheet(figure)
+    sheet = machine_figure(scene)
     draw_surroundings(sheet, scene)
     draw_machine(sheet, scene, points, angle)
     if path is not None:
         draw_path(sheet, path)
     draw_directions(sheet, scene)
     sheet.fill()
-    return figure
+    return sheet.figure
+
+
+def machine_figure(scene: Scene, title: str = "") -> MachineAxes:
+    """Return axes for a machine in an empty figure of the usual size."""
+    height = _SPACE
+    if scene.plane is not None:
+        height = float(np.clip(0.6 + (_WIDTH - 0.6) * scene.aspect, 2.6, 5.6))
+    figure = blank(_WIDTH, height)
+    box = None
+    if title:
+        figure.suptitle(title, fontsize=FONT_SIZE, color=INK)
+        box = (0.0, 0.0, 1.0, 1.0 - 1.2 * _TITLE / height) if scene.plane is None else None
+    return scene.sheet(figure, box)
 
 
 def poses_figure(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -73,10 +73,17 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
     return figure
 
 
-def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None) -> Figure:
-    """Return the map of a measure (B, A) between 0 and 1 on a slice, where it is in reach.
+def measure_figure(
+    cut: ReachSlice,
+    measure: Array,
+    *,
+    path: Array | None = None,
+    levels: Sequence[float] = _TENTHS,
+) -> Figure:
+    """Return the map of a measure (B, A) on a slice, where it is in reach.
 
-    The shade deepens with the measure, by tenths; every second line is named.
+    The shade deepens with the measure from level to level, by default tenths; every second line is
+    named.
     """
     figure, axes, first, second = _sheet(cut, lowest=0.0)
     # Drawn beyond the edge of the reach and cut off there, so that the edge is smooth.
@@ -84,14 +91,14 @@ def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None
     whole = measure[tuple(nearest)]
     inside = np.ma.masked_where(cut.status != REACHABLE, whole)
     drawn = [
-        axes.contourf(first, second, whole, levels=[level, 2.0], colors=[REACH], alpha=0.11)
-        for level in _TENTHS
+        axes.contourf(first, second, whole, levels=[level, np.inf], colors=[REACH], alpha=0.11)
+        for level in levels
         if level < whole.max()
     ]
-    named = [level for level in _TENTHS[::2] if inside.min() < level < inside.max()]
+    named = [level for level in levels[::2] if inside.min() < level < inside.max()]
     if named:
         lines = axes.contour(first, second, inside, levels=named, colors=[INK], linewidths=0.7)
-        axes.clabel(lines, fmt="%.1f", fontsize=FONT_SIZE - 1.0, colors=[INK])
+        axes.clabel(lines, fmt="%.4g", fontsize=FONT_SIZE - 1.0, colors=[INK])
     edge = axes.contour(first, second, cut.margin, levels=[0.0], colors=[MUTED], linewidths=1.0)
     # Where the reach ends in a thread thinner than the grid, single cells of it are no picture.
     cell = np.array([np.ptp(first), np.ptp(second)]) / np.subtract(inside.shape, 1)

@@ -51,7 +51,6 @@ class SpaceAxes(MachineAxes):
         super().__init__(axes, small=small)
         axes.set_axis_off()
         axes.set_proj_type("persp", focal_length=1.6)
-        self.figure = figure
         self.rotation = upright(vertical)
         self._box = box
         self.turn(0.0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable
 from importlib.resources import files
 from math import floor, isfinite, log10
 from typing import Any
 
 from jinja2 import Template
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from pteron.platforms.coordinates import coordinate
 from pteron.templates import template as any_template
@@ -19,6 +20,12 @@ _MINUS = "\u2212"
 
 _NARROW = "\u202f"
 """The narrow space within a unit."""
+
+_COMMAND = r"pteron [a-z]+ ROBOT(?: --[a-z-]+ [\w.]*\w)+"
+"""Pattern of a command of `pteron` in a text."""
+
+_CODE = r"<code>\g<0></code>"
+"""HTML of a command."""
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -52,6 +59,21 @@ def fixed(value: float, places: int = 1) -> str:
     return text.replace("-", _MINUS)
 
 
+def measured(value: float, half: float) -> tuple[str, str]:
+    """Return a value and half its interval, to the second digit of the latter.
+
+    Examples
+    --------
+    >>> measured(1.2361326, 0.012752), measured(-0.004113744, 4.4e-05)
+    (('1.236', '0.013'), ('−0.004114', '0.000044'))
+    """
+    if not isfinite(half) or half <= 0.0:
+        return significant(value, 6), significant(half, 2)
+    # 0.0996 is 0.10 in two digits: the size counts after rounding.
+    places = max(1 - floor(log10(float(f"{half:.1e}"))), 0)
+    return fixed(value, places), fixed(half, places)
+
+
 def _millimetres(metres: float, places: int = 1) -> str:
     return fixed(1e3 * float(metres), places)
 
@@ -64,6 +86,13 @@ def compact(value: float, digits: int = 4) -> str:
 def triple(values: Iterable[float], factor: float = 1.0, digits: int = 4) -> str:
     """Return a vector, each component as `compact` has it."""
     return f"({', '.join(compact(factor * value, digits) for value in values)})"
+
+
+def prose(text: str) -> Markup:
+    """Return a message with true minus signs; commands and options are code, in one piece."""
+    signed = re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", str(escape(text)))
+    commands = re.sub(_COMMAND, lambda found: re.sub(r"\S+", _CODE, found[0]), signed)
+    return Markup(re.sub(r"(?<!<code>)--[a-z][a-z-]*(?: each)?", _CODE, commands))
 
 
 def resource(name: str) -> Markup:
@@ -83,6 +112,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         "compact": compact,
         "fixed": fixed,
         "mm": _millimetres,
+        "prose": prose,
         "significant": significant,
         "symbol": lambda name: coordinate(name).symbol,
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),

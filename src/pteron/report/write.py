@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -153,6 +154,30 @@ def checked_folder(path: str | Path) -> Path:
         reason = f"{there} is a file" if there != target else "it is a file"
         reason = reason if there.is_file() else error.strerror or str(error)
         raise OutputError(f"{target}: cannot be written to as a folder ({reason})") from None
+
+
+def checked_apart(path: Path, sources: Iterable[str | Path]) -> Path:
+    """Return the path of a model file: no file that is read, and no description of a log.
+
+    Raises
+    ------
+    OutputError
+        If it is one.
+    """
+    for source in map(Path, sources):
+        if source.resolve() == path.resolve():
+            raise OutputError(f"{path}: would replace a file that is read; give another folder")
+        if source.with_suffix(".toml").resolve() == path.resolve():
+            raise OutputError(
+                f"{path}: would be taken for the description of {source.name}; give another folder"
+            )
+    return path
+
+
+def commented(lines: Iterable[str]) -> str:
+    """Return lines as comments at the head of a TOML file, which forbids control characters."""
+    clean = ("".join(c if c.isprintable() else " " for c in line) for line in lines)
+    return "".join(f"# {' '.join(line.split())}\n" for line in clean) + "#\n"
 
 
 def numbers(report: Report) -> dict[str, Any]:

@@ -7,6 +7,7 @@ node, and so are all balls and all blocks, so that a pose costs a few messages a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from pteron.kernels import Array
 from pteron.kinematics import joint_screws
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points
+from pteron.motion.enlarged_points import enlarged_points
 from pteron.plots.canvas import GRID, INK, LEG_COLORS, MUTED, REACH
 from pteron.plots.machine_drawing import grid_step
 from pteron.viewer.meshes import Mesh, ball, cube, cylinder, fan
@@ -62,8 +64,18 @@ _FAR = 1.9
 class Scene:
     """The picture of one machine in one working mode."""
 
-    def __init__(self, server: viser.ViserServer, robot: Manipulator, poses: Array) -> None:
-        """Make the nodes; the guides without limits are as long as the poses (K, m) need."""
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        robot: Manipulator,
+        poses: Array,
+        compared: tuple[Manipulator, float] | None = None,
+    ) -> None:
+        """Make the nodes; the guides without limits are as long as the poses (K, m) need.
+
+        The compared machine stands there too, in grey, so many times as far from the first one.
+        """
+        self._compared = compared
         self._server, self._robot = server, robot
         self._guides = joint_guides(robot, poses)
         points = joint_points(robot, poses[0])
@@ -85,6 +97,10 @@ class Scene:
             shafts, heads = arrows(none, none, [1.0] * most, [INK] * most)
             self._add_copies(name, cylinder(), shafts, visible=False)
             self._add_copies(f"{name}-heads", cylinder(0.0), heads, visible=False)
+        if compared is not None:
+            self._add_copies("compared-bars", cylinder(), _in_grey(moving.bars))
+            self._add_copies("compared-balls", ball(), _in_grey(moving.balls))
+            self._show_compared(points, poses[0])
         self._aim(points)
 
     def show(self, state: ViewerState, forces: Array, scale: Array) -> None:
@@ -98,10 +114,28 @@ class Scene:
         for k, outline in enumerate(moving.faces):
             if f"face{k}" in self._nodes:
                 self._nodes[f"face{k}"].vertices = fan(outline)[0].astype(np.float32)
+        self._show_compared(points, state.pose)
         if self._nodes["screws"].visible:
             self._place_arrows("screws", *self._screws(state, points))
         if self._nodes["forces"].visible:
             self._place_arrows("forces", *self._force_arrows(points, forces, scale))
+
+    def _show_compared(self, points: JointPoints, pose: Array) -> None:
+        """Show the compared machine in a pose, if it reaches it."""
+        if self._compared is None:
+            return
+        robot, times = self._compared
+        names = "compared-bars", "compared-balls"
+        try:
+            moved = enlarged_points(points, joint_points(robot, pose), times)
+        except PteronError:
+            for name in names:
+                self._nodes[name].visible = False
+            return
+        solids = moving_solids(moved, self._guides, self.size)
+        for name, copies in zip(names, (solids.bars, solids.balls), strict=True):
+            self._place(name, copies)
+            self._nodes[name].visible = True
 
     def set_visible(self, name: str, visible: bool) -> None:
         """Show or hide the joint axes ("screws") or the force arrows ("forces")."""
@@ -286,6 +320,10 @@ class Scene:
 def _box(points: JointPoints, guides: Sequence[Guide]) -> tuple[Array, Array]:
     everything = np.vstack([*points.links, *(guide.path for guide in guides)])
     return everything.min(axis=0), everything.max(axis=0)
+
+
+def _in_grey(copies: Copies) -> Copies:
+    return replace(copies, colors=np.tile(np.uint8(rgb(MUTED)), (len(copies.colors), 1)))
 
 
 def _linear(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:

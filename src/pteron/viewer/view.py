@@ -14,8 +14,10 @@ import numpy as np
 
 from pteron.errors import DataError, PteronError, shown
 from pteron.kernels import Array
-from pteron.manipulator import RobotLike, as_manipulator
-from pteron.motion import Motion, Simulation
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion import Motion, Simulation, joint_guides, joint_points
+from pteron.motion.enlarged_points import greatest_difference
+from pteron.plots.calibration import enlargement, expect_alike
 from pteron.shapes import PoseLike
 from pteron.viewer.handle import Handle
 from pteron.viewer.panel import Panel
@@ -24,6 +26,7 @@ from pteron.viewer.scene import Scene
 from pteron.viewer.server import serve, stop
 from pteron.viewer.session import Session
 from pteron.viewer.slices import NONE, slice_meshes
+from pteron.viewer.solids import machine_size
 from pteron.viewer.state import ViewerState, stopped
 
 _FRAME = 1.0 / 30.0
@@ -50,8 +53,14 @@ class Viewer:
         The page's address.
     """
 
-    def __init__(self, session: Session, host: str, port: int) -> None:
-        self._session = session
+    def __init__(
+        self,
+        session: Session,
+        host: str,
+        port: int,
+        compared: tuple[Manipulator, float] | None = None,
+    ) -> None:
+        self._session, self._compared = session, compared
         self._server = serve(host, port, session.state.robot.name)
         shown = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
         address = f"[{shown}]" if ":" in shown else shown
@@ -203,7 +212,7 @@ class Viewer:
         """Put the machine into the picture, in its working mode."""
         session = self._session
         self._robot = session.state.robot
-        self._scene = Scene(self._server, self._robot, session.examples)
+        self._scene = Scene(self._server, self._robot, session.examples, self._compared)
         self._handle = Handle(self._server, self._robot, self._scene.size, self._pulled)
 
     def _pulled(self, pose: Array) -> None:
@@ -281,6 +290,8 @@ def view(
     port: int = 8080,
     motion: Motion | Simulation | str | Path | None = None,
     payload: float = 0.0,
+    compare: RobotLike | None = None,
+    enlarge: float | None = None,
 ) -> Viewer:
     """Show a machine in the browser, where it can be moved.
 
@@ -303,6 +314,11 @@ def view(
         the standard pick-and-place cycle.
     payload : float
         At the tool's centre point, kg.
+    compare : Manipulator, name or path, optional
+        A machine with the same kinds of legs, such as the drawing of one that was calibrated: it
+        stands there in grey, in the same pose.
+    enlarge : float, optional
+        How many times its differences are enlarged; by default so that the greatest is well seen.
 
     Returns
     -------
@@ -335,7 +351,21 @@ def view(
         session.load_standard()
     elif motion is not None:
         session.load(str(motion), read_bytes(motion))
-    return Viewer(session, host, port)
+    return Viewer(session, host, port, _compared(session, compare, enlarge))
+
+
+def _compared(
+    session: Session, compare: RobotLike | None, enlarge: float | None
+) -> tuple[Manipulator, float] | None:
+    if compare is None:
+        return None
+    robot, other = session.state.robot, as_manipulator(compare)
+    expect_alike(robot, other)
+    if enlarge is None:
+        one, there = (joint_points(each, session.home) for each in (robot, other))
+        size = machine_size(one, joint_guides(robot, session.home))
+        enlarge = enlargement(greatest_difference(one, there), size)
+    return other, enlarge
 
 
 def read_bytes(path: str | Path) -> bytes:

@@ -3,7 +3,6 @@
 from pteron.public import publish as _publish
 from pteron.report.identification.values import (
     Parameter as Parameter,
-    measured as measured,
     parameter_rows as parameter_rows,
 )
 from pteron.report.identification.write import (
@@ -12,5 +11,6 @@ from pteron.report.identification.write import (
     numbers as numbers,
     write_identification as write_identification,
 )
+from pteron.report.typeset import measured as measured
 
 _publish(__name__)

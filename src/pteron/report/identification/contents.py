@@ -51,7 +51,7 @@ class PageRecording:
 class Contents:
     """The contents of the page of an identification; n is the number of actuators.
 
-    `tone` is "good", "care" or "bad", by the verdict. `drawn` are the worst of the held-out
+    `drawn` are the worst of the held-out
     recordings; `repeats` says whether these are no logs of their own, but the ends of the fitted
     ones. A finding is a tuple: kind, row, column and message. The residuals (R, n), N or N m, are
     NaN where an equation is not used; `correlations` (L, n) are their autocorrelations at lags of 1
@@ -59,7 +59,6 @@ class Contents:
     """
 
     result: Identification
-    tone: str
     reasons: tuple[str, ...]
     steps: tuple[str, ...]
     notes: tuple[str, ...]
@@ -120,10 +119,8 @@ def contents(result: Identification) -> Contents:
     worst = sorted(held, key=lambda one: -float(one.prediction.nrms.max()))
     residuals = _residuals(result)
     correlations, bound = _correlations(residuals)
-    tones = {"trustworthy": "good", "usable with care": "care", "not trustworthy": "bad"}
     return Contents(
         result=result,
-        tone=tones[result.verdict.grade],
         reasons=shortened(result.verdict.reasons, names),
         steps=shortened(result.verdict.next_steps, names),
         notes=shortened(result.notes, names),

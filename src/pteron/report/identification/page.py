@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup, escape
 
 import pteron
 from pteron.equations.machine import closure_of
@@ -26,15 +24,8 @@ from pteron.plots import (
     svg,
 )
 from pteron.report.identification.contents import Contents, PageRecording, contents
-from pteron.report.identification.values import measured
 from pteron.report.quantities import force, nouns
-from pteron.report.typeset import resource, significant, template
-
-_COMMAND = r"pteron [a-z]+ ROBOT(?: --[a-z-]+ [\w.]*\w)+"
-"""Pattern of a command of `pteron` in a text."""
-
-_CODE = r"<code>\g<0></code>"
-"""HTML of a command."""
+from pteron.report.typeset import measured, resource, significant, template
 
 
 def page(result: Identification, model_file: str | None = None) -> str:
@@ -43,7 +34,6 @@ def page(result: Identification, model_file: str | None = None) -> str:
         "identification/page.html.j2",
         measured=lambda row: measured(row.value, row.half),
         percent=_percent,
-        prose=_prose,
     )
     found = contents(result)
     joints = [leg.joint for leg in result.robot.legs]
@@ -64,13 +54,6 @@ def page(result: Identification, model_file: str | None = None) -> str:
         version=pteron.__version__,
         style=resource("page.css") + resource("identification/page.css"),
     )
-
-
-def _prose(text: str) -> Markup:
-    """Return a message with true minus signs; commands and options are code, in one piece."""
-    signed = re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", str(escape(text)))
-    commands = re.sub(_COMMAND, lambda found: re.sub(r"\S+", _CODE, found[0]), signed)
-    return Markup(re.sub(r"(?<!<code>)--[a-z][a-z-]*(?: each)?", _CODE, commands))
 
 
 def _percent(share: float) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import floor, isfinite, log10
 from typing import Literal
 
 import numpy as np
@@ -14,7 +13,6 @@ from pteron.bodies.parameters import PLATFORM
 from pteron.identification import Identification
 from pteron.identification.names_in_html import html_expressions, html_names
 from pteron.kernels import Array
-from pteron.report.typeset import fixed, significant
 
 _STRONG = 0.95
 """Correlation from which two values can hardly be told apart."""
@@ -86,21 +84,6 @@ def _partners(correlation: Array) -> tuple[Array, Array]:
     off = np.where(np.eye(p, dtype=bool), 0.0, np.nan_to_num(correlation))
     partners = np.argmax(np.abs(off), axis=1)
     return partners, off[np.arange(p), partners]
-
-
-def measured(value: float, half: float) -> tuple[str, str]:
-    """Return a value and half its interval, to the second digit of the latter.
-
-    Examples
-    --------
-    >>> measured(1.2361326, 0.012752), measured(-0.004113744, 4.4e-05)
-    (('1.236', '0.013'), ('−0.004114', '0.000044'))
-    """
-    if not isfinite(half) or half <= 0.0:
-        return significant(value, 6), significant(half, 2)
-    # 0.0996 is 0.10 in two digits: the size counts after rounding.
-    places = max(1 - floor(log10(float(f"{half:.1e}"))), 0)
-    return fixed(value, places), fixed(half, places)
 
 
 @dataclass(frozen=True)

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pteron.atomic import make_folder, write_text
-from pteron.errors import OutputError
 from pteron.identification import Identification
 from pteron.json_values import json_ready
-from pteron.manipulator import save
+from pteron.manipulator.saving import text_of
 from pteron.report.identification.contents import short_sources, shortened
-from pteron.report.write import checked_folder
+from pteron.report.write import checked_apart, checked_folder, commented
 
 _SAFE = re.compile(r"[^\w.-]+")
 """Characters that names of files do without."""
@@ -84,23 +82,14 @@ def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()
     """Return the path of the model file: no file that is read, and no description of a log."""
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
-    for source in map(Path, sources):
-        if source.resolve() == path.resolve():
-            raise OutputError(f"{path}: would replace a file that is read; give another folder")
-        if source.with_suffix(".toml").resolve() == path.resolve():
-            raise OutputError(
-                f"{path}: would be taken for the description of {source.name}; give another folder"
-            )
-    return path
+    return checked_apart(path, sources)
 
 
 def _model_text(result: Identification) -> str | None:
     """Return the model file of an identification; None where there are no real bodies."""
     if result.machine is None:
         return None
-    with tempfile.TemporaryDirectory() as folder:
-        plain = save(result.machine, Path(folder) / "robot.toml").read_text("utf-8")
-    return "".join(f"# {_line(text)}\n" for text in _header(result)) + "#\n" + plain
+    return commented(_header(result)) + text_of(result.machine)
 
 
 def _header(result: Identification) -> list[str]:
@@ -126,11 +115,6 @@ def _header(result: Identification) -> list[str]:
         + ("as near as can be to the CAD model." if consistency.nearest_to == "CAD" else plain),
         "Friction and offsets are those of the fit, in each leg's drive.",
     ]
-
-
-def _line(text: str) -> str:
-    """Return text as a comment may hold it: TOML forbids control characters there."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def numbers(result: Identification) -> dict[str, Any]:

@@ -1,0 +1,181 @@
+"""`pteron calibrate`: from measurements to a machine's geometry, and the poses to measure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from rich.table import Table
+
+from pteron.cli.arguments import load_robot
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import (
+    GRADE_COLORS,
+    ascii_number,
+    plain,
+    show,
+    show_json,
+    table,
+    written,
+)
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.calibration import Calibration
+    from pteron.report.calibration import Written
+
+_MOST = 12
+"""Values that the terminal shows, those that changed most; the page has them all."""
+
+Measure = Literal["positions", "heights", "poses", "distances"]
+"""What is measured at planned poses."""
+
+
+def calibrate(
+    log: list[str] | None = None,
+    *,
+    robot: str,
+    out: str,
+    held_out: list[str] | None = None,
+    free: list[str] | None = None,
+    prior: str | None = None,
+    plan: int | None = None,
+    measure: Measure = "positions",
+    elbows: str | None = None,
+    json: bool = False,
+) -> None:
+    """Find a machine's true geometry from measurements, and say what they cannot show.
+
+    The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
+    it was found, robot.toml. The exit code is 0 whatever the verdict.
+
+    With --plan, poses that show the geometry best are written as a table of joints and poses.
+
+    Arguments
+    ---------
+    LOG...: Measurements, .csv or .parquet, or a controller's log.
+
+    Options
+    -------
+    --robot ROBOT: The machine as it is drawn.
+    --out DIR|FILE: The folder to write it to; with --plan the table.
+    --held-out LOG: What to judge by; once for each. By default every fifth row, if there are
+        enough.
+    --free GROUP: Seek only this; once for each: zeros, scales, lengths, points, directions, tool,
+        radius, angles, or a value such as legs[2].lower_length.
+    --prior TOML: Standard deviations by group or value, m and rad.
+    --plan N: Choose so many poses to measure, in place of a LOG.
+    --measure: What will be measured at the planned poses.
+
+    Examples
+    --------
+    pteron calibrate log.csv --robot robot.toml --out calibrated
+    pteron calibrate printer.cfg --robot printer.toml --free radius --free zeros --out calibrated
+    pteron calibrate a.csv b.csv --held-out c.csv --robot delta --prior shop.toml --out calibrated
+    pteron calibrate --plan 40 --measure heights --robot printer.toml --out plan.csv
+    """
+    if (plan is None) == (not log):
+        raise DataError("give logs of measurements, or --plan with the number of poses to measure")
+    machine = load_robot(robot, elbows)
+    if plan is not None:
+        _plan(machine, plan, measure, out, json=json)
+        return
+    with spinner("Reading the measurements"):
+        from pteron.calibration import calibrate as calibrated, read_measurements
+        from pteron.report.calibration import numbers, write_calibration
+        from pteron.report.write import checked_apart, checked_folder
+
+        read = [*(log or ()), *(held_out or ())]
+        sources = [path for path in (*read, robot, *([prior] if prior else ())) if _is_file(path)]
+        checked_apart(checked_folder(out) / "robot.toml", sources)
+        tolerances = None if prior is None else _prior(prior)
+        given = read_measurements(machine, *(log or ()))
+        check = read_measurements(machine, *held_out) if held_out else None
+    with spinner(f"Calibrating {machine.name} from {len(given)} rows"):
+        result = calibrated(machine, given, free=free, prior=tolerances, held_out=check)
+    with spinner("Drawing the report"):
+        files = write_calibration(result, out, sources=sources)
+    if json:
+        show_json({"files": [str(path) for path in files.paths], **numbers(result)})
+        return
+    _show(result, files)
+
+
+def _is_file(path: str) -> bool:
+    return Path(path).is_file()
+
+
+def _prior(path: str) -> dict[str, float]:
+    from pteron.toml import read_toml
+
+    found: dict[str, float] = {}
+    for name, value in read_toml(path, DataError, f"{path}: there is no such file").items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise DataError(
+                f"{path}: {name} = {value!r}: a standard deviation in m or rad expected; a value's "
+                'name stands in quotes, as in "legs[2].lower_length" = 0.0001'
+            )
+        found[name] = float(value)
+    return found
+
+
+def _plan(machine: Any, count: int, measure: Measure, out: str, *, json: bool) -> None:
+    raise DataError(f"--plan {count}: poses cannot be planned yet")
+
+
+def _show(result: Calibration, files: Written) -> None:
+    """Print a verdict, what changed, what shows and what does not, and the files."""
+    from pteron.report.calibration.write import notes
+
+    verdict, shown = result.verdict, result.observability
+    color = GRADE_COLORS[verdict.grade]
+    show(
+        f"[bold {color}]{plain(result.drawn.name)}: {verdict.grade}[/bold {color}], "
+        f"{shown.rank} of {shown.columns} combinations shown",
+        _values(result),
+        *_errors(result),
+        *map(plain, (*verdict.reasons, *verdict.next_steps)),
+        *(f"Cannot be seen, as drawn: {plain(line)}" for line in shown.unseen),
+        *(f"[yellow]Weak:[/yellow] {plain(line)}" for line in shown.weak),
+        *map(plain, notes(result)),
+        *written(*files.paths),
+    )
+
+
+def _values(result: Calibration) -> Table:
+    from pteron.report.calibration import value_rows
+
+    rows = sorted(value_rows(result), key=lambda row: -row.size)
+    numbers = ("drawn", "found", "+- 95 %", "change")
+    more = len(rows) - _MOST
+    return table(
+        *("value", *numbers, "unit", "made by"),
+        rows=[
+            (
+                plain(row.name),
+                *(ascii_number(text) for text in (row.drawn, row.found, row.half, row.change)),
+                "deg" if row.unit == "°" else row.unit,
+                row.origin,
+            )
+            for row in rows[:_MOST]
+        ],
+        numbers=numbers,
+        names=("value",),
+        caption=f"{more} more, which changed less, are on the page." if more > 0 else None,
+    )
+
+
+def _errors(result: Calibration) -> list[Table]:
+    held = result.held_out
+    if held is None:
+        return []
+    from pteron.report.typeset import significant
+
+    numbers = ("before", "after", "expected")
+    rows = []
+    for kind in held.after:
+        values = (held.before[kind], held.after[kind], held.expected[kind])
+        unit = "mrad" if kind == "angle" else "mm"
+        rows.append((kind, *(ascii_number(significant(1e3 * value)) for value in values), unit))
+    caption = f"Errors at {held.rows} rows that were not fitted."
+    return [table("held out", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]

@@ -1,0 +1,59 @@
+"""A machine's joint points with their differences from another machine's enlarged, to be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.motion.joint_points import Guide, JointPoints, Part
+
+
+def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> JointPoints:
+    """Return one machine's points in a pose, moved towards another's by so many times the way.
+
+    With 1 they are the other machine's.
+    """
+    whole = np.vstack([part.corners for part in other.parts])
+    return replace(
+        points,
+        links=tuple(
+            _moved(line, there, times)
+            for line, there in zip(points.links, other.links, strict=True)
+        ),
+        parts=tuple(
+            Part(part.hub, _moved(part.corners, whole, times) if len(whole) else part.corners)
+            for part in points.parts
+        ),
+        tool=points.tool + times * (other.tool - points.tool),
+    )
+
+
+def enlarged_guides(
+    guides: Sequence[Guide], others: Sequence[Guide], times: float
+) -> tuple[Guide, ...]:
+    """Return one machine's guides, moved towards another's by so many times the way."""
+    return tuple(
+        replace(guide, path=guide.path + times * (other.path - guide.path))
+        for guide, other in zip(guides, others, strict=True)
+    )
+
+
+def greatest_difference(points: JointPoints, other: JointPoints) -> float:
+    """Return the greatest distance, m, of a joint of one machine from the same of another."""
+    moved = enlarged_points(points, other, 1.0)
+    return max(
+        float(np.linalg.norm(there - line, axis=-1).max())
+        for line, there in zip(points.links, moved.links, strict=True)
+    )
+
+
+def _moved(points: Array, others: Array, times: float) -> Array:
+    # Joints that coincide in one machine may be two in the other: the nearest is the same one.
+    if len(points) == len(others):
+        nearest = others
+    else:
+        nearest = others[np.linalg.norm(points[:, None] - others, axis=-1).argmin(axis=1)]
+    return np.asarray(points + times * (nearest - points))

@@ -1,0 +1,228 @@
+"""Pictures of a calibration: the machine drawn and found, the tool's errors, and residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion import JointPoints, joint_guides, joint_points
+from pteron.motion.enlarged_points import enlarged_guides, enlarged_points, greatest_difference
+from pteron.plots.canvas import (
+    INK,
+    LEG_COLORS,
+    MUTED,
+    PAPER,
+    WARNING,
+    blank,
+    nice_step,
+    stack,
+    zero_line,
+)
+from pteron.plots.machine_axes import MachineAxes
+from pteron.plots.machine_drawing import (
+    Scene,
+    draw_directions,
+    draw_machine,
+    draw_surroundings,
+    rods,
+    scene_of,
+)
+from pteron.plots.machine_figures import gravity_of, machine_figure
+from pteron.shapes import PoseLike
+from pteron.workspace import home_pose
+
+_SHOWN = 0.05
+"""Least length of the greatest difference in a picture, as a share of the machine's size."""
+
+_RESIDUALS = {"position": "position (mm)", "angle": "angles (mrad)"}
+"""Names of kinds of residuals with their units; others are in mm under their own names."""
+
+
+def differences_figure(
+    drawn: RobotLike,
+    found: RobotLike,
+    pose: PoseLike | None = None,
+    *,
+    enlarge: float | None = None,
+) -> Figure:
+    """Return a machine in colours over another in grey, its differences from that one enlarged.
+
+    Both bring the platform to the same pose.
+
+    Parameters
+    ----------
+    drawn, found : Manipulator, name or path
+        Two machines with the same kinds of legs: the grey one, and the one whose joints are moved
+        away from it.
+    pose : array, shape (m,), optional
+        m and rad; by default the home pose of the grey one.
+    enlarge : float, optional
+        How many times differences are enlarged; by default a round number at which the greatest is
+        well seen. The picture says it.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If the machines have other kinds of legs.
+    UnreachablePose
+        If one of them does not reach the pose.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from dataclasses import replace
+    >>> drawn = pteron.load("linear-delta")
+    >>> first = replace(drawn.legs[0], lower_length=0.23)
+    >>> found = replace(drawn, legs=(first, *drawn.legs[1:]))
+    >>> figure = pteron.plots.differences_figure(drawn, found)
+    """
+    one, other = as_manipulator(drawn), as_manipulator(found)
+    expect_alike(one, other)
+    shown = home_pose(one) if pose is None else checked(one, pose, "pose").ravel()
+    points, there = joint_points(one, shown), joint_points(other, shown)
+    guides = joint_guides(one, shown)
+    size = scene_of(points, guides, None).size
+    times = enlargement(greatest_difference(points, there), size) if enlarge is None else enlarge
+    moved = enlarged_points(points, there, times)
+    scene = scene_of(points, guides, gravity_of(one))
+    far = scene_of(moved, enlarged_guides(guides, joint_guides(other, shown), times), None)
+    sheet = _in_grey(scene, points, f"differences {times:g} times enlarged")
+    for color, guide in zip(LEG_COLORS, far.guides, strict=False):
+        sheet.line(guide.path, color, 1.6, raised=-0.2)
+    draw_machine(sheet, far, moved)
+    draw_directions(sheet, scene)
+    sheet.fill()
+    return sheet.figure
+
+
+def tool_errors_figure(
+    robot: RobotLike,
+    places: Array,
+    errors: Array,
+    *,
+    enlarge: float | None = None,
+) -> Figure:
+    """Return the machine in its home pose with the tool's errors as lines, enlarged.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    places, errors : array, shape (N, 3)
+        Where the tool is asked to be, and from there to where it goes, m; NaN is left out.
+    enlarge : float, optional
+        How many times the errors are enlarged; by default as in `differences_figure`.
+
+    Returns
+    -------
+    Figure
+    """
+    machine = as_manipulator(robot)
+    shown = home_pose(machine)
+    points, guides = joint_points(machine, shown), joint_guides(machine, shown)
+    scene = scene_of(points, guides, gravity_of(machine))
+    known = np.isfinite(errors).all(axis=-1)
+    greatest = float(np.linalg.norm(errors[known], axis=-1).max(initial=0.0))
+    times = enlargement(greatest, scene.size) if enlarge is None else enlarge
+    told = f"errors {times:g} times enlarged, the greatest {1e3 * greatest:.3g} mm"
+    sheet = _in_grey(scene, points, told)
+    for place, error in zip(places[known], errors[known], strict=True):
+        sheet.line(np.array([place, place + times * error]), WARNING, 1.3, raised=2.0)
+        sheet.mark(place, WARNING, PAPER, 3.2, raised=2.1)
+    draw_directions(sheet, scene)
+    sheet.fill()
+    return sheet.figure
+
+
+def row_residuals_figure(
+    residuals: Array,
+    kinds: Sequence[str],
+    measured: NDArray[np.bool_],
+    kept: NDArray[np.bool_],
+    noise: dict[str, float],
+) -> Figure:
+    """Return the residuals of measurements by row, each kind in a panel of its own.
+
+    Parameters
+    ----------
+    residuals, measured : array, shape (N, K)
+        m or rad, and which of them count.
+    kinds : sequence of str, K
+        "position", "angle", "height" or "distance".
+    kept : array of bool, shape (N,)
+        Rows that are no outliers; the others are red rings.
+    noise : dict
+        Standard deviation by kind, m or rad: the band is two of them to each side.
+
+    Returns
+    -------
+    Figure
+    """
+    named = np.array(kinds)
+    shown = [kind for kind in noise if measured[:, named == kind].any()]
+    labels = [_RESIDUALS.get(kind, f"{kind} (mm)") for kind in shown]
+    figure = blank(5.6, 0.8 + 1.7 * len(shown))
+    rows = np.arange(1, len(residuals) + 1)
+    for kind, axes in zip(shown, stack(figure, "row", labels), strict=True):
+        zero_line(axes)
+        band = 2e3 * noise[kind]
+        axes.axhspan(-band, band, color=MUTED, alpha=0.16, linewidth=0.0)
+        for column in np.flatnonzero(named == kind):
+            for chosen, look in (
+                (kept, {"color": INK, "markersize": 2.6}),
+                (
+                    ~kept,
+                    {"markerfacecolor": "none", "markeredgecolor": WARNING, "markersize": 5.0},
+                ),
+            ):
+                here = chosen & measured[:, column]
+                axes.plot(rows[here], 1e3 * residuals[here, column], "o", **look)
+        axes.set_xlim(0.0, len(rows) + 1.0)
+    return figure
+
+
+def enlargement(difference: float, size: float) -> float:
+    """Return the round number of times that makes a difference well seen beside a size, m."""
+    return nice_step(_SHOWN * size / difference) if difference > 1e-9 * size else 1.0
+
+
+def expect_alike(one: Manipulator, other: Manipulator) -> None:
+    """Check that two machines differ in numbers only.
+
+    Raises
+    ------
+    DataError
+        If they do not.
+    """
+    if [leg.type for leg in one.legs] != [leg.type for leg in other.legs] or (
+        one.coordinates != other.coordinates
+    ):
+        raise DataError(
+            f"{other.name} is no machine to compare with {one.name}: it has other legs, or its "
+            "platform moves otherwise"
+        )
+
+
+def _in_grey(scene: Scene, points: JointPoints, title: str) -> MachineAxes:
+    """Return axes of a new figure with a machine in grey, below a title."""
+    sheet = machine_figure(scene, title)
+    draw_surroundings(sheet, scene)
+    for line, bar in zip(points.links, points.bars, strict=True):
+        for ends in (*pairwise(line[:-1]), *rods(line, bar, scene.size)):
+            sheet.line(np.array(ends), MUTED, 2.2, raised=-0.5)
+    for part in points.parts:
+        for corner in part.corners:
+            sheet.line(np.array([part.hub, corner]), MUTED, 2.2, raised=-0.5)
+    return sheet

@@ -1,0 +1,53 @@
+"""Rows of a calibration's report: each value drawn and found, its interval, and what made it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pteron.calibration import Calibration, Value
+from pteron.report.typeset import measured
+
+ORIGINS = {"data": "measurements", "both": "measurements and tolerance", "tolerance": "tolerance"}
+"""What made a value, in words."""
+
+_UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "°"), "": (1e2, "%")}
+
+_ORDINARY = {"m": 1e-3, "rad": 0.0035, "": 1e-3}
+"""Sizes by which changes in m, rad and of scales are compared."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One value in mm, degrees or percent: as texts with as many digits as its interval has."""
+
+    name: str
+    drawn: str
+    found: str
+    change: str
+    half: str
+    unit: str
+    origin: str
+    size: float
+    """How great the change is beside an ordinary tolerance."""
+
+
+def value_rows(result: Calibration) -> tuple[Row, ...]:
+    """Return the values of a calibration, in its order."""
+    return tuple(_row(value) for value in result.values)
+
+
+def _row(value: Value) -> Row:
+    factor, unit = _UNITS[value.unit]
+    half = factor * 0.5 * (value.interval[1] - value.interval[0])
+    change = value.found - value.drawn
+    texts = [measured(factor * one, half)[0] for one in (value.drawn, value.found, change)]
+    return Row(
+        value.name,
+        *texts,
+        measured(0.0, half)[1],
+        unit,
+        ORIGINS[value.origin],
+        abs(change) / _ORDINARY[value.unit],
+    )

@@ -1,0 +1,100 @@
+"""`write_calibration`: the report's page, `calibration.json` and the machine's file, written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pteron.atomic import write_texts
+from pteron.calibration import Calibration
+from pteron.json_values import json_ready
+from pteron.manipulator.saving import text_of
+from pteron.report.write import checked_apart, checked_folder, commented
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files of a calibration."""
+
+    page: Path
+    numbers: Path
+    model: Path
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files."""
+        return self.page, self.numbers, self.model
+
+
+def write_calibration(
+    result: Calibration, folder: str | Path, *, sources: Iterable[str | Path] = ()
+) -> Written:
+    """Write a calibration: a page, `calibration.json`, and the machine as found, `robot.toml`.
+
+    The page, `calibration.html`, needs no other file or network. All files are written, or none.
+
+    Parameters
+    ----------
+    result : Calibration
+        What was found.
+    folder : str or path
+        Where to write; made if it is missing.
+    sources : iterable of str or path
+        Files that were read, which `robot.toml` must not replace.
+
+    Returns
+    -------
+    Written
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written, or a file that was read would be replaced.
+    """
+    # Matplotlib and Jinja are behind it.
+    from pteron.report.calibration.page import page
+
+    target = checked_folder(folder)
+    checked_apart(target / "robot.toml", sources)
+    texts = {
+        "calibration.html": page(result),
+        "calibration.json": json.dumps(numbers(result), indent=1, allow_nan=False) + "\n",
+        "robot.toml": commented(_header(result)) + text_of(result.robot),
+    }
+    return Written(*write_texts(target, texts))
+
+
+def numbers(result: Calibration) -> dict[str, Any]:
+    """Return the numbers of a calibration as JSON has them, null where one is not finite."""
+    found: dict[str, Any] = json_ready(result.as_dict() | {"notes": list(notes(result))})
+    return found
+
+
+def notes(result: Calibration) -> tuple[str, ...]:
+    """Return what a user of the found machine must know: its zeros, and its bodies' parameters."""
+    kept = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
+    found = []
+    if any(value.group in ("zeros", "scales") for value in result.values):
+        found.append(
+            f"Zeros and scales of joints {', '.join(kept)} are the legs' reading in robot.toml: "
+            "joint coordinate = zero + scale x reading."
+            if kept
+            else "The geometry has taken the joints' zeros: joint coordinates are readings."
+        )
+    found.append(
+        "Masses, centres of mass, moments of inertia and friction are as they were on the drawn "
+        "geometry: where they were identified, identify them again on this one."
+    )
+    return tuple(found)
+
+
+def _header(result: Calibration) -> list[str]:
+    return [
+        f"{result.drawn.name}, calibrated from {len(result.measurements)} rows of measurements.",
+        f"Verdict: {result.verdict.grade}.",
+        *result.verdict.reasons,
+        *notes(result),
+    ]

@@ -1,0 +1,67 @@
+"""`pteron calibrate`: files that agree with the terminal, refusals of one line."""
+
+from __future__ import annotations
+
+import json
+from functools import lru_cache
+from pathlib import Path
+
+import polars as pl
+import pytest
+from measured import built, positions
+from mechanisms import CATALOG
+from test_cli import done, refused
+
+import pteron
+
+DRAWN = CATALOG["linear-delta"]
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    log().write_csv("log.csv")
+
+
+@lru_cache
+def log() -> pl.DataFrame:
+    readings, poses = positions(DRAWN, built(DRAWN), 30)
+    columns = {f"rho{i}": readings[:, i - 1] for i in (1, 2, 3)}
+    return pl.DataFrame(columns | dict(zip("xyz", poses.T, strict=True)))
+
+
+def test_the_files_agree_with_the_terminal():
+    text = done("calibrate log.csv --robot linear-delta --out found")
+    folder = Path("found")
+    names = ["calibration.html", "calibration.json", "robot.toml"]
+    assert sorted(file.name for file in folder.iterdir()) == names
+    data = json.loads((folder / "calibration.json").read_text("utf-8"))
+    assert text.startswith(f"linear-delta: {data['verdict']['grade']}, {data['rank']} of ")
+    for line in (*data["verdict"]["reasons"], *data["notes"]):
+        assert f"{line}\n" in text
+    for line in data["unseen"]:
+        assert f"Cannot be seen, as drawn: {line}\n" in text
+    for name in names:
+        assert f"Written: {folder / name}\n" in text
+    errors = data["held_out"]
+    assert errors["after"]["position"] < 0.05 * errors["before"]["position"]
+    assert pteron.load(folder / "robot.toml").legs != DRAWN.legs
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--robot linear-delta --out a", "give logs of measurements, or --plan"),
+        ("log.csv --robot linear-delta --plan 5 --out a", "give logs of measurements, or --plan"),
+        ("no.csv --robot linear-delta --out a", "no.csv"),
+        ("log.csv --robot linear-delta --free rods --out a", "'rods': no group or value"),
+        ("log.csv --robot linear-delta --prior p.toml --out a", "a standard deviation in m or rad"),
+        ("log.csv --robot linear-delta --prior no.toml --out a", "no.toml: there is no such file"),
+        ("log.csv --robot linear-delta --out log.csv", "it is a file"),
+        ("log.csv --robot robot.toml --out .", "would replace a file that is read"),
+    ],
+)
+def test_a_users_error_is_one_line_and_leaves_nothing(options: str, words: str):
+    Path("p.toml").write_text("legs = [1.0]\n", "utf-8")
+    pteron.save(DRAWN, "robot.toml")
+    refused(f"calibrate {options}", words)

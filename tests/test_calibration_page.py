@@ -1,0 +1,97 @@
+"""The report on a calibration: a whole page, the machine's file, and pictures of both machines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from measured import built, positions
+from mechanisms import CATALOG
+from test_report import HOSTILE, Reader, strict
+
+import pteron
+from pteron.calibration import Measurements, calibrate
+from pteron.errors import DataError, OutputError
+from pteron.motion import joint_points
+from pteron.motion.enlarged_points import enlarged_points, greatest_difference
+from pteron.report.calibration import value_rows, write_calibration
+
+DRAWN = replace(CATALOG["linear-delta"], name=HOSTILE)
+TRUE = built(DRAWN)
+
+
+@lru_cache
+def calibration():
+    readings, poses = positions(DRAWN, TRUE, 30)
+    return calibrate(DRAWN, Measurements.of(DRAWN, readings, poses=poses))
+
+
+def test_the_page_is_whole_and_says_the_verdict_first(tmp_path: Path):
+    result = calibration()
+    files = write_calibration(result, tmp_path / "a" / "b")
+    text = files.page.read_text("utf-8")
+    page = Reader(text)
+    assert page.faults == page.open == page.sources == []
+    assert page.ids[0] == "verdict"
+    words = " ".join(page.text.split())
+    for line in (*result.verdict.reasons, *result.observability.unseen):
+        assert " ".join(line.split()).replace("-", "\u2212")[:40] in words.replace("-", "\u2212")
+    for row in value_rows(result):
+        assert row.found in words
+        assert row.name in words
+    # Arrows, the machine, residuals, and three slices before and after.
+    assert text.count("<svg") == 10
+    assert "7 * 6" in words
+
+    data = strict(files.numbers.read_text("utf-8"))
+    assert data["rank"] == result.observability.rank
+    assert [value["name"] for value in data["values"]] == [value.name for value in result.values]
+
+
+def test_the_file_holds_the_machine_as_found(tmp_path: Path):
+    model = write_calibration(calibration(), tmp_path).model
+    found = pteron.load(model)
+    assert found == calibration().robot
+    comments = [line for line in model.read_text("utf-8").splitlines() if line.startswith("#")]
+    assert any("Verdict: " in line for line in comments)
+    assert any("identify them again" in line for line in comments)
+
+
+def test_guides_that_tolerances_tilt_have_their_home_where_parallel_ones_have():
+    homes = [pteron.workspace.home_pose(robot) for robot in (DRAWN, TRUE)]
+    np.testing.assert_allclose(*homes, rtol=0.0, atol=0.1)
+
+
+def test_a_file_that_is_read_is_not_replaced(tmp_path: Path):
+    drawing = pteron.save(DRAWN, tmp_path / "robot.toml")
+    before = drawing.read_bytes()
+    with pytest.raises(OutputError, match="would replace a file that is read"):
+        write_calibration(calibration(), tmp_path, sources=[drawing])
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.toml"]
+    assert drawing.read_bytes() == before
+
+
+def test_enlarged_once_a_machine_is_the_other():
+    home = pteron.workspace.home_pose(DRAWN)
+    drawn, found = (joint_points(robot, home) for robot in (DRAWN, TRUE))
+    for one, other in zip(enlarged_points(drawn, found, 1.0).links, found.links, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-15)
+    twice = enlarged_points(drawn, found, 2.0)
+    assert greatest_difference(drawn, twice) == pytest.approx(
+        2.0 * greatest_difference(drawn, found)
+    )
+    assert greatest_difference(drawn, drawn) == 0.0
+
+
+def test_machines_of_other_kinds_are_not_compared():
+    with pytest.raises(DataError, match="no machine to compare with"):
+        pteron.plots.differences_figure("linear-delta", "delta")
+
+
+def test_a_picture_says_how_many_times_differences_are_enlarged():
+    robot = CATALOG["five-bar"]
+    figure = pteron.plots.differences_figure(robot, built(robot, share=0.5), enlarge=20)
+    assert figure.get_suptitle() == "differences 20 times enlarged"
