@@ -21,7 +21,7 @@ from pteron.plots import (
     tool_errors_figure,
 )
 from pteron.plots.canvas import nice_step
-from pteron.report.calibration.values import ORIGINS, value_rows
+from pteron.report.calibration.values import value_rows
 from pteron.report.calibration.write import notes
 from pteron.report.typeset import resource, significant, template
 from pteron.workspace import home_pose, reach_slice
@@ -58,7 +58,6 @@ def page(result: Calibration) -> str:
         robot=result.drawn,
         shown=result.observability,
         rows=value_rows(result),
-        origins=ORIGINS,
         maps=error_maps(result),
         figures=_figures(result),
         notes=notes(result),

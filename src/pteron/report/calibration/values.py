@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.calibration import Calibration, Value
+from pteron.calibration.result import Origin
 from pteron.report.typeset import measured
-
-ORIGINS = {"data": "measurements", "both": "measurements and tolerance", "tolerance": "tolerance"}
-"""What made a value, in words."""
 
 _UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "°"), "": (1e2, "%")}
 
@@ -28,7 +26,7 @@ class Row:
     change: str
     half: str
     unit: str
-    origin: str
+    origin: Origin
     size: float
     """How great the change is beside an ordinary tolerance."""
 
@@ -48,6 +46,6 @@ def _row(value: Value) -> Row:
         *texts,
         measured(0.0, half)[1],
         unit,
-        ORIGINS[value.origin],
+        value.origin,
         abs(change) / _ORDINARY[value.unit],
     )
