@@ -125,7 +125,7 @@ def _plan(machine: Any, count: int, measure: Measure, out: str, *, json: bool) -
 
 def _show(result: Calibration, files: Written) -> None:
     """Print a verdict, what changed, what shows and what does not, and the files."""
-    from pteron.report.calibration.write import notes
+    from pteron.report.calibration.values import notes
 
     verdict, shown = result.verdict, result.observability
     color = GRADE_COLORS[verdict.grade]

@@ -21,8 +21,7 @@ from pteron.plots import (
     tool_errors_figure,
 )
 from pteron.plots.canvas import nice_step
-from pteron.report.calibration.values import value_rows
-from pteron.report.calibration.write import notes
+from pteron.report.calibration.values import notes, value_rows
 from pteron.report.typeset import resource, significant, template
 from pteron.workspace import home_pose, reach_slice
 from pteron.workspace.reach import slice_planes

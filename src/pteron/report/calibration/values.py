@@ -1,4 +1,4 @@
-"""Rows of a calibration's report: each value drawn and found, its interval, and what made it."""
+"""Rows of a calibration's report: values drawn and found, their intervals, and notes."""
 
 from __future__ import annotations
 
@@ -49,3 +49,21 @@ def _row(value: Value) -> Row:
         value.origin,
         abs(change) / _ORDINARY[value.unit],
     )
+
+
+def notes(result: Calibration) -> tuple[str, ...]:
+    """Return what a user of the found machine must know: its zeros, and its bodies' parameters."""
+    kept = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
+    found = []
+    if any(value.group in ("zeros", "scales") for value in result.values):
+        found.append(
+            f"Zeros and scales of joints {', '.join(kept)} are the legs' reading in robot.toml: "
+            "joint coordinate = zero + scale x reading."
+            if kept
+            else "The geometry has taken the joints' zeros: joint coordinates are readings."
+        )
+    found.append(
+        "Masses, centres of mass, moments of inertia and friction are as they were on the drawn "
+        "geometry: where they were identified, identify them again on this one."
+    )
+    return tuple(found)

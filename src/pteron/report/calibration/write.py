@@ -12,6 +12,7 @@ from pteron.atomic import write_texts
 from pteron.calibration import Calibration
 from pteron.json_values import json_ready
 from pteron.manipulator.saving import text_of
+from pteron.report.calibration.values import notes
 from pteron.report.write import checked_apart, checked_folder, commented
 
 
@@ -71,24 +72,6 @@ def numbers(result: Calibration) -> dict[str, Any]:
     """Return the numbers of a calibration as JSON has them, null where one is not finite."""
     found: dict[str, Any] = json_ready(result.as_dict() | {"notes": list(notes(result))})
     return found
-
-
-def notes(result: Calibration) -> tuple[str, ...]:
-    """Return what a user of the found machine must know: its zeros, and its bodies' parameters."""
-    kept = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
-    found = []
-    if any(value.group in ("zeros", "scales") for value in result.values):
-        found.append(
-            f"Zeros and scales of joints {', '.join(kept)} are the legs' reading in robot.toml: "
-            "joint coordinate = zero + scale x reading."
-            if kept
-            else "The geometry has taken the joints' zeros: joint coordinates are readings."
-        )
-    found.append(
-        "Masses, centres of mass, moments of inertia and friction are as they were on the drawn "
-        "geometry: where they were identified, identify them again on this one."
-    )
-    return tuple(found)
 
 
 def _header(result: Calibration) -> list[str]:
