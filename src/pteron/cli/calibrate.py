@@ -62,7 +62,7 @@ def calibrate(
     --held-out LOG: What to judge by; once for each. By default every fifth row, if there are
         enough.
     --free GROUP: Seek only this; once for each: zeros, scales, lengths, points, directions, tool,
-        radius, angles, or a value such as legs[2].lower_length.
+        radius, angles, or a value by its name in calibration.json.
     --prior TOML: Standard deviations by group or value, m and rad.
     --plan N: Choose so many poses to measure, in place of a LOG.
     --measure: What will be measured at the planned poses.
@@ -113,7 +113,7 @@ def _prior(path: str) -> dict[str, float]:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise DataError(
                 f"{path}: {name} = {value!r}: a standard deviation in m or rad expected; a value's "
-                'name stands in quotes, as in "legs[2].lower_length" = 0.0001'
+                'name stands in quotes, as in "zeros[2]" = 0.0001'
             )
         found[name] = float(value)
     return found

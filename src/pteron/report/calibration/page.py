@@ -111,7 +111,8 @@ def levels(values: Array) -> list[float]:
     """Return round levels of a map, of which the first is below all of its values."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     step = nice_step(max((high - low) / _LEVELS, 1e-3 * high, 1e-12))
-    return (step * np.arange(np.floor(low / step), np.ceil(high / step) + 1.0)).tolist()
+    first, last = int(np.floor(low / step)), int(np.ceil(high / step))
+    return [step * k for k in range(first, last + 1)]
 
 
 def _figures(result: Calibration) -> dict[str, Any]:
