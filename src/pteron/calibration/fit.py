@@ -39,6 +39,15 @@ _SETTLED = 1e-4
 _DOUBTED = 0.99
 """Quantile of a row's squared residuals beyond which it counts less."""
 
+_LOST = 30.0
+"""Cost of a row whose readings lead to no pose, in variances: as of one that hardly fits."""
+
+_STRAY = 30.0
+"""Deviations from which on a row may stray from a step that serves all others."""
+
+_FEW = 0.05
+"""Most of all rows that may."""
+
 _OUTLYING = 1e-5
 """Probability of a faultless row, over their number, below which it is left out."""
 
@@ -199,6 +208,10 @@ class Fitter:
                     moved = guess.moved(self.blocks, share * step)
                     after = self._sums(moved, total + share * step, sums.poses, noise, kept)
                     fell = after.cost <= sums.cost * (1.0 + 1e-9) + 1e-12
+                    if not fell and share == 1.0:
+                        strays = self._strays(sums, after, kept)
+                        if strays is not None:
+                            kept, fell = kept & ~strays, True
                 except ValueError:  # no such machine, or out of its reach
                     fell = False
                 if fell:
@@ -215,6 +228,20 @@ class Fitter:
             if share == 1.0 and small.max() < _SETTLED:
                 break
         return guess, total, sums, taken
+
+    def _strays(
+        self, before: _Sums, after: _Sums, kept: NDArray[np.bool_]
+    ) -> NDArray[np.bool_] | None:
+        """Return the few rows without which a step is a great one; None where there are none.
+
+        The pose of a row next to a singularity jumps where the geometry moves by little.
+        """
+        strays = kept & (after.distances > _STRAY)
+        if not 0 < strays.sum() <= max(1.0, _FEW * kept.sum()):
+            return None
+        others = kept & ~strays
+        squares = [float((sums.distances[others] ** 2).sum()) for sums in (before, after)]
+        return strays if squares[1] < 0.1 * squares[0] else None
 
     def cost(self, guess: Guess, total: Array, fit: Fit) -> float:
         """Return the squared residuals, in variances, and tolerances of a guess; inf: no pose."""
@@ -250,8 +277,11 @@ class Fitter:
         matrix, right, cost = np.zeros((count, count)), np.zeros(count), 0.0
         joints = guess.joints(self.given.readings)
         found = self.slopes.poses(guess, joints, poses)
-        if np.isnan(found[kept]).any():
+        lost = np.isnan(found).any(axis=1)
+        if 2 * lost[kept].sum() > kept.sum():
             raise ValueError
+        found[lost] = poses[lost]  # out of reach by little; it may come back
+        cost += _LOST * float((lost & kept).sum())
         residuals = np.zeros((rows, width))
         measured = np.zeros((rows, width), dtype=bool)
         distances = np.zeros(rows)
@@ -260,6 +290,7 @@ class Fitter:
             at = self.slopes.rows(guess, self.given, found, chosen)
             residuals[chosen], measured[chosen] = at.residuals, at.measured
             r, slopes = self.whitened(at, guess, noise)
+            r[lost[chosen]], slopes[lost[chosen]] = 0.0, 0.0
             squares = np.einsum("nk,nk->n", r, r)
             distances[chosen] = np.sqrt(squares)
             limit = np.sqrt(chi2.ppf(_DOUBTED, np.maximum(at.measured.sum(axis=1), 1)))
