@@ -1,6 +1,6 @@
 """The reference: pages of everything public, written from what the package says of itself.
 
-A function that no topic names comes under "More", a module of `pteron.__all__` gets a page of its
+A function that no topic names comes under "More", a module of `_PUBLIC` gets a page of its
 own, so that nothing public is left out.
 """
 
@@ -57,7 +57,7 @@ TOPICS: dict[str, tuple[str, ...]] = {
 """Names on each page, in order."""
 
 MORE_MODULES = ("pteron.reduction",)
-"""Public, though `pteron.__all__` has its functions only."""
+"""Public, though `_PUBLIC` has its functions only."""
 
 INSIDE = {
     "equations": "The paper, as expressions: [the theory](../../theory/index.md) links here.",
@@ -79,21 +79,25 @@ def directive_for(value: object) -> str:
     return "autofunction" if callable(value) else "autodata"
 
 
+_PUBLIC: list[str] = vars(pteron)["__all__"]
+"""All public names of the package."""
+
+
 def by_topic() -> dict[str, tuple[str, ...]]:
     """Return the public names by page."""
     named = {name for names in TOPICS.values() for name in names}
-    modules = {name for name in pteron.__all__ if isinstance(getattr(pteron, name), ModuleType)}
+    modules = {name for name in _PUBLIC if isinstance(getattr(pteron, name), ModuleType)}
     found = {
-        topic: tuple(name for name in names if name in pteron.__all__)
+        topic: tuple(name for name in names if name in _PUBLIC)
         for topic, names in TOPICS.items()
     }
-    rest = tuple(name for name in pteron.__all__ if name not in named | modules)
+    rest = tuple(name for name in _PUBLIC if name not in named | modules)
     return found | ({"More": rest} if rest else {})
 
 
 def public_modules() -> list[ModuleType]:
     """Return the modules that `pteron` hands on."""
-    values = [getattr(pteron, name) for name in pteron.__all__]
+    values = [getattr(pteron, name) for name in _PUBLIC]
     found = [value for value in values if isinstance(value, ModuleType)]
     return [*found, *map(import_module, MORE_MODULES)]
 

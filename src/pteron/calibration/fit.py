@@ -277,7 +277,7 @@ class Fitter:
         matrix, right, cost = np.zeros((count, count)), np.zeros(count), 0.0
         joints = guess.joints(self.given.readings)
         found = self.slopes.poses(guess, joints, poses)
-        lost = np.isnan(found).any(axis=1)
+        lost: NDArray[np.bool_] = np.asarray(np.isnan(found).any(axis=1))
         if 2 * lost[kept].sum() > kept.sum():
             raise ValueError
         found[lost] = poses[lost]  # out of reach by little; it may come back

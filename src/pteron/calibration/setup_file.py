@@ -79,7 +79,7 @@ class InstrumentTable(Table):
     """`[instrument]`: what measured positions and angles."""
 
     frame: Literal["known", "unknown"] = Field(
-        "known", description='"known": it measures in the base frame'
+        default="known", description='"known": it measures in the base frame'
     )
 
 

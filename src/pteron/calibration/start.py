@@ -54,7 +54,9 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
     poses = slopes.poses(guess, joints, begin)
     whole = seen.all(axis=-1) & ~np.isnan(places).any(axis=-1)
-    told = whole if given.setup.frame_known else np.zeros_like(whole)
+    told: NDArray[np.bool_] = np.asarray(whole)
+    if not given.setup.frame_known:
+        told[:] = False
     with np.errstate(invalid="ignore"):  # of a pose that was not found
         sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
     far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)

@@ -50,7 +50,7 @@ _COMPLETION = {
 }
 
 
-def help_of(command: Callable[..., None]) -> dict[str, str]:
+def help_of(command: Callable[..., None]) -> dict[str, Any]:
     """Give a command's parameters their options; return its help and what stands at its end."""
     text, *sections = _SECTION.split(cleandoc(command.__doc__ or ""))
     told = dict(zip(sections[::2], sections[1::2], strict=True))
