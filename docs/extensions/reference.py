@@ -88,8 +88,7 @@ def by_topic() -> dict[str, tuple[str, ...]]:
     named = {name for names in TOPICS.values() for name in names}
     modules = {name for name in _PUBLIC if isinstance(getattr(pteron, name), ModuleType)}
     found = {
-        topic: tuple(name for name in names if name in _PUBLIC)
-        for topic, names in TOPICS.items()
+        topic: tuple(name for name in names if name in _PUBLIC) for topic, names in TOPICS.items()
     }
     rest = tuple(name for name in _PUBLIC if name not in named | modules)
     return found | ({"More": rest} if rest else {})

@@ -262,13 +262,14 @@ def calibrated(guess: Guess) -> Manipulator:
     for leg, zero, scale in zip(
         guess.robot.legs, guess.zeros.tolist(), guess.scales.tolist(), strict=True
     ):
-        taken = leg.with_zero(zero) if scale == 1.0 else None
-        if taken is not None:
-            legs.append(replace(taken, reading=None, limits=leg.limits))
-        elif zero == 0.0 and scale == 1.0:
-            legs.append(replace(leg, reading=None))
+        taken = leg.with_zero(zero)
+        if taken is None:
+            taken, left = leg, zero
         else:
-            legs.append(replace(leg, reading=Reading(zero, scale)))
+            left = 0.0
+        plain = left == 0.0 and scale == 1.0
+        reading = None if plain else Reading(left, scale)
+        legs.append(replace(taken, reading=reading, limits=leg.limits))
     robot = replace(guess.robot, legs=tuple(legs))
     tool = tuple(guess.marks[""].tolist())
     if any(tool) or robot.platform.tool:

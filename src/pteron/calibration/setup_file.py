@@ -36,18 +36,18 @@ Noise = Annotated[Number, Field(gt=0.0)]
 class NoiseTable(Table):
     """`noise` by kind of value, m or rad."""
 
-    position: Noise | None = Field(None, description="of x, y and z, m")
-    angle: Noise | None = Field(None, description="of the pose's angles, rad")
-    height: Noise | None = Field(None, description="m")
-    distance: Noise | None = Field(None, description="m")
-    readings: Noise | None = Field(None, description="of the joints' readings, m or rad")
+    position: Noise | None = Field(default=None, description="of x, y and z, m")
+    angle: Noise | None = Field(default=None, description="of the pose's angles, rad")
+    height: Noise | None = Field(default=None, description="m")
+    distance: Noise | None = Field(default=None, description="m")
+    readings: Noise | None = Field(default=None, description="of the joints' readings, m or rad")
 
 
 class MeasuredTable(Table):
     """`[measured]`: how exactly."""
 
     noise: Annotated[NoiseTable, BeforeValidator(_named)] = Field(
-        default_factory=lambda: NoiseTable(),
+        default_factory=NoiseTable,
         description="standard deviation: one number for all that was measured, or one by kind",
     )
 
@@ -56,7 +56,7 @@ class PlaceTable(Table):
     """`[marks.NAME]` on the platform, `[anchors.NAME]` in the base frame."""
 
     at: Three = Field((0.0, 0.0, 0.0), description="m; where free, where it is sought from")
-    free: bool = Field(False, description="whether it is found with the geometry")
+    free: bool = Field(default=False, description="whether it is found with the geometry")
 
     @model_validator(mode="after")
     def _somewhere(self) -> PlaceTable:
@@ -68,11 +68,11 @@ class PlaceTable(Table):
 class PlaneTable(Table):
     """`[planes.NAME]`: normal . p = offset in the base frame."""
 
-    known: bool = Field(True, description="false: it is found with the geometry")
+    known: bool = Field(default=True, description="false: it is found with the geometry")
     normal: Annotated[Three, AfterValidator(lambda v: unit_vector(v, "normal"))] = Field(
         (0.0, 0.0, 1.0), description="unit vector along which heights grow"
     )
-    offset: Number = Field(0.0, description="m")
+    offset: Number = Field(default=0.0, description="m")
 
 
 class InstrumentTable(Table):
@@ -91,7 +91,7 @@ class MeasuredLog(Table):
     marks: dict[str, PlaceTable] = Field(default_factory=dict)
     planes: dict[str, PlaneTable] = Field(default_factory=dict)
     anchors: dict[str, PlaceTable] = Field(default_factory=dict)
-    instrument: InstrumentTable = Field(default_factory=lambda: InstrumentTable())
+    instrument: InstrumentTable = Field(default_factory=InstrumentTable)
 
     def setup(self) -> Setup:
         """Return what the measurements refer to."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from rich.table import Table
 
@@ -22,6 +22,7 @@ from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.calibration import Calibration
+    from pteron.manipulator import Manipulator
     from pteron.report.calibration import Written
 
 _MOST = 12
@@ -78,7 +79,8 @@ def calibrate(
         raise DataError("give logs of measurements, or --plan with the number of poses to measure")
     machine = load_robot(robot, elbows)
     if plan is not None:
-        _plan(machine, plan, measure, out, json=json)
+        tolerances = None if prior is None else _prior(prior)
+        _plan(machine, plan, measure, out, free, tolerances, json=json)
         return
     with spinner("Reading the measurements"):
         from pteron.calibration import calibrate as calibrated, read_measurements
@@ -119,8 +121,46 @@ def _prior(path: str) -> dict[str, float]:
     return found
 
 
-def _plan(machine: Any, count: int, measure: Measure, out: str, *, json: bool) -> None:
-    raise DataError(f"--plan {count}: poses cannot be planned yet")
+def _plan(
+    machine: Manipulator,
+    count: int,
+    measure: Measure,
+    out: str,
+    free: list[str] | None,
+    prior: dict[str, float] | None,
+    *,
+    json: bool,
+) -> None:
+    """Choose the poses to measure, and write the table that the machine runs."""
+    from pteron.tables import check_output, write_table
+
+    check_output(out)
+    with spinner(f"Choosing {count} poses"):
+        import polars as pl
+
+        from pteron.calibration import plan
+
+        found = plan(machine, count, measure, free=free, prior=prior)
+        path = write_table(pl.DataFrame(found.columns()), out)
+    box = {name: list(side) for name, side in zip(("low", "high"), found.region.box, strict=True)}
+    if json:
+        expected = {"before": found.before, "after": found.after}
+        show_json({"file": str(path), "expected": expected, "region": box})
+        return
+    low, high = found.region.box
+    sides = ", ".join(
+        f"{name} {1e3 * a:.0f} to {1e3 * b:.0f} {'mm' if unit == 'm' else 'mrad'}"
+        for name, unit, a, b in zip(
+            machine.coordinates, machine.units, low.tolist(), high.tolist(), strict=True
+        )
+    )
+    show(
+        f"{plain(machine.name)}: {count} poses to measure their {measure}, in a box where every "
+        f"pose is proved to serve: {sides}",
+        f"The tool's place is off by up to {1e3 * found.before:.3g} mm as drawn (one standard "
+        f"deviation of ordinary tolerances); {1e3 * found.after:.3g} mm are expected to be left.",
+        *written(path),
+    )
 
 
 def _show(result: Calibration, files: Written) -> None:

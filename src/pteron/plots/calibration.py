@@ -180,15 +180,12 @@ def row_residuals_figure(
         band = 2e3 * noise[kind]
         axes.axhspan(-band, band, color=MUTED, alpha=0.16, linewidth=0.0)
         for column in np.flatnonzero(named == kind):
-            for chosen, look in (
-                (kept, {"color": INK, "markersize": 2.6}),
-                (
-                    ~kept,
-                    {"markerfacecolor": "none", "markeredgecolor": WARNING, "markersize": 5.0},
-                ),
-            ):
+            for chosen, face, edge, size in ((kept, INK, INK, 2.6), (~kept, "none", WARNING, 5.0)):
                 here = chosen & measured[:, column]
-                axes.plot(rows[here], 1e3 * residuals[here, column], "o", **look)
+                (marks,) = axes.plot(
+                    rows[here], 1e3 * residuals[here, column], "o", markersize=size
+                )
+                marks.set(markerfacecolor=face, markeredgecolor=edge)
         axes.set_xlim(0.0, len(rows) + 1.0)
     return figure
 

@@ -323,7 +323,9 @@ def _box(points: JointPoints, guides: Sequence[Guide]) -> tuple[Array, Array]:
 
 
 def _in_grey(copies: Copies) -> Copies:
-    return replace(copies, colors=np.tile(np.array(rgb(MUTED), dtype=np.uint8), (len(copies.colors), 1)))
+    return replace(
+        copies, colors=np.tile(np.array(rgb(MUTED), dtype=np.uint8), (len(copies.colors), 1))
+    )
 
 
 def _linear(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -101,9 +101,7 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
                 drawn.append(svg(figure, name=f"{when}{''.join(plane)}", title=title))
                 units.append(unit)
             most = tuple(length(float(error[reached].max())) for error in errors)
-            found.append(
-                ErrorMap("-".join(plane), *drawn, (most[0], most[1]), (units[0], units[1]))
-            )
+            found.append(ErrorMap("-".join(plane), drawn[0], drawn[1], list(most), units))
     return found
 
 

@@ -41,9 +41,12 @@ def _row(value: Value) -> Row:
     half = factor * 0.5 * (value.interval[1] - value.interval[0])
     change = value.found - value.drawn
     texts = [measured(factor * one, half)[0] for one in (value.drawn, value.found, change)]
+    drawn, found, changed = texts
     return Row(
         value.name,
-        *texts,
+        drawn,
+        found,
+        changed,
         measured(0.0, half)[1],
         unit,
         value.origin,
