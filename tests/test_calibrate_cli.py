@@ -65,3 +65,14 @@ def test_a_users_error_is_one_line_and_leaves_nothing(options: str, words: str):
     Path("p.toml").write_text("legs = [1.0]\n", "utf-8")
     pteron.save(DRAWN, "robot.toml")
     refused(f"calibrate {options}", words)
+
+
+def test_planned_poses_are_a_table_that_the_machine_runs():
+    text = done("calibrate --plan 9 --measure heights --robot linear-delta --out plan.csv")
+    table = pl.read_csv("plan.csv")
+    assert table.columns == ["x", "y", "z", "rho1", "rho2", "rho3"]
+    poses, joints = table.select("x", "y", "z").to_numpy(), table.select("^rho.$").to_numpy()
+    assert pteron.inverse_kinematics(DRAWN, poses) == pytest.approx(joints, abs=1e-12)
+    assert len(table) == 9
+    assert len(set(poses[:, 2])) == 1
+    assert "every pose is proved to serve" in text

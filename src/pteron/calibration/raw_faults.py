@@ -28,7 +28,7 @@ _FAR = 25.0
 _NEAR = 9.0
 """The same that a fault leaves which explains it."""
 
-_ROWS = 60
+_ROWS = 16
 """Rows looked at, evenly spread."""
 
 _NOISE = 1e-4
@@ -49,12 +49,15 @@ def _fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> 
     now = _misfit(rows, blocks, robot_guess)
     if now < _FAR:
         return None
-    found = []
-    for text, mended in _mistakes(rows, robot_guess):
-        left = _misfit(mended, blocks, robot_guess)
-        if left < _NEAR and left < 0.1 * now:
-            found.append((left, text))
-    return min(found)[1] if found else None
+    for mistakes in _MISTAKES:
+        tried = (
+            (_misfit(mended, blocks, robot_guess), text)
+            for text, mended in mistakes(rows, robot_guess)
+        )
+        found = [(left, text) for left, text in tried if left < min(_NEAR, 0.1 * now)]
+        if found:
+            return min(found)[1]
+    return None
 
 
 def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
@@ -76,9 +79,8 @@ def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
     return float(np.median(squares / counts))
 
 
-def _mistakes(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
-    """Yield likely mistakes, and the measurements with each of them undone."""
-    setup = given.setup
+def _units(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield units that were perhaps meant, and the measurements in them."""
     linear = np.array([leg.joint.unit == "m" for leg in guess.robot.legs])
     for factor, text in ((1e-3, "in millimetres"), (1e3, "1000 times too small, as of km for m")):
         if not np.isnan(given.positions).all():
@@ -122,15 +124,22 @@ def _mistakes(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurem
             "the measured angles are in degrees: give them in radians",
             replace(given, angles=np.radians(given.angles)),
         )
-    names = guess.robot.joint_names
-    for i, j in combinations(range(len(names)), 2):
-        order = list(range(len(names)))
-        order[i], order[j] = j, i
+
+
+def _marks(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield marks that were perhaps swapped, and the measurements with them exchanged."""
+    used = sorted(set(given.marks))
+    for a, b in combinations(used, 2):
+        other = {a: b, b: a}
         yield (
-            f"the readings of legs {i + 1} and {j + 1} ({names[i]} and {names[j]}) are swapped: "
-            "exchange the columns",
-            replace(given, readings=given.readings[:, order]),
+            f"the marks {a or 'tool'} and {b or 'tool'} are swapped: exchange their names",
+            replace(given, marks=tuple(other.get(name, name) for name in given.marks)),
         )
+
+
+def _frames(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield quarter turns of the instrument, and the measurements turned back."""
+    setup = given.setup
     if setup.frame_known and not np.isnan(given.positions).all():
         for turn in _quarter_turns():
             # Rows of `turn` say where the instrument's x, y and z point.
@@ -145,13 +154,23 @@ def _mistakes(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurem
                 'say [instrument] frame = "unknown"',
                 replace(given, positions=given.positions @ turn),
             )
-    used = sorted(set(given.marks))
-    for a, b in combinations(used, 2):
-        other = {a: b, b: a}
+
+
+def _legs(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield legs whose readings were perhaps swapped, and the measurements with them exchanged."""
+    names = guess.robot.joint_names
+    for i, j in combinations(range(len(names)), 2):
+        order = list(range(len(names)))
+        order[i], order[j] = j, i
         yield (
-            f"the marks {a or 'tool'} and {b or 'tool'} are swapped: exchange their names",
-            replace(given, marks=tuple(other.get(name, name) for name in given.marks)),
+            f"the readings of legs {i + 1} and {j + 1} ({names[i]} and {names[j]}) are swapped: "
+            "exchange the columns",
+            replace(given, readings=given.readings[:, order]),
         )
+
+
+_MISTAKES = (_units, _marks, _frames, _legs)
+"""Likely mistakes, those that are quick to try first."""
 
 
 def _quarter_turns() -> Iterator[Array]:

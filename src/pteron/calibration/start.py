@@ -62,8 +62,9 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
     other = np.isnan(poses).any(axis=-1)
     other |= np.where(told, far.any(axis=-1), sides != side)
-    for i in np.flatnonzero(other):
-        modes = direct_kinematics(robot, joints[i])
+    for i, modes in zip(
+        np.flatnonzero(other), direct_kinematics(robot, joints[other]), strict=True
+    ):
         modes = modes[~np.isnan(modes).any(axis=-1)]
         if not len(modes):
             raise DataError(
