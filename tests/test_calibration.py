@@ -299,9 +299,9 @@ def test_a_mistake_that_the_drawing_shows_is_one_line(kind, words):
 
 
 def test_swapped_marks_are_told():
-    robot = pteron.load("stewart")
+    robot = pteron.load("quadrupteron")
     truth, _, poses, readings = off_drawing(robot)
-    marks = {"a": (0.3, 0.0, 0.1), "b": (-0.2, 0.2, 0.1)}
+    marks = {"a": (0.08, 0.0, 0.05), "b": (-0.06, 0.05, 0.02)}
     names = tuple("ab"[i % 2] for i in range(60))
     places = np.array(
         [
@@ -310,7 +310,8 @@ def test_swapped_marks_are_told():
         ]
     )
     setup = Setup(marks={name: Place(at) for name, at in marks.items()})
-    given = replace(Measurements.of(robot, readings, positions=places, setup=setup), marks=names)
+    seen = Measurements.of(robot, readings, poses=poses, positions=places, setup=setup)
+    given = replace(seen, marks=names)
     assert calibrate(robot, given, free=GEOMETRY).verdict.grade == "trustworthy"
     other = replace(given, marks=tuple("ba"["ab".index(name)] for name in names))
     with pytest.raises(DataError, match="marks a and b are swapped"):
