@@ -26,7 +26,7 @@ class Destination:
     out : str or None
         As it was given.
     name : str
-        Name of the table and the figures in a folder, without their endings.
+        Name of the files NAME.csv and NAME.json in a folder.
     """
 
     out: str | None

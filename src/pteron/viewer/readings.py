@@ -15,10 +15,10 @@ from pteron.viewer.state import ViewerState
 from pteron.workspace import pose_margins
 
 Level = Literal["far", "near", "close"]
-"""Distance of a pose from what ends the machine's work."""
+"""How near a margin of a pose, to a singularity or a limit, is to its end: see `level`."""
 
 _NEAR = 0.3
-"""Margin, 1 at best, below which a pose is near what ends the work."""
+"""Margin, 1 at best, below which it is near its end."""
 
 _CLOSE = 0.1
 """Margin below which it is close to that."""

@@ -1,4 +1,7 @@
-"""Forces, speeds, power, energy and inertia at the drives over a cycle, and the best ratios."""
+"""Results of sizing: peaks, means, power and energy of a cycle at the drives, and best ratios.
+
+The samples of forces, speeds and inertia come from `size`.
+"""
 
 from __future__ import annotations
 
