@@ -20,6 +20,7 @@ PLAIN = {
         "errors",
         "extras",
         "html_table",
+        "public",
         "renamed",
         "shapes",
         "templates",
