@@ -15,6 +15,7 @@ from pteron.calibration.guess import Block, Guess, Unknown
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
+from pteron.calibration.unseen import tower_radius
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
@@ -250,6 +251,8 @@ def _drawn(start: Guess, block: Block, k: int) -> float:
     if block.kind == "frame":
         return float(start.shift[k]) if k < 3 else 0.0
     change = block.changes[k]
+    if change.group == "radius":
+        return tower_radius(start)
     if change.group not in ("points", "lengths"):
         return 0.0
     value = getattr(start.robot.legs[change.leg], change.key)

@@ -16,7 +16,7 @@ _PART = 0.02
 """Share of a combination's greatest part from which a part is named."""
 
 _NAMED = 6
-"""Most values that are named of a combination."""
+"""Most values that are named of a combination, and most combinations of many values."""
 
 _WHOLE = 0.9995
 """A part from which on it counts as the greatest one, 1."""
@@ -64,7 +64,11 @@ def unseen_combinations(
         of = f", of {', '.join(owners)}" if owners else ""
         told_lines.append(f"{text}{of} ({len(all_of)})")
     names = [unknown.name for block in blocks for unknown in block.unknowns]
-    return (*told_lines, *(told(row * tolerances, names) for row in _sparse(left)))
+    others = [told(row * tolerances, names) for row in _sparse(left)]
+    more = len(others) - _NAMED
+    if more > 1:
+        others[_NAMED:] = [f"and {more} more combinations of many values"]
+    return (*told_lines, *others)
 
 
 def told(vector: Array, names: Sequence[str]) -> str:
@@ -169,7 +173,7 @@ def _size(start: Guess, blocks: Sequence[Block]) -> Array:
             if block.kind == "geometry":
                 change = block.changes[k]
                 if change.group in AXIAL:
-                    found.append(_radius(start) if change.group == "radius" else 0.0)
+                    found.append(tower_radius(start) if change.group == "radius" else 0.0)
                     continue
                 held = getattr(start.robot.legs[change.leg], change.key)
                 if unknown.unit == "m":
@@ -184,7 +188,8 @@ def _size(start: Guess, blocks: Sequence[Block]) -> Array:
     return np.array(found)
 
 
-def _radius(start: Guess) -> float:
+def tower_radius(start: Guess) -> float:
+    """Return the distance of the first guide point from the platform's axis, m."""
     point, axis = np.array(start.robot.legs[0].guide_point), np.array(start.robot.platform.axis)
     return float(np.linalg.norm(np.cross(axis, point)))
 

@@ -186,14 +186,14 @@ def _values(result: Calibration) -> Table:
     from pteron.report.calibration import value_rows
 
     rows = sorted(value_rows(result), key=lambda row: -row.size)
-    numbers = ("drawn", "found", "+- 95 %", "change")
+    numbers = ("drawn", "change", "+- 95 %")
     more = len(rows) - _MOST
     return table(
         *("value", *numbers, "unit", "made by"),
         rows=[
             (
                 plain(row.name),
-                *(ascii_number(text) for text in (row.drawn, row.found, row.half, row.change)),
+                *(ascii_number(text) for text in (row.drawn, row.change, row.half)),
                 "deg" if row.unit == "°" else row.unit,
                 row.origin,
             )
