@@ -36,7 +36,7 @@ def test_the_files_agree_with_the_terminal():
     names = ["calibration.html", "calibration.json", "robot.toml"]
     assert sorted(file.name for file in folder.iterdir()) == names
     data = json.loads((folder / "calibration.json").read_text("utf-8"))
-    assert text.startswith(f"linear-delta: {data['verdict']['grade']}, {data['rank']} of ")
+    assert text.startswith(f"linear-delta: {data['verdict']['grade']}, {data['shown']} of ")
     for line in (*data["verdict"]["reasons"], *data["notes"]):
         assert f"{line}\n" in text
     for line in data["unseen"]:

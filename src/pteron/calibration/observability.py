@@ -34,7 +34,7 @@ class Observability:
     Attributes
     ----------
     rank : int
-        How many combinations of the values they show.
+        How many combinations of the values they show, if there are poses enough.
     columns : int
         How many values there are.
     primes : tuple of int
@@ -60,6 +60,11 @@ class Observability:
     largest_dropped: float
     unseen: tuple[str, ...]
     weak: tuple[str, ...]
+
+    @property
+    def shown(self) -> int:
+        """How many combinations these rows show."""
+        return min(self.rank, self.at_poses)
 
     def summary(self) -> str:
         """Return the grounds of the rank in a few sentences."""

@@ -198,6 +198,7 @@ class Calibration:
             "scales": self.fit.guess.scales.tolist(),
             "noise": self.noise,
             "rank": self.observability.rank,
+            "shown": self.observability.shown,
             "columns": self.observability.columns,
             "certificate": self.observability.summary(),
             "unseen": list(self.observability.unseen),

@@ -83,10 +83,11 @@ def verdict_of(
     if out > 0.1 * len(fit.kept):
         worse("usable with care")
         reasons.append(f"{out} of {len(fit.kept)} rows do not fit and were left out.")
-    open_values = shown.columns - shown.rank
+    open_values = shown.columns - shown.shown
     if open_values:
+        more = f"; at more poses {shown.rank} would" if shown.rank > shown.shown else ""
         reasons.append(
-            f"{shown.rank} of {shown.columns} combinations show in these measurements; the other "
-            f"{open_values} are kept at the drawing."
+            f"{shown.shown} of {shown.columns} combinations show in these measurements, the other "
+            f"{open_values} are kept at the drawing{more}."
         )
     return Verdict(grade, tuple(reasons), tuple(steps))

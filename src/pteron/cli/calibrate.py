@@ -171,7 +171,7 @@ def _show(result: Calibration, files: Written) -> None:
     color = GRADE_COLORS[verdict.grade]
     show(
         f"[bold {color}]{plain(result.drawn.name)}: {verdict.grade}[/bold {color}], "
-        f"{shown.rank} of {shown.columns} combinations shown",
+        f"{shown.shown} of {shown.columns} combinations shown",
         _values(result),
         *_errors(result),
         *map(plain, (*verdict.reasons, *verdict.next_steps)),
