@@ -163,7 +163,7 @@ if __name__ == "__main__":
         (nine, fell), (own, left) = trap(seed)
         print(
             f"trap {seed}: nine free, rods off by {nine:.1f} mm, heights {fell:.3f} mm rms; with"
-            f"  tolerances {own:.2f} mm, {left:.3f} mm rms",
+            f" tolerances {own:.2f} mm, {left:.3f} mm rms",
             flush=True,
         )
     for name in ("delta", "linear-delta"):

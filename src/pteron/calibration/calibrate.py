@@ -24,7 +24,7 @@ from pteron.manipulator import RobotLike, as_manipulator
 Array = NDArray[np.float64]
 
 _EVERY = 5
-"""Of so many rows one is held out where no other log is given."""
+"""One row in so many is held out where no other log is given."""
 
 _PER_VALUE = 1.5
 """Numbers measured for each that can be seen, below which every row is needed for the fit."""

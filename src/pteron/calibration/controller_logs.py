@@ -48,7 +48,7 @@ class _Touched(NamedTuple):
     at: dict[str, float]
     """By the letters of its axes, X to C, in mm and degrees."""
     height: float
-    """Of the tool over the plane, mm."""
+    """Height of the tool over the plane, mm."""
 
 
 def read_controller_log(path: str | Path, robot: Manipulator) -> Measurements | None:

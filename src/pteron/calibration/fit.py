@@ -57,7 +57,7 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class Fit:
-    """What was found.
+    """The result of a search for the most probable values.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What measurements can show of a machine's geometry: an exact rank, and in words what they cannot.
+"""The part of a geometry that measurements show: an exact rank, and in words what they do not.
 
 The rank of the residuals' slopes at random poses is found modulo primes, on the machine's geometry
 in exact numbers, as that of base parameters is; singular values at the measured poses confirm it,
@@ -29,7 +29,7 @@ _NAMED = 6
 
 @dataclass(frozen=True)
 class Observability:
-    """What measurements can show.
+    """The combinations of values that measurements show, and those that they do not.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Observability:
 
     @property
     def shown(self) -> int:
-        """How many combinations these rows show."""
+        """The number of combinations that these rows show."""
         return min(self.rank, self.at_poses)
 
     def summary(self) -> str:

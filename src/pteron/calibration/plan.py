@@ -1,4 +1,4 @@
-"""Which poses to measure: those that say most, within a box of poses that is proved to serve."""
+"""Plans of measurements: the poses that say most, in a box of poses that is proved to serve."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pteron.workspace import Box, home_pose, prove
 Array = NDArray[np.float64]
 
 Measure = Literal["poses", "positions", "heights", "distances"]
-"""What is to be measured: all coordinates, the tool's place, its height, or a distance to it."""
+"""The quantity to measure: all coordinates, the tool's place, its height, or a distance to it."""
 
 Criterion = Literal["D", "worst"]
 """Least volume of the joint region of all values; or the least of the tool's greatest error."""

@@ -38,10 +38,8 @@ _LISTED = 8
 
 class _Score(NamedTuple):
     improvement: float
-    amounts: Array
     finding: str
     kind: str
-    tried: int
 
 
 def residual_faults(
@@ -108,7 +106,7 @@ def _scores(
         amounts = -(inverse @ (right / size)) / size
         return float(-right @ amounts) / variance, amounts
 
-    tests: list[tuple[str, str, int, float, Array]] = []
+    tests: list[tuple[str, str, int, float]] = []
     later = np.arange(len(chosen))
     for i in range(joints):
         column = more[..., i : i + 1]
@@ -120,7 +118,7 @@ def _scores(
                 f"The zero of joint {i + 1} ({names[i]}) slipped by {unit * amount[0]:+.3g} {told} "
                 f"before {given.places[chosen[t]]}: home it again, and measure anew from there."
             )
-            tests.append(("slipped zero", text, 1, found, amount))
+            tests.append(("slipped zero", text, 1, found))
         steps = np.sign(np.diff(given.readings[chosen, i], prepend=given.readings[chosen[0], i]))
         found, amount = score(column * steps[:, None, None])
         tests.append(
@@ -130,7 +128,6 @@ def _scores(
                 "its direction of approach: approach poses from one side, or take up its play.",
                 1,
                 found,
-                amount,
             )
         )
     times = given.times[chosen] if given.times is not None else chosen.astype(float)
@@ -146,7 +143,6 @@ def _scores(
                 "let it warm up, and measure quickly.",
                 joints,
                 found,
-                amount,
             )
         )
     place = joints
@@ -162,13 +158,12 @@ def _scores(
                     f"before {given.places[chosen[t]]}: fix it, and measure anew from there.",
                     3,
                     found,
-                    amount,
                 )
             )
-    for kind, text, freedom, found, amount in tests:
+    for kind, text, freedom, found in tests:
         limit = chi2.isf(_CHANCE / len(tests), freedom)
         if found > limit and found * variance > _SHARE * total:
-            yield _Score(found - chi2.isf(0.5, freedom), amount, text, kind, len(tests))
+            yield _Score(found - chi2.isf(0.5, freedom), text, kind)
 
 
 def _bad_leg(
@@ -194,7 +189,7 @@ def _bad_leg(
             f"{np.sqrt(mean[first]):.2g} times the noise: look for play, bending, or joints whose "
             "axes do not meet."
         )
-        yield _Score(float(squares[:, first].sum()), np.zeros(1), text, "wrong model", 1)
+        yield _Score(float(squares[:, first].sum()), text, "wrong model")
 
 
 def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> tuple[Block, ...]:

@@ -1,4 +1,4 @@
-"""What measurements miss the machine by, with slopes against all that is sought.
+"""Residuals of measurements, with their slopes against all that is sought.
 
 The pose of a row is the one that its readings lead to, so that x' = -J^-1 (dq/dtheta theta'): every
 measurement, of whatever kind, is a function of that pose and of a mark on the platform.

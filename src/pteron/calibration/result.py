@@ -1,4 +1,4 @@
-"""What a calibration found: the machine, each value with its interval, and what it is worth."""
+"""The result of a calibration: the machine, each value with its interval, and a verdict."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pteron.manipulator import Manipulator
 Array = NDArray[np.float64]
 
 Origin = Literal["data", "both", "tolerance"]
-"""What made a value: the measurements, its ordinary tolerance, or both."""
+"""The maker of a value: the measurements, its ordinary tolerance, or both."""
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
 

@@ -14,7 +14,7 @@ from pteron.errors import DataError
 from pteron.manipulator import Manipulator
 
 GROUPS: tuple[str, ...] = tuple(group for group in get_args(Group) if group not in AXIAL)
-"""What may be freed as one."""
+"""The groups that may be freed as one."""
 
 TOLERANCES: dict[str, float] = {
     "lengths": 1e-3,

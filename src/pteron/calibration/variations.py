@@ -23,7 +23,7 @@ from pteron.manipulator import Manipulator
 Array = NDArray[np.float64]
 
 Group = Literal["zeros", "scales", "lengths", "points", "directions", "tool", "radius", "angles"]
-"""What a user frees, and gives a tolerance, as one."""
+"""Values that a user frees, and gives a tolerance, as one."""
 
 AXIAL = ("radius", "angles")
 """Groups of guide points about the platform's axis."""

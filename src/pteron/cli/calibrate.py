@@ -29,7 +29,7 @@ _MOST = 12
 """Values that the terminal shows, those that changed most; the page has them all."""
 
 Measure = Literal["positions", "heights", "poses", "distances"]
-"""What is measured at planned poses."""
+"""Quantities that may be measured at planned poses."""
 
 
 def calibrate(

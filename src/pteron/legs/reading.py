@@ -11,7 +11,7 @@ from pteron.toml import told
 
 @dataclass(frozen=True)
 class Reading:
-    """How a joint's coordinate follows from what its drive reads: q = zero + scale reading.
+    """The relation of a joint's coordinate to what its drive reads: q = zero + scale reading.
 
     Calibration writes it where the leg's geometry cannot take a zero or a scale.
 

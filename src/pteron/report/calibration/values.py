@@ -28,7 +28,7 @@ class Row:
     unit: str
     origin: Origin
     size: float
-    """How great the change is beside an ordinary tolerance."""
+    """The size of the change beside an ordinary tolerance."""
 
 
 def value_rows(result: Calibration) -> tuple[Row, ...]:
