@@ -1,4 +1,7 @@
-"""A leg's end in a ball joint under a platform that tilts; planar legs end so in a tripod."""
+"""Legs that end in a ball joint at a tilting platform: their keys, cone and hinges.
+
+`held_plane` and `UPRIGHT` are for planar legs of a tripod (P-R-S, R-P-S, R-R-S).
+"""
 
 from __future__ import annotations
 

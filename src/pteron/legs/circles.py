@@ -1,6 +1,7 @@
 """Two links that close a triangle: the intersection of two circles, the paper's Lemma 1.
 
-Vectors lie in the plane of the links, as two-vectors (2, 1).
+Vectors of the links' plane are two-vectors (2, 1); `plane_of` gives its axes. The random vectors
+are rational: exact reduction closes legs with them.
 """
 
 from __future__ import annotations
@@ -16,17 +17,17 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import cross
 
 _ROUNDING = 1e-15
-"""Difference from 0, 1 or -1 that counts as rounding."""
+"""Difference of an axis' component from 0, 1 or -1 that counts as rounding."""
 
 
 def edges_of_reach(lu: Expression, ll: Expression, n2: Expression) -> tuple[Expression, Expression]:
-    """Return what is 0 where the links are stretched, and where folded; negative beyond."""
+    """Return what is 0 where the links are stretched, and folded; negative beyond; n2 is u . u."""
     longest, shortest = lu + ll, lu - ll
     return longest * longest - n2, n2 - shortest * shortest
 
 
 def squared_reach(lu: Expression, ll: Expression, n2: Expression) -> Expression:
-    """Return Delta, the product under the radical of Eqs. (1) and (2), its four factors paired."""
+    """Return Delta, the radicand of Eqs. (1) and (2), its four factors paired; n2 is u . u."""
     stretched, folded = edges_of_reach(lu, ll, n2)
     return stretched * folded
 
@@ -39,7 +40,7 @@ def quarter_turn(v: Expression) -> Expression:
 def links_from_triangle(
     lu: Expression, ll: Expression, sigma: Expression, u: Expression
 ) -> tuple[Expression, Expression, Expression]:
-    """Return l_u, l_l (Eqs. 1 and 2, or 6 and 7) and 1/D with D = (l_u x l_l) . d.
+    """Return links l_u + l_l = u (Eqs. 1 and 2, or 6 and 7) and 1/D with D = (l_u x l_l) . d.
 
     D = -sigma sqrt(Delta) / 2: twice the area of the links' triangle.
     """

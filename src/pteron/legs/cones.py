@@ -1,4 +1,4 @@
-"""Limits of passive joints: the cone in which a ball joint holds its rod, the angle of an elbow."""
+"""Limits of passive joints: the cone in which a ball joint holds its rod, an elbow's angles."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Whether a kind of leg keeps the protocol of `legs.leg`: run it on a leg of a kind of your own.
+"""A test that a kind of leg keeps the protocol of `legs.leg`: run `faults` on a leg of your own.
 
-All of it is differentiation along one random motion of platform point and rotation: rates are the
-derivatives of coordinates, bodies move with the joints that carry them, the forces that bodies need
-do the work that their energy takes. No number is known beforehand.
+It differentiates along one random motion of platform point and rotation: rates are the derivatives
+of coordinates, bodies move with the joints that carry them, the forces that bodies need do the work
+that their energy takes. No number is known beforehand.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from pteron.legs.protocol import breaches, point_in_reach
 
 
 class _Moved:
-    """A leg along c(t) and phi(t), with what holds of it at t = 0."""
+    """A leg whose platform point and rotation move at random in t, with random inertia."""
 
     def __init__(self, leg: LegKind, axes: Sequence[Vector], seed: int) -> None:
         rng = np.random.default_rng(seed)

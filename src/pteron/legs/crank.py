@@ -1,8 +1,8 @@
-"""Legs with a crank, R-S-S and planar R-R-R: a last link leads from the crank's end on.
+"""Data and equations shared by legs with a crank, R-S-S and planar R-R-R.
 
-The crank turns about d through the guide point r; the last link ends at the platform point. The
-last link counts its length in space where it is a rod, in the crank's plane where it is a planar
-link; this is all that tells the kinds apart.
+The crank turns about d through the guide point r; the last link leads from the crank's end to the
+platform point. A rod (R-S-S) has its length in space, a planar link (R-R-R) in the crank's plane;
+each subclass supplies what depends on this.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
     ("mgx", "l"): (1, ("ll",)),
     ("I", "l"): (-1, ("ll", "ll")),
 }
-"""Mass moved from the last link's end to the upper link's: both carry the joint between them."""
+"""A transfer of mass between the links at the joint that both carry: for each parameter its sign
+and the lengths that multiply it (`Transfer.entries`)."""
 
 
 CRANK_KEYS: dict[str, Key] = {
@@ -188,15 +189,15 @@ class CrankEquations(LegEquations):
 
     @abstractmethod
     def counted(self, v: Expression) -> Expression:
-        """Return what of a vector (3, 1) the length of the last link counts."""
+        """Return the components of a vector (3, 1) that the last link's length is measured in."""
 
     @abstractmethod
     def within(self, v: Expression) -> Expression:
-        """Return a vector of the crank's plane (2, K) as `counted` has it."""
+        """Return a vector of the crank's plane (2, K) in the components of `counted`."""
 
     @abstractmethod
     def height(self, w: Expression) -> Expression:
-        """Return how far from the crank's plane c is, as far as it counts; w = c - r."""
+        """Return the distance of c from the crank's plane, 0 for a planar link; w = c - r."""
 
     @abstractmethod
     def last_link(

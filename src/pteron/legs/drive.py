@@ -1,4 +1,4 @@
-"""The drive of an actuated joint: friction, the motor's inertia, limits."""
+"""The drive of an actuated joint: friction, the motor's inertia, limits of force and speed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Stribeck:
 
 @dataclass(frozen=True)
 class Drive:
-    """The drive of an actuated joint; everything at the joint but what is said to be the motor's.
+    """The drive of an actuated joint; its values hold at the joint unless they name the motor.
 
     It must give ratio^2 rotor_inertia q'' + (coulomb + stribeck) s(q') + viscous q' + offset beside
     the force of the rigid bodies. s is the sign where forces are compared with logs, and

@@ -1,4 +1,4 @@
-"""The drives as a table that people read: a row for each quantity, a text a leg."""
+"""Rows of the table of the legs' drives, in `pteron show` and reports: a text for each leg."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _QUANTITIES = (
 
 
 def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
-    """Return what the legs' drives are; "-" where one has it not, no row if none has.
+    """Return a row for each quantity that some drive has: its name, a text a leg, "-" for none.
 
-    Where all legs have one unit it stands with the name.
+    A unit that all legs share stands with the name.
 
     Examples
     --------

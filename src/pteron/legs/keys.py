@@ -1,4 +1,4 @@
-"""The keys of a leg: what its fields, which are its keys in a file, hold, and the check of that."""
+"""The TOML keys of a leg, which are its dataclass' fields: roles, help, defaults and checks."""
 
 from __future__ import annotations
 

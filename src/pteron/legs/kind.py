@@ -1,4 +1,4 @@
-"""The data of a leg: what a kind of leg says of itself; `legs.leg` is the page to read first."""
+"""`LegKind`, the data of one leg: geometry, bodies, limits, drive; read `legs.leg` first."""
 
 from __future__ import annotations
 

@@ -15,10 +15,10 @@ from pteron.legs.circles import quarter_turn
 from pteron.legs.leg import Joint
 
 _PARALLEL = 1.0 - 1e-12
-"""Cosine between d and k above which a leg's last revolute joint and the one about k are one."""
+"""Cosine between d and the platform's axis k above which the revolute joints about them are one."""
 
 _COINCIDENT = 1e-12
-"""m between their axes below which they are."""
+"""Distance of the two axes, m, below which they are."""
 
 
 class Turning(NamedTuple):
@@ -29,7 +29,7 @@ class Turning(NamedTuple):
     acceleration: Expression
 
     def less(self, other: Turning) -> Turning:
-        """Return how it turns against another link."""
+        """Return its turning against another link's."""
         return Turning(*(a - b for a, b in zip(self, other, strict=True)))
 
 

@@ -1,4 +1,4 @@
-"""Breaches of the protocol of `legs.leg`, told before a machine takes a kind of leg."""
+"""Breaches of the protocol of `legs.leg`, for which a machine is refused when it is made."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from pteron.legs.kind import LegKind
 from pteron.legs.leg import LegMotion
 
 _TRIED = 200
-"""Random points among which one in reach is sought."""
+"""Random platform points of which the first in reach is taken."""
 
 _ALIKE = 1e-9
-"""Share of a row's size within which two rows are one."""
+"""Difference of two velocity rows, relative to their size, up to which they are equal."""
 
 
 def breaches(leg: LegKind, axes: Sequence[Vector]) -> tuple[str, ...]:
-    """Return why a leg cannot be modelled, whoever wrote its kind: one line each.
+    """Return why a leg cannot be modelled, a line each; none where it can.
 
     `axes` are those about which the platform turns against the leg, perpendicular to each other.
     """

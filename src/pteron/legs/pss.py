@@ -1,6 +1,6 @@
 """P-S-S legs, the linear Delta's: a slider (P) carries a rod between two ball joints (S).
 
-Two parallel rods, which keep the platform from turning, count as one rod with the sum of both. The
+Two parallel rods, which keep the platform from turning, count as one rod with both inertias. The
 joints of a rod are counted as universal ones: a rod's spin about itself moves nothing.
 """
 

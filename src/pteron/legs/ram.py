@@ -1,4 +1,4 @@
-"""A ram, driven in its middle: what legs with a cylinder at the base and a piston have alike."""
+"""Rams (a cylinder at the base, a piston, driven between them): data that R-P-R and U-P-S share."""
 
 from __future__ import annotations
 

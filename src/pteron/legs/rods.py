@@ -1,4 +1,4 @@
-"""A rod between two ball joints, or parallel rods that keep a bar at their ends parallel."""
+"""A rod between two ball joints, or parallel rods: keys, motion, joints and couples for any leg."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ ROD_KEYS: dict[str, Key] = {
 
 
 def free_axes(rods: int, bar: Vector | None, axis: Vector | None) -> tuple[Vector, ...]:
-    """Return axes about which rods let the platform turn, whose axis is `axis` if it turns.
+    """Return axes about which rods let the platform turn; `axis` is the platform's, if it turns.
 
     Parallel rods keep the bar at their ends, on a hinge where the platform turns; one alone keeps
     nothing. Where the bar is not told, nothing is held against the machine.

@@ -1,6 +1,6 @@
 """R-S-S legs, the Delta robot's: a crank (R) whose end carries a rod between two ball joints (S).
 
-Two parallel rods, which keep the platform from turning, count as one rod with the sum of both. The
+Two parallel rods, which keep the platform from turning, count as one rod with both inertias. The
 joints of a rod are counted as universal ones (R-U-U): a rod's spin about itself moves nothing.
 """
 

@@ -2,7 +2,7 @@
 
 A turning joint (R) drives two universal joints (U) with a slide (P) between them. The leg holds no
 point of the platform: its joint follows phi, and its two parts swing with the direction from the
-base to the platform point. The cardan error of its joints is left out.
+base to the platform point. The angle error of universal joints is left out.
 """
 
 from __future__ import annotations

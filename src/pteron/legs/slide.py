@@ -1,7 +1,7 @@
-"""Legs with a slider and one link, P-S-S and planar P-R-R.
+"""Data and equations shared by legs with a slider and one link, P-S-S and planar P-R-R.
 
-The slider moves along e through the guide point r. The link counts its length in space where it is
-a rod, in its plane where it is a planar link; this is all that tells the kinds apart.
+The slider moves along e through the guide point r. A rod (P-S-S) has its length in space, a planar
+link (P-R-R) in its plane; each subclass supplies what depends on this.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ class SlideEquations(LegEquations):
 
     @abstractmethod
     def counted(self, v: Expression) -> Expression:
-        """Return what of a vector (3, K) the length of the link counts: (3, K), or (2, K)."""
+        """Return a vector (3, K) as the link's length is measured: in space, or (2, K) in its plane."""
 
     @abstractmethod
     def in_space(self, v: Expression) -> Expression:

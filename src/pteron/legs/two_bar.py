@@ -1,19 +1,18 @@
-"""A P-R-R-R leg whose masses sit at its joints: its forces, in the cheapest form known.
+"""The forces that the two links of a P-R-R-R leg need, in the cheapest form known.
 
 The lower link's m and m gamma_x are two masses at its ends, so they may join the upper link, the
 slider and the platform; what is left of it is a moment of inertia I_l and the first moment across
-the link. A leg's kinetic energy is then, but for masses that move with R1 and R3,
+the link, m gamma_y. With links l_u + l_l = u, a leg's kinetic energy is then, but for masses that
+move with its first and last revolute joint, R1 and R3,
 
     T = I_u theta_u'^2 / 2  +  I_l theta_l'^2 / 2  -  eta D theta_u' theta_l',
 
 D = (l_u x l_l) . d and eta = m gamma_y / ll of the lower link. The coupling's two moments are eta
 times D theta_l'' + C theta_l'^2 and D theta_u'' - C theta_u'^2, C = l_u . l_l, which the closure of
-the links turns into products of what is known:
+the links turns into products of known terms:
 
     D theta_l'' + C theta_l'^2 = -(l_u . u'' + lu^2 theta_u'^2),
     D theta_u'' - C theta_u'^2 =   l_l . u'' + ll^2 theta_l'^2.
-
-The tests hold these forces against those of the bodies in motion.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from pteron.legs.circles import quarter_turn
 
 
 class TwoBar(Protocol):
-    """The part of a leg's equations that its forces here need."""
+    """The attributes of a leg's equations that `two_bar_needs` reads."""
 
     lu: Expression
     ll: Expression

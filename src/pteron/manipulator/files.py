@@ -1,4 +1,4 @@
-"""Manipulators in TOML files, those of the catalog too: `load` reads one, by name or path."""
+"""`load` reads a manipulator from a TOML file or the catalog, and tells all its faults at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A machine as a call is given it: the value, its name in the catalog, or its file's path."""
+"""`as_manipulator`: the machine that a call is given by value, catalog name or file path."""
 
 from __future__ import annotations
 

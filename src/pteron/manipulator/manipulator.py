@@ -32,10 +32,10 @@ from pteron.platforms.parts import HeldPoint
 from pteron.toml import told
 
 _COINCIDENT = 1e-9
-"""m between points that are taken for one."""
+"""Distance, m, below which points are taken for one."""
 
 _ACROSS = 1e-9
-"""Share of a leg's force in the platform's plane below which it counts as none."""
+"""Size in the platform's plane of a leg's unit force, below which it counts as none."""
 
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 """Acceleration of gravity where a file does not say it, m/s^2."""

@@ -1,4 +1,4 @@
-"""Names of machines: what every message, file and format can hold."""
+"""The check of a machine's name, which every message, file and format must be able to hold."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import unicodedata
 from collections.abc import Iterator
 
 LONGEST_NAME = 200
-"""Characters; file systems hold 255 bytes, and files add to the machine's name what they are."""
+"""Characters; a file's name has at most 255 bytes, and adds to the machine's name."""
 
 _JOINERS = "\u200c\u200d"
 """Unseen characters that spelling needs, in Persian and Hindi."""
@@ -29,7 +29,7 @@ def name_faults(name: object) -> Iterator[str]:
 
 
 def _is_unseen(c: str) -> bool:
-    """Say whether a character controls the text about it, or is none."""
+    """Return whether a character is a control character or no character at all."""
     if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
         return c not in _JOINERS
     return ord(c) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(c) <= 0xFDEF

@@ -1,7 +1,6 @@
-"""Joint coordinates and what the drives read, by the legs' `reading`: q = zero + scale reading.
+"""Conversion of joint coordinates to drives' readings and back: q = zero + scale reading.
 
-Rates follow by the scale. Forces follow by virtual work: a force that a drive tells for its reading
-is scale times the one at the joint's coordinate.
+Rates follow by the scale; a force along a reading is scale times the force along the coordinate.
 """
 
 from __future__ import annotations

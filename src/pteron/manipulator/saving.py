@@ -1,4 +1,4 @@
-"""A manipulator as a TOML file: `save` writes it."""
+"""`save` writes a manipulator to a TOML file."""
 
 from __future__ import annotations
 

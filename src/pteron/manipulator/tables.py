@@ -1,6 +1,6 @@
-"""The tables of a machine's TOML file as pydantic models, each key with what it is.
+"""The tables of a machine's TOML file as pydantic models, with a description of each key.
 
-Imported where a file is read or written, since pydantic would slow the start of those who do not.
+Imported only where a file is read or written, since pydantic slows the start.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from pteron.toml import told
 
 
 class ConeTable(Table):
-    """`{ axis, angle }` of the cone in which a ball joint holds its rod."""
+    """`{ axis, angle }`: the cone in which a ball joint holds its rod."""
 
     axis: Three = Field(description="from the joint along the rod, in the frame of what holds it")
     angle: Number = Field(description="the greatest angle between axis and rod, rad")

@@ -1,4 +1,4 @@
-"""Machines made of a machine: its working modes, and the whole of it turned."""
+"""Variants of a machine: its working modes, and the machine turned as a whole."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A machine's file as text: its values, and on request what every key is."""
+"""The text of a machine's TOML file, on request with comments that explain every key."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Maps of performance indices over grids of poses, and sweeps of any function over many chunks.
 
-Work is done in chunks, here or on a cluster, and what is finished is never computed twice.
+Work is done in chunks, here or on a cluster; a chunk that is stored is not computed again.
 """
 
 from pteron.maps.files import load_map as load_map, save_map as save_map

@@ -1,6 +1,7 @@
-"""Maps of performance indices over poses, computed by JAX, on its accelerator if there is one.
+"""Maps of performance indices over poses, computed by JAX: the engine "jax" of `map_index`.
 
-One function of the axes' values is compiled for all chunks.
+One function of the axes' values is compiled for all chunks; JAX runs it on an accelerator if it
+has one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Maps of indices over poses as NumPy archives (.npz): arrays, and grid and machine as JSON."""
+"""Maps of indices over poses as NumPy archives (.npz): write, and read with a check for damage."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pteron.maps.grid import Grid
 from pteron.maps.map import Map
 
 _ABOUT, _STATUS = "about", "status"
-"""Names of the arrays beside indices and axes."""
+"""Names of two more arrays: grid, machine and units as JSON; whether each pose is in reach."""
 
 
 def write_archive(given: Map, target: Path) -> Path:

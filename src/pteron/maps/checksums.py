@@ -1,4 +1,4 @@
-"""Checksums of a map's data and arrays, by which damage to a file is noticed."""
+"""Checksums (SHA-256) of a map's data and arrays, by which damage to a file is noticed."""
 
 from __future__ import annotations
 

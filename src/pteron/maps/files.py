@@ -1,4 +1,4 @@
-"""Maps of indices over poses in files: tables, NumPy archives, Zarr stores, surfaces to draw."""
+"""`save_map` and `load_map`: maps of indices in tables, NumPy archives, Zarr stores, surfaces."""
 
 from __future__ import annotations
 

@@ -23,11 +23,10 @@ from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose
 
 _POINTS = {1: 400, 2: 200, 3: 100, 4: 40, 5: 16, 6: 10}
-"""Points along each axis, by the number of axes, where none is given: about as much as a picture
-shows."""
+"""Points along each axis, by the number of axes, where none is given: enough for a picture."""
 
 _TURNS = 5
-"""Orientations of which the bounding boxes are taken together, where the angle varies."""
+"""Values of one varying angle at which the reach is boxed in; the grid spans all these boxes."""
 
 _HUGE = float_info.max
 """The largest finite number."""
@@ -36,7 +35,7 @@ _CHUNK = 1 << 17
 """Poses of a chunk at most: a second's work or less, and a megabyte of each index."""
 
 Region = tuple[slice, ...]
-"""A part of a grid: from where to where along each of its axes."""
+"""A part of a grid: a slice of each axis."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A map: performance indices over a grid of poses, and whether each pose is in reach."""
+"""`Map`, the result of `map_index`: indices over a grid of poses, and whether each is in reach."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MARGIN = Index(
     "m",
     "more",
 )
-"""The index of maps for which no other is asked; negative out of reach or beyond limits."""
+"""The default index of maps; negative out of reach or beyond limits."""
 
 ALL = {MARGIN.name: MARGIN, **INDICES}
 """All indices that a map may hold, by name."""

@@ -1,4 +1,4 @@
-"""`map_index`: performance indices over a grid of poses, chunk by chunk, here or elsewhere."""
+"""`map_index`: performance indices over a grid of poses, chunk by chunk, here or on a cluster."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Engine = Literal["auto", "jax"]
 """The kernels of `pteron.kernels.choice`, or JAX."""
 
 _BLOCK = 1 << 14
-"""Poses in one call of a kernel: what it reads and writes stays in the processor's cache."""
+"""Poses in one call of a kernel: its data then stay in the processor's cache."""
 
 _MANY = 1 << 18
 """Poses for which it pays to wait for the compiler."""

@@ -1,4 +1,4 @@
-"""The plan of a store of results: all that they depend on, so that no other run goes on with it."""
+"""Comparison of a store's plan, all that its results depend on, with that of a run to resume it."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ _MANY = 2
 
 
 def expect_same(path: str | Path, found: Any, wanted: Mapping[str, Any]) -> None:
-    """Refuse to go on with a store whose plan is another one.
+    """Refuse to resume a store whose plan differs.
 
     Parameters
     ----------
     path : str or Path
         The store.
     found, wanted : mapping
-        Plain data, as JSON has them: what it says, and what it is to be continued with. Texts that
-        are TOML, as a robot's is, are compared by their keys.
+        Plans as plain JSON data: the store's, and that of the run. Texts that are TOML, as a
+        robot's is, are compared by their keys.
 
     Raises
     ------

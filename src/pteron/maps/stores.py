@@ -1,4 +1,4 @@
-"""Stores of the chunks of a map of poses: memory, or a Zarr store on a disk all processes reach."""
+"""Stores of the chunks of a map of poses: memory, or a Zarr folder that all workers reach."""
 
 from __future__ import annotations
 

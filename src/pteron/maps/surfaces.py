@@ -1,8 +1,8 @@
 """Surfaces from a map over three coordinates: of the reach, and of equal values of an index.
 
 The triangles are those of marching cubes (T. Lewiner et al., Journal of Graphics Tools 8(2) (2003)
-1-15), between poses in reach and in limits; the reach's surface is where its margin is zero. Files
-of them are drawn by other programs.
+1-15), between poses in reach and in limits; the reach's surface is where its margin is zero. They
+are written to VTK, PLY or STL files for other programs to draw.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _SHARES = (0.25, 0.5, 0.75)
 """Quantiles of an index at which its surfaces are by default."""
 
 _BEYOND = 1e-9
-"""Minus the margin that places outside of the grid get, m: so the reach's surface is closed."""
+"""Places outside of the grid get minus this as margin, m, so that the reach's surface is closed."""
 
 
 @dataclass(frozen=True)

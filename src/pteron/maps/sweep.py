@@ -1,10 +1,9 @@
-"""Sweeps: the same work on many chunks, here, in processes of this computer, or on a cluster.
+"""Sweeps: one function on many chunks, in this process, in several, or on a cluster.
 
 Chunks are numbered by a plan that depends on nothing but the task. The process that has computed a
-chunk writes it, whole or not at all. So a process that is killed loses its present chunk and
-nothing else, a chunk that is computed twice is written twice alike, and the result does not depend
-on who computed what. `dask.distributed` decides who computes a chunk, and again after a worker is
-gone.
+chunk writes it, whole or not at all: a killed process loses its present chunk only, a chunk that is
+computed twice is written twice alike, and the result does not depend on who computed what.
+`dask.distributed` hands the chunks out, again after a worker is gone.
 """
 
 from __future__ import annotations

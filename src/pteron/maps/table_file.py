@@ -1,4 +1,4 @@
-"""Maps as tables (.csv, .parquet): a row a pose, which may be read back in any order of rows."""
+"""Maps as tables (.csv, .parquet), a row a pose: writing, and reading from rows in any order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Results of a sweep as a folder of Parquet files, one a chunk, that data-set readers open."""
+"""`TableStore`: a sweep's results as a folder of Parquet files, one a chunk."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 _PLAN = "plan.json"
-"""File with the plan of the sweep."""
+"""File with the plan of the sweep: the data that its results depend on."""
 
 _ENDING = ".parquet"
 """Ending of the chunks' files."""

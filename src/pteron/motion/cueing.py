@@ -2,8 +2,7 @@
 
 A classical washout (L. D. Reid, M. A. Nahon, UTIAS Report 296, 1985): the platform moves with quick
 accelerations, tilts where they last, so that gravity stands for them, and always returns to the
-middle. Its poses are then pressed into a box of poses that is proved to lie in the workspace, so
-that none of them leaves it.
+middle. Its poses are then compressed into a box of poses that is proved to lie in the workspace.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ _GRAVITY = 9.81
 """m/s^2, by which an acceleration that lasts becomes a tilt."""
 
 _DAMPING = 1.0
-"""Damping ratio of the filters: critical, so that none overshoots more than it must."""
+"""Damping ratio of the filters: critical."""
 
 _ROOM = 3.0
 """Greatest size of the box, over what the vehicle's motion demands."""

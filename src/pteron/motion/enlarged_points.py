@@ -1,4 +1,4 @@
-"""A machine's joint points with their differences from another machine's enlarged, to be drawn."""
+"""A machine's joint points with their difference from another machine's enlarged, for drawings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points of a machine's joints and platform in given poses, and the joints' guides, to be drawn."""
+"""Points of a machine's joints and platform in given poses, and of the joints' guides, to draw."""
 
 from __future__ import annotations
 

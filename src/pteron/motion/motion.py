@@ -1,4 +1,4 @@
-"""A motion of the platform: samples in time, and interpolation between them."""
+"""`Motion`: a motion of the platform, sampled in time, and interpolation between its samples."""
 
 from __future__ import annotations
 

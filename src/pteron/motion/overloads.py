@@ -1,4 +1,4 @@
-"""Warnings about forces and speeds of a motion beyond the limits of the drives."""
+"""Overloads: the drives' limits of force and speed that a motion exceeds, as warnings."""
 
 from __future__ import annotations
 

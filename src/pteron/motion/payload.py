@@ -1,4 +1,4 @@
-"""A machine with a payload, a point mass joined to its platform; a warning of an unlikely mass."""
+"""A machine with a payload, a point mass at its tool, and a warning of an unlikely mass."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pteron.errors import DataError, ModelError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _HEAVY = 20.0
-"""Payload over the machine's moving mass above which its unit is unlikely."""
+"""Payload over the machine's moving mass above which it is likely in grams."""
 
 
 def payload_warning(robot: Manipulator, mass: float) -> str:

@@ -1,6 +1,6 @@
-"""Whether a kind of platform keeps the protocol of `platforms.motion`: run it on one of your own.
+"""A test that a kind of platform keeps the protocol of `platforms.motion`: run `faults` on one.
 
-All of it is differentiation along one random motion of the pose.
+It differentiates along one random motion of the pose.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pteron.platforms.coordinates import COORDINATES
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _POINTS = 3
-"""Platform points of the motion."""
+"""Number of platform points of the random platform."""
 
 _SMALL = 0.3
 """Size of the motion, SI units: a tripod does not tilt by much."""

@@ -1,4 +1,4 @@
-"""A platform's motion as that of a chain of joints: slides along its lengths, then turns."""
+"""A platform's motion as a chain of virtual joints, slides then turns, for exported models."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 
 
 class PlatformJoint(NamedTuple):
-    """A joint between the base and the platform, that no machine has: it tells how P moves."""
+    """A virtual joint of the chain from the base to the platform."""
 
     name: str
-    """That of the coordinate that it moves by."""
+    """Name of its coordinate: one of the pose's, or one that follows from them."""
     slides: bool
     axis: Array
     """Unit vector (3,) where all coordinates are zero; joints before it move it."""
@@ -28,7 +28,7 @@ class PlatformJoint(NamedTuple):
 def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
     """Return the chain of joints whose motion is the platform's, at poses (..., m).
 
-    Of a tripod they have x, y and yaw too, which its planes hold.
+    A tripod's chain has x, y and yaw too, which follow from its pose.
     """
     kind = equations_class(platform)
     x0, y0, k = (np.array(axis) for axis in platform.frame)

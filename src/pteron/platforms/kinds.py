@@ -1,4 +1,4 @@
-"""The kinds of platforms' equations, by what a file says of a platform."""
+"""The classes of the platforms' equations; `equations_class` picks a platform's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a place of P and a rotation to a pose: the angles of a rotation, for every kind of platform.
+"""The pose nearest to a position of the reference point P and a rotation, of any kind of platform.
 
 A rotation (..., 3, 3) takes vectors of the platform's frame to the base frame.
 """
@@ -13,7 +13,7 @@ from pteron.platforms.platform import Platform
 Array = NDArray[np.float64]
 
 _SINGULAR = 1e-12
-"""Cosine of the middle angle below which the others are not told apart."""
+"""Cosine of the middle angle below which the pose's angles are taken for singular."""
 
 
 def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:

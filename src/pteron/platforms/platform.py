@@ -1,4 +1,4 @@
-"""The platform: which motions it has, about which axes it turns, its parts, inertia and tool."""
+"""`Platform`, the data of the moving platform: motion, axes, parts, inertia, limits and tool."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The sliding platform of an I4: two half-nacelles, whose distance along each other is phi.
+"""The platform of an I4 robot: two halves that slide along each other, by phi times a length.
 
-A rack and a pinion turn the tool by phi as the halves slide. Nothing that the legs carry turns.
+A rack and a pinion turn the tool by phi as they slide. Nothing that the legs carry turns.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pteron.platforms.motion import Offset, PlatformEquations, PlatformMotion
 
 
 class Sliding(PlatformEquations):
-    """c = p + t0 + phi v, v being the platform point, in m/rad, in a frame that does not turn.
+    """A leg's point c = p + t0 + phi v, v its platform point in m/rad, t0 its fixed offset.
 
     The first moment of the halves is phi times (m gamma_x, m gamma_y), kg m/rad, and I is the sum
     of m v^2 of what slides and of the inertia of what turns, kg m^2: both per radian.

@@ -1,8 +1,9 @@
-"""The platform of a tripod, 1T2R: its legs keep three points in planes that stand upright.
+"""The platform of a tripod, 1T2R: its legs keep its three points in planes that stand upright.
 
-x, y and the yaw follow from z, roll and pitch: with l = (n2 x n3, n3 x n1, n1 x n2).k the sum of
-l_i n_i vanishes, and with it x and y from the sum of l_i n_i.(p + s_i - r_i) = 0, which leaves
-A cos(yaw) + B sin(yaw) = C.
+x, y and the yaw follow from z, roll and pitch. Plane i has the normal n_i and the point r_i; s_i
+leads from P to its platform point, k is the platform's axis. With l = (n2 x n3, n3 x n1, n1 x n2).k
+the sum of l_i n_i vanishes, and with it x and y from the sum of l_i n_i.(p + s_i - r_i) = 0, which
+leaves A cos(yaw) + B sin(yaw) = C.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pteron.platforms.tilting import Tilting, rotation
 
 
 class Tripod(Tilting):
-    """c = p + R s0 with R = Rz(yaw) Ry(pitch) Rx(roll), of which the planes fix x, y and yaw.
+    """c = p + R s0 with R = Rz(yaw) Ry(pitch) Rx(roll), where the planes fix x, y and yaw.
 
     The yaw is the one of two that is nearest to 0 where the platform is level; the forces of the
     planes do no work.

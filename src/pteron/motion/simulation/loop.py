@@ -1,4 +1,4 @@
-"""The loop of a simulation: at each sample forces are asked for, limited, delayed, integrated."""
+"""The loop of a simulation: at each sample the controller's forces, limits, delay, integration."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pteron.motion.simulation.stops import (
 from pteron.motion.trajectories.limits import limits_of
 
 _WHOLE = 1e-9
-"""Share of a sample below which a delay counts as whole samples: rounding."""
+"""Part of a sample, from rounding, by which a delay of whole samples may miss them."""
 
 
 @runtime_checkable

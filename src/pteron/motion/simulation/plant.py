@@ -21,11 +21,10 @@ Method = Literal["rk4", "dop853"]
 """Runge and Kutta's method with fixed steps, or SciPy's DOP853, which chooses its steps."""
 
 _STABLE = 2.0
-"""Greatest decay within a step, for stability: Runge and Kutta's method of fourth order is stable
-up to 2.78."""
+"""Greatest decay rate times step; Runge and Kutta's method of fourth order is stable to 2.78."""
 
 _SHORTEST = 1e-8
-"""Steps shorter than this, s, point to a mistake in the drives' numbers."""
+"""A step that must be shorter than this, s, points to a mistake in the drives' numbers."""
 
 
 def advance(

@@ -25,7 +25,7 @@ STEP = 1e-4
 """Length of the integration's steps, s, where none is given and friction allows it."""
 
 PERIOD = 1e-3
-"""Time between two samples where no controller says it, s."""
+"""Time between two samples, s, where no controller sets it."""
 
 _POSES = 64
 """Poses of a motion at which the longest stable step under friction is computed."""
@@ -34,7 +34,7 @@ _MOST = 10_000_000
 """Most samples of a simulation; a longer one is refused."""
 
 _STATE = ("start, pose", "start, velocity")
-"""Names in messages of the two parts of a start."""
+"""Names in messages of the two parts of the start state."""
 
 
 @runtime_checkable

@@ -1,4 +1,4 @@
-"""The result of a simulation: its samples, and why it ended."""
+"""`Simulation`, the result of `simulate`: its samples, and why it ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reasons why a simulation ends before its time, in a sentence each."""
+"""Reasons why a simulation ends early (limits, singularities, divergence), in a sentence each."""
 
 from __future__ import annotations
 

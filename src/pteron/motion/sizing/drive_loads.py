@@ -1,7 +1,4 @@
-"""Results of sizing: peaks, means, power and energy of a cycle at the drives, and best ratios.
-
-The samples of forces, speeds and inertia come from `size`.
-"""
+"""`Sizing`, the result of `size`: peaks, means, power and energy of each drive over a cycle."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ _STILL = 1e-9
 """Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
 
 _NONE = 1e-9
-"""Share of the energy given below which the net energy counts as zero."""
+"""Share of the drives' energy below which its net sum counts as zero: rounding."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,8 +1,8 @@
 """Ratios between a motor and its joint that the motor's limits allow, and its torque at a ratio.
 
-A motor of rotor inertia J behind a ratio i, motor angle over the joint's coordinate, has the torque
-T = f / i + J i q''. What the joint needs without the motor, f, does not depend on the ratio, for
-friction is the joint's. So every answer here is in closed form.
+A motor of rotor inertia J behind a ratio i, motor angle over the joint's coordinate q, has the
+torque T = f / i + J i q''. What the joint needs without the motor, f, does not depend on the ratio,
+for friction is the joint's. So every answer here is in closed form.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Choice of motors: those of a list that can drive a joint, their ratios and their margins."""
+"""`choose`: which motors of a list can drive each joint of a cycle, their ratios and margins."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`size`: the load of a motion on each drive.
+"""`size`: forces, speeds and inertia at each drive over a motion, integrated to loads (`Sizing`).
 
 Integrals over the motion are Simpson's over each interval between two samples, of which the middle
 is interpolated as `Motion.at` does: exact for cubics, and the error falls with the fourth power of

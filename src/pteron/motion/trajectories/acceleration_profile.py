@@ -1,4 +1,4 @@
-"""Time laws s(t) of piecewise constant acceleration, and their moving averages."""
+"""Time laws s(t) of piecewise constant acceleration, and their moving averages for less jerk."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Profile(NamedTuple):
 
     @classmethod
     def of(cls, grid: Array, squares: Array) -> Profile:
-        """Return the profile of x = s'^2 on a grid of s, at rest before and after."""
+        """Return the profile with the squared speeds s'^2 (K,) on a grid of s, at rest outside."""
         rate = np.sqrt(np.maximum(squares, 0.0))
         spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
         time = np.concatenate([[0.0], np.cumsum(spans)])

@@ -31,7 +31,7 @@ _ROUNDING = 1e-9
 """Distance beyond a joint's limit that counts as rounding, m or rad."""
 
 _MILLIMETRES = 20.0
-"""Misses of a leg's reach by so many times its size suggest millimetres."""
+"""A place that misses a leg's reach by more times the leg's size is likely in millimetres."""
 
 
 def check_path(robot: RobotLike, path: Path) -> None:

@@ -1,7 +1,7 @@
-"""The pick-and-place cycle as a path in time: up, across, down, and back, over one unit of time.
+"""The pick-and-place cycle in time: the tool goes up, across, down, and back, in one unit of time.
 
-It is the path of the tool's centre point. A planar machine goes it in its plane: up is then against
-what gravity does in the plane or, where that is nothing, at a right angle to across.
+A planar machine stays in its plane: up is then against the part of gravity in the plane or, where
+there is none, at a right angle to across.
 """
 
 from __future__ import annotations

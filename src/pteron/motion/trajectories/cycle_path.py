@@ -1,4 +1,4 @@
-"""The path of a pick-and-place cycle as a function of its arc length."""
+"""The path of a pick-and-place cycle, one way, as a function of its arc length."""
 
 from __future__ import annotations
 

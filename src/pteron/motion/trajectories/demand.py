@@ -1,7 +1,7 @@
-"""Joint motion and drive forces along a curve of poses: its largest rate within limits, its peaks.
+"""Demand of a curve of poses x(p) on joints and drives: largest rate p' within limits, and peaks.
 
-Along a curve x(p) the drives' forces are c + a p'' + b p'^2, and what friction takes: dry friction
-by the sign of the joint's motion, viscous friction by its speed.
+The drives' forces are c + a p'' + b p'^2, and friction: dry friction by the sign of the joint's
+motion, viscous friction by its speed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ROUNDING = 1e-12
 """Relative excess over a drive's limit that counts as rounding."""
 
 _CREEP = 1e-30
-"""Rate that stands for a joint that reverses, with either sign."""
+"""Rate of either sign that a reversing joint gets instead of 0, for dry friction both ways."""
 
 _HALVINGS = 50
 """Bisections for the place where a joint reverses."""

@@ -1,4 +1,4 @@
-"""Finite Fourier series: their basis, their sums, and periodic motions of the platform."""
+"""Finite Fourier series in time: basis, sums, and periodic motions of the platform."""
 
 from __future__ import annotations
 

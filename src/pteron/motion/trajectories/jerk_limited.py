@@ -25,10 +25,10 @@ from pteron.motion.trajectories.tool import Curve
 from pteron.shapes import PoseLike
 
 _NEAR = 1e-6
-"""m or rad by which the platform may miss the pose that its joints go to; more is refused."""
+"""Distance, m or rad, from the pose asked for at which the motion may end."""
 
 _FAST = 1e6
-"""m/s or rad/s of a joint that has no limit."""
+"""Limit that Ruckig gets for a joint without one, m/s or rad/s."""
 
 
 def jerk_limited(

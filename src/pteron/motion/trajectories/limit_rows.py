@@ -1,4 +1,4 @@
-"""Limits of a motion along a path s: inequalities linear in s'' and s'^2, but for friction."""
+"""Limits of a motion along a path s as rows for TOPP-RA: linear in s'' and s'^2, but for friction."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class LimitRows(NamedTuple):
 
 
 def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
-    """Return the demand at points of a stretch over its limits, with times in `unit`."""
+    """Return the rows of a demand at K points of a path, with times in `unit`, s."""
     count = len(asked.first)
     none = np.zeros((count, 0))
     a, b, c, v = [none], [none], [none], [none]

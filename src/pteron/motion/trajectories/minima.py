@@ -1,4 +1,4 @@
-"""Minima of measures along a path, between samples too, and the first place below a bound."""
+"""Least values of measures along a path, between samples too, and the first place below a bound."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Paths of the tool without a time law: straight lines, rounded corners, there and back.
 
-A path is told by s, the metres that the tool has gone; a turn of the platform by one radian counts
-as `TURN` metres. Poses are twice continuously differentiable in s, but for the rests, where the
+A path is a function of s, the metres that the tool has gone; one radian of the platform counts as
+`TURN` metres. Poses are twice continuously differentiable in s, but for the rests, where the
 platform stops: at both ends, at corners that are not rounded, and where the path turns back.
 """
 
@@ -22,7 +22,7 @@ from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 from pteron.platforms import Platform
 
 TURN = 0.1
-"""Length of path that one radian of the platform's rotation counts as, m."""
+"""Metres of path that one radian of the platform's rotation counts as."""
 
 _SAME = 1e-9
 """Lengths of path below this count as zero, m."""

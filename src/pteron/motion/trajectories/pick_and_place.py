@@ -1,4 +1,4 @@
-"""The standard pick-and-place cycle of 25, 305 and 25 mm, out and back."""
+"""`pick_and_place`: the standard cycle of 25, 305 and 25 mm, out and back, as a motion in time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A straight motion from one pose to another, at rest in both."""
+"""`point_to_point`: a straight motion from rest in one pose to rest in another."""
 
 from __future__ import annotations
 

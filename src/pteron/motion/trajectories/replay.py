@@ -1,4 +1,4 @@
-"""A motion from a table of poses over time, or of joint coordinates that the platform follows."""
+"""`replay`: the motion in a table of poses, or of joint coordinates, over time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The largest pick-and-place cycle that a machine can do, as a share of the standard one."""
+"""The largest pick-and-place cycle that a machine can do, as a share of the standard size."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from pteron.workspace import pose_margins
 from pteron.workspace.margins import joint_distances
 
 _LEAST_RESERVE = 0.2
-"""Least margin, of type I and of type II, that a cycle keeps; or half of its middle's."""
+"""Least type-I and type-II measure of a cycle's poses; or half of its middle pose's if less."""
 
 TURN = np.pi / 3.0
 """Turn of the platform on its way across in the full cycle, rad."""
 
 _DIRECTIONS = 12
-"""Horizontal directions of the cycle that are tried."""
+"""Number of horizontal directions tried for the cycle."""
 
 _SAMPLES = 501
 """Poses checked on the path out; the path back is the same."""

@@ -1,4 +1,4 @@
-"""Motions along a path or a curve in a given duration, or in the shortest one within limits."""
+"""Motions along a path or curve of poses in a given duration, or in the shortest within limits."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LOOK = 2001
 checked."""
 
 KEPT = 1.0 + 1e-9
-"""Share of a limit up to which it counts as kept: rounding."""
+"""Share of a limit up to which it counts as kept, for rounding."""
 
 _FINER = 10
 """Points at which a finished motion is checked, for each of its samples."""

@@ -1,4 +1,4 @@
-"""The fastest motion along a path under limits of joints, drives and tool, by TOPP-RA.
+"""`time_optimal`: the fastest motion along a path within limits of joints, drives, tool (TOPP-RA).
 
 Along a path x(s) speeds are linear in s', and accelerations and the drives' forces in s'' and s'^2:
 a u + b x + c <= 1 with u = s'' and x = s'^2, for each limit at each s. TOPP-RA (Pham and Pham,

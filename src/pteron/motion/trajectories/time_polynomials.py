@@ -1,4 +1,4 @@
-"""Time laws from rest to rest that are polynomials of the fifth or the seventh degree."""
+"""Time laws from rest to rest: polynomials of degree five (quintic) or seven."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Progress(Protocol):
 def polynomial(law: PolynomialLaw) -> Progress:
     """Return the polynomial from 0 to 1 whose derivatives vanish at both ends.
 
-    Of the fifth degree, 10 t^3 - 15 t^4 + 6 t^5, two of them; of the seventh, 35 t^4 - 84 t^5 +
-    70 t^6 - 20 t^7, three: the jerk begins and ends at zero too.
+    The quintic, 10 t^3 - 15 t^4 + 6 t^5, has two such derivatives; the seventh degree's, 35 t^4 -
+    84 t^5 + 70 t^6 - 20 t^7, has three: the jerk begins and ends at zero too.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A curve of poses traversed in a given duration, which can be made longer as a whole."""
+"""Curves of poses traversed in a given duration, and paths timed stretch by stretch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motion of the tool's centre point from that of the platform, and the other way round."""
+"""Motion of the tool's centre point from that of the platform, and the inverse."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Curve = tuple[Array, Array, Array]
 
 
 def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
-    """Return the tool's place along the pose's lengths, with its angles, and two derivatives.
+    """Return poses with their lengths moved from P to the tool, and two derivatives.
 
     Of a platform that turns about its axis alone, the part from P to the tool along that axis,
     which is constant, is left out. A platform whose lengths cannot carry the tool anywhere, such as
