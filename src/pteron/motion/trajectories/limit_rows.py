@@ -1,4 +1,4 @@
-"""Limits of a motion along a path s as rows for TOPP-RA: linear in s'' and s'^2, but for friction."""
+"""Limits of a motion along a path s as rows for TOPP-RA: linear in s'', s'^2 but for friction."""
 
 from __future__ import annotations
 
