@@ -156,7 +156,7 @@ ALLOWED = {
     ("workspace/orientations.py", "an elbow"): "the working modes",
     ("kinematics/direct.py", "an elbow"): "the working mode that a pose is in",
     ("kinematics/evaluate.py", "an elbow"): "the kind of a singularity, in its message",
-    ("reduction/configurations.py", "an elbow"): "the side that a leg says it closed on",
+    ("reduction/exact_regressor.py", "an elbow"): "the side that a leg says it closed on",
     ("reduction/exact_geometry.py", "data of one kind"): "a unit vector across another, in a field",
 }
 """File or folder, and knowledge; and why."""

@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.kernels import NoSquareRoot, PrimeField, RationalField, evaluate
-from pteron.reduction.configurations import is_square
 from pteron.reduction.elimination import dependencies, reconstruct, remainder
 from pteron.reduction.exact_geometry import exact_geometry
+from pteron.reduction.exact_regressor import is_square
 from pteron.reduction.surds import Surd, direction_cosine, length
 
 PRIMES = (2**61 - 1, 2**89 - 1, 2**107 - 1)

@@ -19,7 +19,7 @@ from pteron.report import write_motion_page, write_report
 from pteron.viewer import view
 from pteron.viewer.session import Session
 from pteron.viewer.slices import choices
-from pteron.workspace.reach import reach_slice
+from pteron.workspace.reach_slices import reach_slice
 
 TOOL = (0.05, -0.02, 0.1)
 

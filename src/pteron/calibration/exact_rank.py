@@ -16,10 +16,10 @@ from pteron.calibration.variations import AXIAL, slope_terms
 from pteron.kernels import NoSquareRoot, PrimeField, evaluate, general_program
 from pteron.kernels.geometry_slopes import slope_columns, slopes_program
 from pteron.kernels.programs import bare
-from pteron.reduction.configurations import is_square
 from pteron.reduction.elimination import dependencies
 from pteron.reduction.exact import primes_of
 from pteron.reduction.exact_geometry import exact_geometry
+from pteron.reduction.exact_regressor import is_square
 
 Array = NDArray[np.float64]
 Matrix = list[list[int]]

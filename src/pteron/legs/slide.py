@@ -149,7 +149,7 @@ class SlideEquations(LegEquations):
 
     @abstractmethod
     def counted(self, v: Expression) -> Expression:
-        """Return a vector (3, K) as the link's length counts it: in space or, (2, K), in its plane."""
+        """Return a vector (3, K) as the link's length has it: whole, or (2, K) in its plane."""
 
     @abstractmethod
     def in_space(self, v: Expression) -> Expression:

@@ -1,6 +1,6 @@
-"""Pictures: each function takes arrays or results and returns a matplotlib Figure.
+"""Pictures: functions of arrays, machines or results that return a matplotlib Figure; and films.
 
-Nothing here computes physics or touches pyplot's global state.
+Nothing here touches pyplot's global state.
 """
 
 from pteron.plots.calibration import (

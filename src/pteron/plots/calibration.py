@@ -1,4 +1,4 @@
-"""Pictures of a calibration: the machine drawn and found, the tool's errors, and residuals."""
+"""Pictures of a calibration: the machine as designed and as found, the tool's errors, residuals."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from pteron.shapes import PoseLike
 from pteron.workspace import home_pose
 
 _SHOWN = 0.05
-"""Least length of the greatest difference in a picture, as a share of the machine's size."""
+"""Least length to which the greatest difference is enlarged, as a share of the machine's size."""
 
 _RESIDUALS = {"position": "position (mm)", "angle": "angles (mrad)"}
 """Names of kinds of residuals with their units; others are in mm under their own names."""

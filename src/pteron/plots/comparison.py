@@ -1,4 +1,4 @@
-"""Pictures that compare measured with predicted forces: over time, over speed, beside the noise."""
+"""Pictures of measured beside predicted drive forces: over time, over speed, and their errors."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ _ROOM = 1.15
 """Half width of the axes over the largest value."""
 
 _FAR = 3.0
-"""A limit above this many times the largest use is left out of the picture."""
+"""A limit above this many times the largest value is left out of the picture."""
 
 
 class Ability(NamedTuple):

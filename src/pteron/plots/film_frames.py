@@ -27,7 +27,7 @@ from pteron.plots.canvas import (
     plain_axes,
     zero_line,
 )
-from pteron.plots.encoders import Pixels
+from pteron.plots.film_encoders import Pixels
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.machine_drawing import (
     Scene,

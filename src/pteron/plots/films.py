@@ -1,4 +1,4 @@
-"""Films of a motion, as MP4 or GIF files: their speed, size and length."""
+"""`film` writes a machine's motion as an MP4 or GIF film: its speed, size and length."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from pteron.errors import DataError, OutputError, shown
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion
-from pteron.plots.encoders import ENCODERS, Pixels, checked_encoder
+from pteron.plots.film_encoders import ENCODERS, Pixels, checked_encoder
 from pteron.plots.film_frames import frames
 
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
-"""Speeds that are chosen from where none is given: 1 is real time."""
+"""Speeds from which one is chosen where none is given; 1 is real time."""
 
 _LEAST = 2.0
-"""Length, s, that the film has at least at the speed chosen."""
+"""Least length, s, of the film at the speed chosen."""
 
 _FPS = 30.0
 """Frames a second where nothing else is asked."""

@@ -1,4 +1,4 @@
-"""Fonts for letters that the usual font lacks: another one of this machine, or else a warning."""
+"""Fonts for letters that the usual font lacks: another font of this computer, or else a warning."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from pteron.errors import shown
 
 _NO_LETTERS = ("Last Resort", "STIXNonUnicode", "STIXSize", "cm")
-"""Families of fonts that are of no use: their letters are boxes, or signs of mathematics."""
+"""Families of fonts not to use: their letters are boxes, or mathematical signs."""
 
 
 def take_fonts(figure: Figure) -> str:
@@ -48,7 +48,7 @@ def warn_of_absent(letters: str) -> None:
 
 @contextmanager
 def no_word_of_glyphs() -> Iterator[None]:
-    """Keep to itself that letters are missing, which matplotlib tells of each one, many times."""
+    """Silence matplotlib's own warnings of missing letters, several for each letter."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"(?s)(Glyph|Matplotlib currently does not).*")
         yield

@@ -1,4 +1,4 @@
-"""Forces and other quantities of the legs over time, and the type-II measure over the angle."""
+"""Pictures of the legs' forces over time, and of the type-II measure over the platform's angle."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from pteron.plots.canvas import (
 from pteron.plots.joint_columns import joints_of, named, rows
 
 _ROOM = 75.0
-"""Degrees between singular orientations from which on each is named in words."""
+"""Least distance, degrees, of singular orientations that are named in words."""
 
 
 def forces_figure(

@@ -1,6 +1,6 @@
-"""The abstract axes on which a machine is drawn: lines, marks, faces and texts at points in space.
+"""`MachineAxes`, base class of axes that a machine is drawn on: lines, marks, faces and texts.
 
-Those of pictures in space and in a plane are in `space_axes` and `plane_axes`.
+`space_axes` and `plane_axes` have those of pictures in space and in a plane.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ _AXLE = 0.03
 """Half the length of a crank's axle, as a share of the machine's size."""
 
 APART = 0.018
-"""Half the distance of parallel rods, as a share of the machine's size: files do not say it."""
+"""Half the distance of parallel rods in pictures, as a share of the machine's size."""
 
 _SQUARES = 10.0
 """Squares of the grid, about, along the machine's size."""
@@ -35,7 +35,7 @@ _FLAT = 1e-6
 """Thickness over width of an outline below which it is flat."""
 
 _NONE = 1e-9
-"""Share of gravity in the plane below which the plane has none."""
+"""Share of gravity that lies in a plane, below which none is drawn there."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Films of a map over three coordinates, which go through the last coordinate."""
+"""`map_film`: a film of a map over three coordinates, a frame for each value of the last."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.transforms import Bbox
 
 from pteron.errors import DataError
 from pteron.maps import Map
-from pteron.plots.encoders import ENCODERS, Pixels
+from pteron.plots.film_encoders import ENCODERS, Pixels
 from pteron.plots.films import Film, checked_film, write_film
 from pteron.plots.index_maps import color_scale, map_panels
 

@@ -34,7 +34,7 @@ _TENTHS = [tenth / 10.0 for tenth in range(10)]
 """Levels of a measure's lines."""
 
 _TIE = 1e-9
-"""Difference of two legs' margins that counts as none, m."""
+"""Difference of two legs' margins, m, up to which they are equal."""
 
 _SPECK = 2.0
 """Size, in cells of the grid, below which an outline is not drawn."""

@@ -1,4 +1,4 @@
-"""The base parameters with which the inverse dynamics take the fewest operations."""
+"""`cheapest_parameters`: base parameters with which the inverse dynamics need few operations."""
 
 from __future__ import annotations
 

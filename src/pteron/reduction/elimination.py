@@ -1,4 +1,4 @@
-"""Dependent columns of a matrix by Gaussian elimination modulo a prime; fractions from residues."""
+"""Gaussian elimination modulo a prime for a matrix's dependent columns; fractions from residues."""
 
 from __future__ import annotations
 

@@ -23,15 +23,15 @@ from pteron.kernels import Array, PrimeField, bare
 from pteron.kinematics import is_singular_everywhere
 from pteron.manipulator import Manipulator
 from pteron.reduction.certificate import ExactCertificate, NumericalRank
-from pteron.reduction.configurations import (
+from pteron.reduction.elimination import dependencies, reconstruct, remainder
+from pteron.reduction.exact_geometry import ExactGeometry, exact_geometry
+from pteron.reduction.exact_regressor import (
     degree_bound,
     is_square,
     modular_rows,
     rational_rows,
     roots,
 )
-from pteron.reduction.elimination import dependencies, reconstruct, remainder
-from pteron.reduction.exact_geometry import ExactGeometry, exact_geometry
 from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.numerical import fitted_shares, numerical_rank
 from pteron.reduction.symbols import algebraic_values, symbolic_shares

@@ -1,4 +1,4 @@
-"""`base_parameters`: the sums of inertial parameters that alone act on the actuator forces."""
+"""`base_parameters`: finds the sums of inertial parameters that alone act on the drives' forces."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""The dynamic model in several forms, each a kernel, to compare what they cost.
+"""The dynamic model in several forms, each compiled to a kernel, to compare their operations.
 
-All return the same actuator forces. `regressor` is the paper's Eq. (15) times P as it is written,
-J^-T taken first or last, complete or reduced to the base parameters; `factored` is the inverse
-dynamics as `pteron.inverse_dynamics` evaluates it, and, reduced, the model of the cheapest base
-parameters.
+All return the same actuator forces. `regressor` is the paper's Eq. (15) times the parameters P as
+it is written, J^-T taken first or last, complete or reduced to the base parameters; `factored` is
+the inverse dynamics as `pteron.inverse_dynamics` evaluates it, and, reduced, the model of the
+cheapest base parameters.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
 
 Form = Callable[[Expression, Expression, Expression, Expression], Expression]
-"""Forces of J^-T (n, m), the bracket of Eq. (15) (m, N), selection (N, K), parameters (K, 1)."""
+"""Forces from J^-T (n, m), the bracket of Eq. (15) (m, N), columns (N, K), parameters (K, 1)."""
 
 
 _GRAPHS: dict[str, Form] = {

@@ -1,6 +1,6 @@
-"""The grouping of a regressor's columns that gives the base parameters.
+"""`Grouping`: a regressor's columns kept as base parameters, and how the others depend on them.
 
-Every method of `base_parameters` returns one: the columns kept, and the shares of the others.
+Each method of `base_parameters` returns one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pteron.kernels import Array
 from pteron.reduction.certificate import Certificate
 
 Share = Fraction | float | Any
-"""A fraction where it is known as one, a SymPy number where it holds roots, else a float."""
+"""A coefficient: a fraction where exact, a SymPy number where it holds roots, else a float."""
 
 Shares = dict[int, dict[int, Share]]
 """`shares[j][k]`: how much of the dependent column j goes with the kept column k."""

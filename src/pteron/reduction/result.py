@@ -1,4 +1,4 @@
-"""The base inertial parameters of a machine: names, grouping, expressions and certificate."""
+"""`BaseParameters`, the result of `base_parameters`: names, sums, values and certificate."""
 
 from __future__ import annotations
 

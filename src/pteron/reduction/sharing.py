@@ -1,4 +1,4 @@
-"""The regressor's columns where legs share parameters, and the order in which they are preferred.
+"""The regressor's columns where legs share parameters, and the order in which columns are kept.
 
 Legs share parameters as equal legs do: the columns of their like parameters add up to one.
 """

@@ -1,4 +1,7 @@
-"""Base parameters in symbols of the geometry, such as (1/ll1^2) I_l1, from the mass transfers."""
+"""Coefficients of base parameters in symbols of the geometry, such as 1/ll1^2 of I_l1.
+
+They follow from the mass transfers (`transfers`).
+"""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ from pteron.workspace import (
 )
 from pteron.workspace.drive_warnings import load_warnings
 from pteron.workspace.machine_warnings import machine_warnings
-from pteron.workspace.reach import Plane, reached, slice_planes
+from pteron.workspace.reach_slices import Plane, reached, slice_planes
 from pteron.workspace.tilts import largest_tilt
 
 _ANGLES = 361

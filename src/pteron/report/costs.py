@@ -1,8 +1,7 @@
-"""Numbers of operations of the dynamic model in each of its forms, complete and reduced.
+"""Operation counts of the dynamic model in each of its forms, complete and reduced, for the report.
 
 The paper says that its reduced model is about 41 % faster than the complete one. How much a
-reduction saves depends on the form: all of them stand side by side here, and their times in
-`benchmarks/paper_claim.py`.
+reduction saves depends on the form; `benchmarks/paper_claim.py` measures times.
 """
 
 from __future__ import annotations

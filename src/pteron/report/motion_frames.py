@@ -30,10 +30,10 @@ _DECIMALS = 6
 """Decimals of the data, m or rad."""
 
 _SAME = 1e-6
-"""Difference between the ends of a closed motion, as a share of its size, and of its speeds."""
+"""Greatest gap between the ends of a closed motion, as a share of its size, or of its speed."""
 
 _LITTLE = 1e-3
-"""Least size (m, rad) and speed of which that share is taken."""
+"""Least size (m, rad), and speed, of which that share is taken."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The moving picture of a page: variables of its template, such as words, speeds and frames."""
+"""Variables of the template of a page's moving picture: frames of the motion, speeds, words."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PACES = (
 """Least duration of a motion, s, speed of its playback, and name of the speed."""
 
 _ROUNDING = 1e-9
-"""Distance of two points, m, that counts as none."""
+"""Distance of two points, m, up to which they are one."""
 
 
 def stage(

@@ -1,4 +1,4 @@
-"""The paper's Table 1, row by row: its printed coefficients beside the computed ones."""
+"""The paper's Table 1, a Quadrupteron's base parameters: coefficients as printed and computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers typeset for the pages, and the templates, texts and data that pages are made of."""
+"""Numbers typeset for HTML pages, and the templates, texts and data that pages are made of."""
 
 from __future__ import annotations
 

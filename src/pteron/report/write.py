@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pteron.report.contents import Report
 
 _WAY = "across up turn"
-"""Attributes of a standard cycle, which other motions have not."""
+"""Attributes of the standard cycle that other motions lack."""
 
 _PAGES = (".html", ".htm")
 """Endings of pages."""

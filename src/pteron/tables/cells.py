@@ -1,4 +1,4 @@
-"""A CSV file's cells as a separator cuts them, and the separator that makes numbers of most."""
+"""The cells of a CSV file, cut by the separator and decimal sign that make most of them numbers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Record(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """A file as one separator cuts it."""
+    """A file's cells as one separator cuts them."""
 
     separator: Separator
     decimal: Decimal
@@ -48,7 +48,7 @@ class Cut(NamedTuple):
     """Cells that are a number or a time."""
 
     def is_row(self, record: Record) -> bool:
-        """Say whether all its numbers are numbers."""
+        """Return whether it has a number or time in every column that holds them."""
         return (
             bool(self.columns)
             and len(record.cells) == self.width
@@ -70,7 +70,7 @@ def single_blanks(text: bytes) -> bytes:
 
 
 def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
-    """Return the file as that separator cuts it which makes most of its cells numbers."""
+    """Return the file as cut by the separator that makes most of its cells numbers."""
     separators = [declared.separator] if declared.separator else list(SEPARATORS)
     decimals = [declared.decimal] if declared.decimal else list(get_args(Decimal))
     cut = [

@@ -1,4 +1,4 @@
-"""CSV files, read in blocks by Polars, or record by record to say what is wrong."""
+"""`CsvFile`: a CSV file read in blocks by Polars, or record by record to say what is wrong."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dialects of CSV: separator, decimal sign, encoding and header lines, as far as declared."""
+"""The dialect of a CSV file as far as declared: separator, decimal sign, encoding, header lines."""
 
 from __future__ import annotations
 

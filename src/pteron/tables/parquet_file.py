@@ -1,4 +1,4 @@
-"""Parquet files, read in blocks of rows."""
+"""`ParquetFile`: a Parquet file, read in blocks of rows."""
 
 from __future__ import annotations
 

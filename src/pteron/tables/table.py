@@ -1,4 +1,4 @@
-"""A table: rows with named columns, and the place of each row in its file."""
+"""`Table`: rows with named columns, of a file or a data frame, and each row's place in the file."""
 
 from __future__ import annotations
 

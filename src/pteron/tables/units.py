@@ -1,4 +1,4 @@
-"""Units that the names of a table's columns say, such as ``x (mm)`` and ``roll [deg]``."""
+"""Conversion to SI units of columns whose names say their unit, such as ``x (mm)``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FACTORS = {
     "rad": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
 }
-"""How many of an SI unit others are."""
+"""Factors from units to SI units, by SI unit."""
 
 _NAMED = re.compile(r"(?P<name>[^\s(\[]+)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]")
 
@@ -63,7 +63,7 @@ def in_si(table: Table, units: Mapping[str, str]) -> Table:
 
 
 def _factor(unit: str, si: str) -> float | None:
-    """Return how many of an SI unit another one is, None if it measures something else."""
+    """Return the factor from a unit to an SI unit, None if it measures something else."""
     (own, _, per), (base, _, wanted) = unit.partition("/"), si.partition("/")
     if re.sub("[ ^]", "", per) != re.sub("[ ^]", "", wanted):
         return None

@@ -1,4 +1,4 @@
-"""The viewer: a machine in the browser, in space, moved by sliders or by hand, with its forces."""
+"""`view`: a machine in the browser, in 3-D, moved by sliders or by hand, with its forces."""
 
 from pteron.public import publish as _publish
 from pteron.viewer.view import Viewer as Viewer, view as view

@@ -1,4 +1,4 @@
-"""The boundary that stops a machine on its path: a leg's reach, a limit, or its mode's end."""
+"""The end of a machine's way to a pose or joint values: a leg's reach, a limit, a singularity."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from pteron.report.quantities import readable
 from pteron.workspace.margins import distance_to_limits, joint_distances
 
 LEAST_TYPE_I = 0.01
-"""The type-I measure at the end of a leg's reach: forces still have most of their digits."""
+"""Least type-I measure of a leg in the viewer: forces still have most of their digits there."""
 
 _ENDS = 2.0 * LEAST_TYPE_I
-"""Type-I measure below which a leg is said to have stopped the machine."""
+"""Type-I measure below which a leg's reach is named as what stops the machine."""
 
 _ROUNDING = 1e-9
 """Distance of a joint beyond its limit that counts as rounding, m or rad."""
@@ -33,7 +33,7 @@ _STEPS = 8
 """Pieces of a path of the joints, along each of which the platform is followed."""
 
 _SAME_JOINT = 1e-6
-"""Difference of a joint's coordinate from the wanted one that counts as none, m or rad."""
+"""Difference of a joint's coordinate from the one asked for, m or rad, up to which it is met."""
 
 
 def allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     _Answer = Callable[[ServerConnection, Request], Response | None]
 
 _SERVES = threading.Lock()
-"""Held while a server is being guarded: one at a time."""
+"""Held while a server starts under the guard: one at a time."""
 
 
 def is_here(host: str) -> bool:

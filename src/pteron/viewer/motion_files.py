@@ -1,4 +1,4 @@
-"""A motion from a file given to the viewer: a motion, joints, a simulation or a log."""
+"""The motion in a file opened in the viewer: poses or joints over time, a simulation, or a log."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pteron.playback import playback, read_content
 from pteron.tables import ENDINGS
 
 _LARGEST = 100 << 20
-"""Greatest size of a file, bytes; a longer motion takes minutes to follow."""
+"""Greatest size of a file, bytes; the motion of a larger one takes minutes to compute."""
 
 
 def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> Motion:

@@ -1,4 +1,4 @@
-"""The panel beside the viewer's picture: controls that show the machine's state and change it."""
+"""The viewer's side panel: controls that show the machine's state and change it."""
 
 from __future__ import annotations
 

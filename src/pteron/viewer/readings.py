@@ -1,4 +1,4 @@
-"""Readings on the viewer's panel: forces, condition number, margins to singularities and limits."""
+"""Numbers on the viewer's panel: forces, condition number, margins to singularities and limits."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from pteron.viewer.state import ViewerState
 from pteron.workspace import pose_margins
 
 Level = Literal["far", "near", "close"]
-"""How near a margin of a pose, to a singularity or a limit, is to its end: see `level`."""
+"""Level of a margin to a singularity or a limit: see `level`."""
 
 _NEAR = 0.3
-"""Margin, 1 at best, below which it is near its end."""
+"""Margin, 1 at best and 0 at the singularity or limit, below which its level is "near"."""
 
 _CLOSE = 0.1
-"""Margin below which it is close to that."""
+"""Margin below which its level is "close"."""
 
 
 @dataclass(frozen=True, eq=False)

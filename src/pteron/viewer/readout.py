@@ -1,4 +1,4 @@
-"""The readings as HTML for the viewer's panel: values with units, colours with words."""
+"""The numbers of `readings` as HTML for the viewer's panel, with units, colours and words."""
 
 from __future__ import annotations
 

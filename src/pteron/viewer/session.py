@@ -41,7 +41,7 @@ STANDARD = "standard pick-and-place cycle"
 """Name of the standard cycle as people read it."""
 
 _DRAWN = 200
-"""Random poses by which the ranges of sliders are chosen."""
+"""Number of random poses from which the sliders' ranges are taken."""
 
 _MARGIN = 0.08
 """Share by which the range of poses is extended for sliders."""

@@ -9,7 +9,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.viewer.meshes import Mesh, cells
 from pteron.workspace import BEYOND_LIMITS, REACHABLE, reach_slice
-from pteron.workspace.reach import slice_planes
+from pteron.workspace.reach_slices import slice_planes
 
 POINTS = 111
 """Points along each side of a slice."""

@@ -20,7 +20,7 @@ from pteron.viewer.boundary import allowed, farthest, followed, told_rest, what_
 from pteron.workspace import home_pose
 
 _SAME_POSE = 1e-6
-"""m or rad within which two poses are one assembly mode."""
+"""Difference of two poses, m or rad, up to which they are one assembly mode."""
 
 
 @dataclass(frozen=True, eq=False)

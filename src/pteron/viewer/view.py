@@ -1,4 +1,4 @@
-"""`view`: serves a page in the browser on which a machine can be moved."""
+"""`view` serves a web page on which a machine can be moved; `Viewer` controls it from Python."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ from pteron.workspace.quadrature import (
     Quadrature as Quadrature,
     quadrature_volume as quadrature_volume,
 )
-from pteron.workspace.reach import (
+from pteron.workspace.reach_slices import (
     BEYOND_LIMITS as BEYOND_LIMITS,
     REACHABLE as REACHABLE,
     ReachSlice as ReachSlice,

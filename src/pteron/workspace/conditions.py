@@ -1,8 +1,8 @@
-"""Conditions on a pose, each a compiled function that must not be below a floor, and their tests.
+"""Conditions on a pose, each a compiled function with a floor that it must keep, and their tests.
 
 They are tested at poses, by ordinary evaluation, or in boxes of poses, by intervals. Pavings,
-proofs, boundaries, largest shapes and designs all use the same list. Anything else that a region
-must keep, such as a distance between links, is one more condition: the name of a function.
+proofs, largest shapes and designs all use the same list. Anything else that a region must keep,
+such as a distance between links, is one more condition: the name of a function.
 """
 
 from __future__ import annotations

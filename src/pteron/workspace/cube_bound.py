@@ -1,4 +1,4 @@
-"""A proved upper bound on the edge of cubes in the workspace."""
+"""`cube_bound`: a proved upper bound on the edge of cubes that fit in the workspace."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A box that is proved to hold every position in reach, from the bounds on the legs' reach."""
+"""A proved box about all positions in reach, from bounds on each leg's reach."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Largest shapes and better geometry by gradients, subject to conditions at all points of a shape.
+"""Semi-infinite programs by the exchange method: largest shapes, better geometry, by gradients.
 
-The conditions are infinitely many, some for every point of the shape. They are asked at a few
-points, the program is solved, and the points where the solution fails are added: the exchange
-method for semi-infinite programs (R. Hettich and K. O. Kortanek, SIAM Review 35(3), 1993). Within a
-round the geometry is taken as affine in the variables, which it is for lengths and points.
+Conditions must hold at every point of a shape. They are asked at a few points, the program is
+solved, and the points where the solution fails are added (R. Hettich and K. O. Kortanek, SIAM
+Review 35(3), 1993). Within a round the geometry is taken as affine in the variables, which it is
+for lengths and points.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pteron.workspace.samples import Samples, Shape, lattice
 from pteron.workspace.smooth_conditions import SmoothConditions
 
 _PER_ROW = 3
-"""Points added in a round for each condition: those where it is least."""
+"""Points added in a round for each condition, where it is least."""
 
 _ROUNDS = 12
 """Most rounds; after them the best unknowns so far, which keep all conditions, are the result."""

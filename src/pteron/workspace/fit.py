@@ -1,4 +1,4 @@
-"""The largest shape in which a machine works at given orientations: found, then proved."""
+"""The largest shape, as a cube or cylinder, in which a machine works: found, then proved."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SHRINKINGS = 30
 """Most times that a shape from the grid is made smaller until it keeps the conditions."""
 
 UNKNOWN = -1e-6
-"""Stand-in for a condition's value that is NaN, or that no proof decides: just below 0."""
+"""Value, just below 0, for a condition that is NaN or that no proof decides."""
 
 _RIM = 0.98
 """Share of the half edge within which a counterexample sends the search back; nearer to the rim the
@@ -36,7 +36,7 @@ _EXCHANGES = 20
 
 @dataclass(frozen=True)
 class Fit:
-    """The place and size of a shape.
+    """The place and size of a shape in a workspace.
 
     Attributes
     ----------

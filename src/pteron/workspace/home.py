@@ -31,11 +31,10 @@ _DRAWN = 200
 """Random poses that the search starts from."""
 
 _MEASURES = 0.3, 0.02, 0.0
-"""Least type-I and type-II measures of these poses, tried in turn: less is asked where legs have
-little common reach."""
+"""Least type-I and type-II measures of these poses, tried in turn: the lesser for little reach."""
 
 _SOURCES = (*EQUATIONS, "kinematics", "workspace")
-"""The packages that a home pose depends on: a change of their source makes a stored one void."""
+"""Packages whose source a home pose depends on: their change makes a stored one void."""
 
 _STARTS = 12
 """Random poses, the best ones, that are improved by a local search."""

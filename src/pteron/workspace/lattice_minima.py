@@ -26,8 +26,8 @@ _DEPTH = 1e-5
 """A condition that fails by less is left to the proof."""
 
 _MOST = 60
-"""Points looked at for each condition, the lowest first: along a limit that the lattice ends at,
-many are lower than those next to a tube, in an order that is rounding's."""
+"""Points looked at for each condition, the lowest first: along a limit at the lattice's rim many
+are lower than those next to a tube."""
 
 
 def failing_between(

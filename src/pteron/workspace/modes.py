@@ -19,7 +19,7 @@ from pteron.workspace.conditions import EDGES, IntervalTest, condition_margins, 
 from pteron.workspace.paving import Paving, paving
 
 _HALVINGS = 50
-"""Bisections, between a corner inside an edge and one beyond it, that lead to a contact."""
+"""Bisections for a contact, between a box's corner inside an edge of reach and one beyond."""
 
 _ROUNDS = 30
 """Most times that boxes are halved; after them it is not decided whether two modes meet."""

@@ -1,4 +1,4 @@
-"""Sample points for conditions: of a shape that moves and grows, and of a region that stays."""
+"""Sample points for `exchange` and `fit`, of a shape that moves and grows and of a fixed region."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _STARTS = 5
 """Random poses, the best ones, that are improved by an optimiser."""
 
 _TOUCH = 1e-6
-"""Metres of common reach that count as none."""
+"""Depth of a pose in all legs' reach, m, up to which it counts as out of reach."""
 
 
 def nowhere(robot: Manipulator) -> ModelError:

@@ -1,4 +1,4 @@
-"""The reach at constant orientation: its bounding box and its volume, or area."""
+"""The reach at constant orientation: its bounding box, and its volume (planar: area)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _NEARER = 0.75
 """Factor on that deviation from round to round."""
 
 _FAR = 1e3
-"""Stand-in for no limit, m: the optimiser wants finite numbers."""
+"""Value for no limit, m: the optimiser wants finite numbers."""
 
 _ENDLESS = 100.0
 """A path this many times the machine's size that stays in reach has no end."""

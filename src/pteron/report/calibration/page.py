@@ -24,7 +24,7 @@ from pteron.plots.canvas import nice_step
 from pteron.report.calibration.values import notes, value_rows
 from pteron.report.typeset import resource, significant, template
 from pteron.workspace import home_pose, reach_slice
-from pteron.workspace.reach import slice_planes
+from pteron.workspace.reach_slices import slice_planes
 
 _POINTS = 41
 """Points along each side of a slice."""

@@ -1,4 +1,4 @@
-"""Rows of a calibration's report: values drawn and found, their intervals, and notes."""
+"""Rows of a calibration's report: values as designed and as found, their intervals, and notes."""
 
 from __future__ import annotations
 

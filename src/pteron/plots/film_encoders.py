@@ -1,4 +1,4 @@
-"""Encoders that write films, picture by picture: H.264 in MP4 files, and GIF files."""
+"""Video encoders that write a film frame by frame: H.264 in MP4 files, and GIF files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plane slices through the reach at constant orientation: poses in reach, and what ends it."""
+"""Slices through the reach: poses over a plane of two coordinates, in reach or not, and why not."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The regressor in exact arithmetic: its rows at random states, and the degree of its entries.
+"""The regressor in exact arithmetic: its rows at random states, and bounds on its entries' degrees.
 
-Rows are residues modulo a prime, or fractions; bounds on degrees and roots tell how seldom a
-combination of entries that is not zero vanishes at random states.
+Rows are residues modulo a prime, or fractions. The bounds on degrees and on the number of roots
+tell how seldom a combination of entries that is not zero vanishes at random states.
 """
 
 from __future__ import annotations
