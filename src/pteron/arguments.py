@@ -1,7 +1,7 @@
 """Checks of public functions' arguments against their type hints, before a function runs.
 
-Each package's `__init__` calls `check_arguments` once, which wraps all of the package's public
-functions. Machines and arrays of states are checked by the functions, which convert them anyway.
+`public.publish` calls `check_arguments`, which wraps public functions and classes of a package.
+Machines and arrays of states are checked by the functions, which convert them anyway.
 """
 
 from __future__ import annotations
@@ -31,11 +31,10 @@ _CHECKED_LATER = {
 """Type hints of arguments that the functions themselves check, at no cost."""
 
 _LOOKED_AT = 1000
-"""Longest sequence whose elements are checked, one by one."""
-
+"""Longest sequence whose elements are checked; of longer ones only the type is."""
 
 _LARGEST = 2**63
-"""Whole numbers must be smaller: they count elements in memory or index them, in 64 bits."""
+"""Whole numbers must be smaller in size: they count or index elements of arrays, in 64 bits."""
 
 
 class Between(NamedTuple):

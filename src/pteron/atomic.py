@@ -16,8 +16,8 @@ def write_texts(folder: str | Path, texts: Mapping[str, str]) -> list[Path]:
     Raises
     ------
     OutputError
-        If the folder cannot be made or written, or a text is none in UTF-8; files that were there
-        are left as they were.
+        If the folder cannot be made or written, or UTF-8 has no form of a text; files that were
+        there are left as they were.
     """
     target = make_folder(folder)
     return write_files(

@@ -1,4 +1,4 @@
-"""The errors and the warning that a user can meet: each says what is wrong, and what to do."""
+"""Pteron's exceptions, with the root `PteronError`, and its warning, `UnlikelyValue`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from reprlib import Repr
 from typing import Any
 
 _LONGEST = 60
-"""Characters of a value that a message shows."""
+"""Most characters of a value that a message shows; see `shown`."""
 
 _brief = Repr()
 _brief.maxstring = _brief.maxother = _brief.maxlong = _LONGEST

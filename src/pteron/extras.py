@@ -1,4 +1,4 @@
-"""The pip command that installs one of Pteron's optional extras, such as `viewer`, for messages."""
+"""Imports of modules that optional extras bring, or an error with the pip command for the extra."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A small table in HTML for notebooks, which `_repr_html_` of a value returns.
 
-It takes the notebook's own colours and font, so that it is read in a light and in a dark one; its
-style is for tables of its class alone, and nothing is fetched.
+It takes the notebook's own colours and font, light or dark. Its style changes no other table, and
+it loads nothing from the network.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Values as JSON has them, and the attributes of objects as such values."""
+"""Conversion of values, and of chosen attributes of objects, to what JSON can hold."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def json_ready(data: Any) -> Any:
-    """Return data as JSON has them: NumPy's numbers as Python's, null for what is not finite."""
+    """Return data for JSON: NumPy's numbers as Python's, None (null) for what is not finite."""
     if isinstance(data, dict):
         return {key: json_ready(value) for key, value in data.items()}
     if isinstance(data, list | tuple):

@@ -1,4 +1,7 @@
-"""The public names of a package: what its `__init__.py` imports as it is, or defines."""
+"""`publish`, the last line of each package's `__init__.py`: it lists the package's public names.
+
+These are the names that the file imports or defines, and others that are imported at first use.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from pteron.arguments import check_arguments
 from pteron.renamed import former_name
 
 _OTHERS = {"annotations", "TYPE_CHECKING"}
-"""Names that a file imports for itself."""
+"""Names that an `__init__.py` imports for itself."""
 
 
 def publish(
@@ -23,7 +26,7 @@ def publish(
     checked: bool | Collection[str] = False,
     classes: Collection[str] = (),
 ) -> None:
-    """List a package's public names, for completion and ``import *``; the last line of its file.
+    """List a package's public names, for completion and ``import *``.
 
     An import that hands a name on says so to readers and type checkers alike: ``import size as
     size``. A name with an underscore is the file's own.

@@ -1,4 +1,4 @@
-"""Former public names: each answers for one release, with a warning that has the new line.
+"""Former public names, which work for one release, with a warning that has the line to write.
 
 A name that is renamed gets a line in `RENAMED`. An attribute that is renamed leaves a line in its
 class: ``old = former_attribute("old", "new")``.

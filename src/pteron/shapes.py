@@ -1,4 +1,4 @@
-"""Names of array shapes, and of other arguments that recur, for the type hints of public functions.
+"""Type hints that recur in public functions: array shapes, tables, seeds, numbers of workers.
 
 `...` are the batch axes, n the legs, m the pose coordinates (n = m), k the assembly modes and N the
 inertial parameters. SI units and radians; poses are ordered (x, y, z, phi), without z in a plane,

@@ -14,7 +14,7 @@ def template(folder: str, name: str, **filters: Callable[..., Any]) -> jinja2.Te
 
     A template may extend or include others of its folder.
     """
-    # Slow to load, and values that are shown in notebooks stand on the lowest floors.
+    # Slow to load, and needed only when a page or a notebook's table is made.
     import jinja2
 
     made = jinja2.Environment(

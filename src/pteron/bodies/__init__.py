@@ -1,1 +1,1 @@
-"""Bodies: three-vectors, inertia, inertial parameters, and a body in motion."""
+"""Rigid bodies: their inertia, inertial parameters and motion, and vectors in space."""

@@ -1,6 +1,6 @@
-"""Exact derivatives along a motion x(t), and whether two expressions of t are equal at t = 0.
+"""Exact time derivatives of CasADi expressions, and comparison of expressions at time 0.
 
-Conformance tests of legs, platforms and closures stand on it.
+The conformance tests of legs, platforms and closures use them.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from pteron.bodies.motion import Expression
 
 _SAME = 1e-9
-"""Share of its size by which a quantity may differ from what it should be."""
+"""Greatest relative difference of quantities that count as equal."""
 
 _SMALL = 1e-3
-"""Sizes below which quantities are compared as they are, SI units."""
+"""Least size to which a difference is relative, SI units."""
 
 TIME = ca.SX.sym("t")
 

@@ -13,7 +13,7 @@ from pteron.bodies.vectors import number, numbers, positive
 from pteron.errors import ModelError
 
 _ROUNDING = 1e-12
-"""Share of an inertia by which it may miss what a real body has at least, from rounding."""
+"""Relative rounding by which an inertia may be below the least that a real body has."""
 
 
 @runtime_checkable
@@ -40,7 +40,7 @@ class Inertia(Protocol):
 
 
 def with_center(inertia: Inertia) -> dict[str, float]:
-    """Return a body's values by kind, its centre of mass (m) in place of the first moments."""
+    """Return a body's values by kind, with its centre of mass (m) in place of first moments."""
     values = dict(zip(inertia.kinds, inertia.values, strict=True))
     return values | {k: values[k] / values["m"] for k in ("mgx", "mgy", "mgz") if k in values}
 

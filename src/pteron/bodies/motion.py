@@ -1,7 +1,9 @@
 """A body in motion, and the wrench that its motion needs: CasADi expressions for one state.
 
 Inertial parameters come as rows (1, K) of K columns: one column for the values of a machine, or a
-column for each parameter, which turns every force below into the regressor of that force.
+column for each parameter, which turns every force below into the regressor of that force. Rows
+against (c', omega) multiply the velocity c' of a leg's platform point and the platform's angular
+velocity omega.
 """
 
 from __future__ import annotations
@@ -85,9 +87,7 @@ class Moments(NamedTuple):
 class BodyMotion(NamedTuple):
     """A rigid body that moves in a plane, a rod that swings, or a slider: all are written alike.
 
-    A body is its reference point and its axes x and y. A rod has no y, a slider no axes. The rows
-    stand against (c', omega): the velocity of the leg's platform point, and the platform's angular
-    velocity.
+    A body is its reference point and its axes x and y. A rod has no y, a slider no axes.
     """
 
     position: Expression

@@ -1,4 +1,4 @@
-"""Inertial parameters as data; their names are printed, and nowhere read again."""
+"""Inertial parameters of a machine: their kinds, units, bodies, legs, names and order."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PREFERENCE = (
     *(("m", "p"), ("mgx", "u"), ("mgy", "u"), ("I", "u"), ("mgx", "l"), ("mgy", "l"), ("m", "e")),
     *(("m", "l"), ("mgx", "e"), ("mgy", "e"), ("I", "e"), ("I", "l"), ("m", "u")),
 )
-"""Kinds and bodies of parameters, those that base parameters keep first in front, as Table 1."""
+"""Kinds and bodies of parameters in the order in which base parameters keep them, as Table 1."""
 
 TILTING_PREFERENCE = (
     *PREFERENCE[:6],

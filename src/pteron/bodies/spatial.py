@@ -19,14 +19,14 @@ class SpatialMoments(NamedTuple):
     m: Expression
     """(1, K)."""
     h: Expression
-    """(3, K): m gamma, in the body's frame."""
+    """(3, K): mass times centre of mass, in the body's frame."""
     i: Expression
     """(6, K): Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the reference point, in the body's frame."""
 
     def with_points(
         self, points: Sequence[Expression], masses: Sequence[Expression]
     ) -> SpatialMoments:
-        """Return those of the body with masses (1, K) on points (3, 1) of its frame."""
+        """Return the parameters with masses (1, K) added at points (3, 1) of the body's frame."""
         m, h, i = self
         for s, mass in zip(points, masses, strict=True):
             x, y, z = ca.vertsplit(s)
@@ -46,11 +46,11 @@ class SpatialMotion(NamedTuple):
     axes: Expression
     """R (3, 3): its x, y and z."""
     acceleration: Expression
-    """That of its reference point."""
+    """Of its reference point, (3, 1)."""
     turning: Expression
-    """omega."""
+    """Angular velocity omega, (3, 1)."""
     growth: Expression
-    """alpha = omega'."""
+    """Angular acceleration alpha = omega', (3, 1)."""
 
 
 def needed_twist_wrench(

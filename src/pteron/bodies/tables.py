@@ -1,8 +1,8 @@
-"""The parts of TOML tables that hold bodies and vectors, as pydantic reads them.
+"""Pydantic models of the bodies and vectors in TOML files.
 
-Only shape and type are checked here; what the numbers mean is checked by what they build. What a
-key is stands in its description, which files and pages show. Imported where a file is read, since
-pydantic would slow the start of those who read none.
+They check shape and type only; whether the numbers are those of a real body is checked by what they
+build, such as `RodInertia`. A key's description is shown in new files and in the documentation.
+The module is imported only where a file is read, as pydantic loads slowly.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class _Body(Table):
 
     @property
     def unit(self) -> Any:
-        """A body that stands for one that cannot be."""
+        """A body with mass and inertia 1, in place of one whose numbers are refused."""
         kinds = self.kind.kinds
         ones = ("m", "I", "Ixx", "Iyy", "Izz")
         return self.kind.of_values([float(kind in ones) for kind in kinds])

@@ -1,4 +1,4 @@
-"""Three-vectors of plain floats, and the checks that a manipulator's numbers must pass."""
+"""Vectors in space as three floats, and checks of a manipulator's numbers and vectors."""
 
 from __future__ import annotations
 

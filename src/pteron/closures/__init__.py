@@ -1,4 +1,4 @@
-"""Kinds of closures: how the legs' rows make up J, and back; `closures.closure` is the page."""
+"""Closures, which solve a machine's closed loops; `closures.closure` has their base class."""
 
 from collections.abc import Sequence
 

@@ -1,10 +1,10 @@
-"""The protocol of closures: read this page before writing another kind.
+"""The base class of closures, which solve a machine's closed loops for forces, rates and poses.
 
-The legs' rows against (c', omega) and the platform's matrices d(c, omega)/dx make up the Jacobian,
-Eq. (10): q' = J x'. A closure turns that round: forces through J^-T, rates through J^-1, joint
-coordinates into poses, and how far J is from singular. Which closure serves a machine depends on
-its legs' rows and on its platform alone. A kind is one file of this folder, named in
-`closures.KINDS`; what is solved here by the adjugate it may give in closed form.
+A leg's row gives its joint rate from (c', omega), the velocity of its platform point and the
+platform's angular velocity; the platform's matrices d(c, omega)/dx lead from there to the pose.
+Together they make up the Jacobian J, Eq. (10): q' = J x'. A closure applies J^-T to wrenches and
+J^-1 to rates, finds poses from joint coordinates, and measures how far J is from singular.
+A kind of closure is a subclass in this folder, entered in `closures.KINDS`.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from pteron.legs.leg import LegEquations, LegMotion, Plane, Turned
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _COINCIDENT = 1e-9
-"""Share of the points' distances from P within which points count as one, or on one line."""
+"""Share of platform points' distances from P within which they count as one, or on one line."""
 
 
 class Closure(ABC):
-    """The closure of one machine, for one state."""
+    """The closure of one machine, for one state, from its legs and platform."""
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         self.legs, self.platform = legs, platform

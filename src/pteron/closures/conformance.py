@@ -1,4 +1,4 @@
-"""Whether a closure keeps the protocol of `closures.closure`, on a machine that it serves."""
+"""Conformance test of a closure against `closures.closure`, on a machine that it serves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pteron.platforms import Platform, equations_class
 def faults(
     legs: Sequence[LegKind], platform: Platform, pose: ArrayLike, seed: int = 0
 ) -> tuple[str, ...]:
-    """Return where the closure of legs under a platform breaks the protocol, a line each.
+    """Return what is wrong with the closure of legs under a platform, one line for each fault.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def faults(
     pose : array, shape (m,)
         A pose that all legs reach, away from singularities.
     seed : int
-        Where the forces and rates that are tried come from.
+        Seed of the random forces and rates that are tried.
 
     Examples
     --------

@@ -1,8 +1,9 @@
-"""The closure d_bar . (c - r) = rho of legs whose rows are constant, in closed form.
+"""The closed-form closure of legs with constant rows, d_bar . (c - r) = rho, such as P-R-R-R legs.
 
-For 3T1R the n = 4 rows d_bar leave one left null vector N (N^T D = 0), and every solution of
-D^T F = w is F = P w + lambda N with D^T P = 1. So the Jacobian, [ D | j ], never needs a numerical
-elimination: its only denominator is N . j, which depends on phi alone.
+Here rho is the slider, c the platform point, r the guide point; the rows d_bar make up D. Of four
+such legs under a platform that turns (3T1R), J = [ D | j ]. D has one left null vector N (N^T D =
+0), so that D^T F = f has the solutions F = P f + lambda N, with D^T P = 1. Nothing is eliminated
+numerically: the only denominator is N . j, which depends on the platform's angle phi alone.
 """
 
 from __future__ import annotations

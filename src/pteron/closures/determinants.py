@@ -1,4 +1,4 @@
-"""Determinants, adjugates and solutions of small systems of expressions, without a pivot."""
+"""Determinants, adjugates and solutions of CasADi systems, 2 to 4 or 6 in size, without pivots."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def determinant(m: Expression) -> Expression:
 
 
 def solved(m: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (n, K) and d with m x = d right, d = det m."""
+    """Return x (n, K) and d = det m with m x = d right."""
     across = adjugate(m)
     return ca.mtimes(across, right), ca.mtimes(m[0, :], across[:, 0])
 
 
 def adjugate(m: Expression) -> Expression:
-    """Return the adjugate of a matrix (2, 2) to (4, 4), or (6, 6): times the matrix it is det 1."""
+    """Return the adjugate, det(m) m^-1, of a matrix (2, 2) to (4, 4), or (6, 6)."""
     if m.shape[0] == 6:
         return _adjugate_of_six(m)
     if m.shape[0] == 2:

@@ -14,11 +14,11 @@ from pteron.legs.leg import Locus, Plane, Sphere, Turned
 from pteron.platforms.motion import PlatformEquations
 
 _ROUNDING = 1e-14
-"""Share of two squares by which their difference may be below zero from rounding."""
+"""Share of the sum of two squares up to which a difference below zero counts as rounding."""
 
 
 def moved(locus: Locus, offset: Expression) -> Locus:
-    """Return the locus of P, where that of P + offset is given."""
+    """Return the locus of the platform's point P from that of P + offset."""
     assert not isinstance(locus, Turned)
     if isinstance(locus, Plane):
         return locus._replace(offset=locus.offset - ca.dot(locus.normal, offset))
@@ -30,8 +30,8 @@ def meeting_points(
 ) -> tuple[Expression, Expression]:
     """Return the points, as columns, in which as many loci meet as the platform has lengths.
 
-    They are two, on both sides of a plane or a line; or one of planes alone. Where they are not
-    real they are NaN, and so is the number that comes with them, which is 0 else.
+    They are two, mirrored in a plane or a line; planes alone meet in one. Where they are not real
+    they are NaN, and so is the number returned beside them, which else is 0.
     """
     if platform.directions.shape[1] == 2:
         return _meeting_in_plane(loci, platform)

@@ -1,8 +1,8 @@
-"""The closure of three legs of any kind under a 3T platform: planes and spheres that meet.
+"""The closure of three legs under a platform that only translates in space (3T).
 
 While its joint is held, a leg keeps its platform point on a plane (P-R-R-R) or on a sphere (a rod's
-end). Moved by the points' offsets, the three loci meet at P: the planes, and the differences of the
-spheres, are linear, and leave a line that meets one sphere twice.
+end). Moved by the platform points' offsets from P, the three loci meet at P: the planes, and the
+differences of the spheres, are linear, and leave a line that meets one sphere twice.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pteron.platforms.motion import PlatformEquations
 
 
 class ThreeLoci(Closure):
-    """Three legs, at least one of whose rows depends on the pose, under a 3T platform."""
+    """Three legs under a 3T platform, where at least one leg's row depends on the pose."""
 
     modes = 2
 

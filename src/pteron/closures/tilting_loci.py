@@ -1,7 +1,7 @@
-"""The closure of legs with ball joints at their ends, under a platform that turns about any axis.
+"""The closure of legs that end in ball joints, under a platform that tilts (two or three angles).
 
-While its joint is held each leg keeps its platform point on a sphere, or on a circle of a tripod's
-plane. The poses have no closed form; `kinematics.tilting_assembly` finds them.
+While its joint is held each leg keeps its platform point on a sphere, or, where the leg stays in a
+plane, on a circle. The poses have no closed form; `kinematics.tilting_assembly` finds them.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""The closure of any legs under a platform that translates and turns, or slides.
+"""The closure of three or four legs under a platform with one angle, phi.
 
-Where a leg holds the angle phi, the loci of the others, moved by offsets that are then known, meet
-at P as they do under a platform that only translates. Where all legs have planes and the platform
-slides, their closures are linear. Otherwise what is left of the closures is one polynomial, in
-tan(phi / 2) or phi, which has no roots in closed form: see `kinematics.assembly`.
+A held joint keeps a leg's platform point on a locus, a plane or a sphere, or it fixes phi. In that
+case the other loci, moved by offsets that are then known, meet at the platform's point P as under a
+platform that only translates. Where all loci are planes and phi slides the platform's halves, the
+closures are linear. Otherwise one polynomial in tan(phi / 2) or phi is left, which has no roots in
+closed form: see `kinematics.assembly`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from pteron.platforms.motion import PlatformEquations
 
 
 class TurningLoci(Closure):
-    """Three legs, or four, under a platform with an angle, on which the legs' rows depend."""
+    """Three legs, or four, under a platform with one angle, and rows that depend on the pose."""
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)

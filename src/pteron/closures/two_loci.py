@@ -1,4 +1,7 @@
-"""The closure of two legs under a 2T platform: circles, or a circle and a line, that meet."""
+"""The closure of two legs under a platform that translates in a plane (2T).
+
+A held joint keeps the platform's point on a circle or a line; the two meet in at most two points.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Controllers: from the reference motion and the measured joints to the forces of the drives."""
+"""Controllers: the drives' forces from a reference motion and the measured joints."""
 
 from pteron.controllers.adaptive import Adaptive as Adaptive
 from pteron.controllers.computed_torque import ComputedTorque as ComputedTorque
@@ -16,6 +16,6 @@ CONTROLLERS: dict[str, Controller] = {
         *(Adaptive(), Adaptive(friction=True)),
     )
 }
-"""Controllers as they are by default, by the names of their laws."""
+"""The controllers with default gains, by the names of their laws."""
 
 _publish(__name__, checked=True)

@@ -1,4 +1,7 @@
-"""Scales for adaptive control: how a motion excites each parameter, and how large each may be."""
+"""Scales for adaptive control: the size of each estimate, and its rate of learning in a motion.
+
+Estimates are base parameters and, for each drive, inertia, dry and viscous friction and offset.
+"""
 
 from __future__ import annotations
 
@@ -23,20 +26,20 @@ _TYPICAL = 0.5, 5.0
 """Speed and acceleration of a platform point in a typical motion, m/s and m/s^2."""
 
 _TURNS = 10
-"""Random directions of velocity and acceleration at each pose of a typical motion."""
+"""Random velocities and accelerations at each pose of a typical motion."""
 
 _HARDLY = 1e-3
-"""Share of the best excited combination below which another counts as not excited."""
+"""Excitation that is added to every combination of estimates, as a share of the greatest."""
 
 _NEAR = 0.1
-"""Greatest random disturbance of velocities and accelerations, as a share: errors of control move
-the machine too. It is bounded, as one far sample would slow down all learning."""
+"""Greatest disturbance, as a share, that is added at random to velocities and accelerations, since
+errors of control move the machine too. It is bounded: one far sample would slow all learning."""
 
 _SAMPLES = 400
-"""Least number of samples to which a longer motion is thinned."""
+"""Least number of samples that are left of a longer motion."""
 
 _DRIVES = 0.1
-"""The share of a joint's typical force, and of its mass, that a drive may take in any case."""
+"""Least size of a drive's estimates, as a share of its joint's typical force and of its mass."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +62,10 @@ class AdaptationScales:
 
     @cached_property
     def scales(self) -> Array:
-        """(K,): the size of what makes up every estimate, in its own unit.
+        """(K,): the size of every estimate, from the parameters in it, in its own unit.
 
         First moments count as the mass times the body's radius of gyration, also where they are
-        zero; drives as a tenth of what their joint takes at least.
+        zero; drives' estimates are at least `_DRIVES` of what their joint takes.
         """
         values, sizes = parameters(self.robot), np.abs(parameters(self.robot))
         for places in body_places(parameter_data(self.robot)).values():

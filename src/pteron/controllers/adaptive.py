@@ -1,4 +1,4 @@
-"""Slotine and Li's adaptive control, in base parameters."""
+"""Slotine and Li's adaptive control, whose estimates are base parameters and drives' friction."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters
 
 _SHARE = 0.02
-"""The default rate of adaptation over the bandwidth."""
+"""The default rate of adaptation, as a share of the bandwidth."""
 
 
 @dataclass(frozen=True)
 class Adaptive(Controller):
     """F = Y theta + K_d z, theta' = Gamma Y^T z: Slotine and Li's law; theta are base parameters.
 
-    z = e' + bandwidth e, and Y theta is what the drives need for q'_r = q'_d + bandwidth e. Errors
-    vanish though the masses are not known; the estimates need not become the true values, only what
-    the motion asks of them. They stay bounded: no farther from the start, in the measure of Gamma,
-    than where all parameters are off by `uncertainty`.
+    e = q_d - q is the joints' error, z = e' + bandwidth e, and Y theta is what the drives need for
+    q'_r = q'_d + bandwidth e. Errors vanish though the masses are not known; the estimates need not
+    become the true values, only what the motion asks of them. They stay bounded: no farther from
+    the start, in the measure of Gamma, than where all parameters are off by `uncertainty`.
 
     Parameters
     ----------
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        Rate at which an error goes, rad/s; by default 0.1 / period.
+        Rate at which an error decays, rad/s; by default 0.1 / period.
     derivative : float or one for each joint, optional
         K_d, N s/m at a slider and N m s/rad at a crank; by default bandwidth times the joint's
         mass, see `joint_masses`.
     adaptation : float, optional
         Rate at which what the motion shows is learnt, rad/s; by default a fiftieth of the
-        bandwidth, and less where something would be learnt faster than errors go.
+        bandwidth, and less where something would be learnt faster than errors decay.
     uncertainty : float
         Share by which the parameters may be off; 0.5 is a half. A first moment that is zero counts
         as the mass times the body's radius of gyration.

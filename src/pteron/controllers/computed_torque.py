@@ -1,4 +1,4 @@
-"""Computed torque control: the forces for the wanted accelerations, corrected by the errors."""
+"""Computed torque control: the drives' forces for accelerations corrected by the joints' errors."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pteron.controllers.feedback import Feedback
 class ComputedTorque(Feedback):
     """F = what the drives need for q'' = q''_d + K_p e + K_d e', in the measured state.
 
-    With the true model errors obey e'' + K_d e' + K_p e = 0, at every joint by itself. The pose is
-    that of the measured joints, by Newton's method from the last one; the model is taken in the
-    middle of the period for which the forces are held. Friction is that of the wanted rates.
+    With the true model the errors e = q_d - q obey e'' + K_d e' + K_p e = 0, at every joint by
+    itself. The pose is that of the measured joints, by Newton's method from the last one; the model
+    is taken in the middle of the period of the forces. Friction is that of the wanted rates.
 
     Parameters
     ----------
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        Rate at which an error goes, rad/s; by default 0.1 / period.
+        Rate at which an error decays, rad/s; by default 0.1 / period.
     damping : float or one for each joint
         1 is the least without overshoot.
     proportional, derivative : float or one for each joint, optional

@@ -1,4 +1,4 @@
-"""The abstract base of all controllers: gains, a sampling period, and the making of a law."""
+"""The abstract base of all controllers: gains and a sampling period; `law` serves one machine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Controller(ABC):
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        Rate at which an error goes, rad/s; by default 0.1 / period.
+        Rate at which an error decays, rad/s; by default 0.1 / period.
     """
 
     period: float = 1e-3
@@ -34,8 +34,8 @@ class Controller(ABC):
         """The name of its law, among `pteron.kernels.FUNCTIONS`."""
 
     share: ClassVar[float] = 0.1
-    """The usual bandwidth, times the period: a controller ten times as slow as its samples allows
-    for a delay of one of them, and for joints that are lighter elsewhere."""
+    """The default bandwidth, times the period: it allows for a delay of one sample, and for joints
+    that are lighter elsewhere."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "period", period_of(self.period))

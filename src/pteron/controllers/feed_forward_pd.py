@@ -1,4 +1,4 @@
-"""Feed-forward of the wanted motion, plus PD control."""
+"""PD control of the joints, with the wanted motion's inverse dynamics as feed-forward."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pteron.controllers.feedback import Feedback
 class FeedForwardPD(Feedback):
     """F = K_p e + K_d e' + what the drives need for the wanted motion, friction included.
 
-    The model is evaluated on the wanted motion alone, in the middle of the period for which the
-    forces are held; no direct kinematics are needed.
+    e = q_d - q is the joints' error. The model is evaluated on the wanted motion alone, in the
+    middle of the period for which the forces are held; no direct kinematics are needed.
 
     Parameters
     ----------
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        Rate at which an error goes, rad/s; by default 0.1 / period. Times the joints' masses, see
-        `joint_masses`, it gives the gains.
+        Rate at which an error decays, rad/s; by default 0.1 / period. It gives the gains, together
+        with the joints' masses (`joint_masses`).
     damping : float or one for each joint
         1 is the least without overshoot.
     proportional, derivative : float or one for each joint, optional

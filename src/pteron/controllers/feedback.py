@@ -1,4 +1,4 @@
-"""The abstract base of controllers with PD feedback: sampled gains from bandwidth and damping."""
+"""The abstract base of controllers with PD feedback: gains from bandwidth, damping and period."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from pteron.manipulator import Manipulator
 
 @dataclass(frozen=True)
 class Feedback(Controller):
-    """A controller with K_p e + K_d e'.
+    """A controller with the feedback K_p e + K_d e' of the joints' errors e = q_d - q.
 
-    By default the gains are such that the error of a joint of its own mass, free of friction, has
-    at the samples e'' + 2 damping bandwidth e' + bandwidth^2 e = 0, exactly.
+    By default the gains are such that the error of a single mass without friction obeys, at the
+    samples, e'' + 2 damping bandwidth e' + bandwidth^2 e = 0 exactly.
 
     Parameters
     ----------
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        Rate at which an error goes, rad/s; by default 0.1 / period.
+        Rate at which an error decays, rad/s; by default 0.1 / period.
     damping : float or one for each joint
-        1 is the least without overshoot.
+        Damping ratio: 1 is the least without overshoot.
     proportional, derivative : float or one for each joint, optional
         The gains themselves, in place of what bandwidth and damping give; both or none.
     """

@@ -1,4 +1,4 @@
-"""Effective mass of a machine at each of its joints, which scales the gains of feedback."""
+"""The effective mass or inertia that each actuated joint moves, which scales feedback gains."""
 
 from __future__ import annotations
 
@@ -18,19 +18,18 @@ _POSES = 100
 """Random poses at which the masses are computed."""
 
 _LEAST = (0.1, 0.01)
-"""Least measure, of type I and of type II, of these poses, tried in turn: less where there are
-none."""
+"""Least measures of type I and type II of these poses; the second where the first finds none."""
 
 _SHARE = 0.1
-"""Share of the poses at which a joint's mass is less than the one returned."""
+"""Quantile of the masses at these poses that is returned."""
 
 
 def joint_masses(robot: RobotLike) -> Array:
-    """Return the mass that each joint's force moves while the others are free, where it is light.
+    """Return the effective mass that each joint's force moves while the other joints are free.
 
-    It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. Of n joints whose stiffness is w^2
-    times it, the squares of the natural frequencies have the mean w^2, so that none is above
-    sqrt(n) w. As it depends on the pose, it is what nine of ten random poses exceed.
+    It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. If n joints have stiffness w^2 times
+    it, the squares of the natural frequencies have the mean w^2, so that none is above sqrt(n) w.
+    It depends on the pose: the value returned is exceeded at nine of ten random poses.
 
     Parameters
     ----------

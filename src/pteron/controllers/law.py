@@ -1,4 +1,4 @@
-"""The law of a controller for one machine: a function that is called at every sample."""
+"""The law of a controller for one machine: a function called at every sample for the forces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pteron.shapes import JointsLike, PerJoint, PoseLike
 
 @dataclass(frozen=True)
 class Law:
-    """A law of control with the gains and the model of one machine; it has no state of its own.
+    """A control law with gains and the model of one machine; its state is passed in and returned.
 
     Attributes
     ----------

@@ -10,18 +10,18 @@ from pteron.controllers.feedback import Feedback
 
 @dataclass(frozen=True)
 class PDGravity(Feedback):
-    """F = K_p e + K_d e' + J^-T g + f_0: what holds the machine, and springs at its joints.
+    """F = K_p e + K_d e' + J^-T g + f_0: springs and dampers at the joints, and gravity balanced.
 
-    g and the drives' offsets f_0 are those of the measured pose. It holds any pose exactly where
-    nothing is dry, and needs no accelerations; in motion the joints lag behind.
+    e = q_d - q is the joints' error, g the gravity forces at the measured pose, f_0 the drives'
+    offsets. Without dry friction it holds any pose exactly; in motion the joints lag behind.
 
     Parameters
     ----------
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        Rate at which an error goes, rad/s; by default 0.2 / period, since springs alone are to hold
-        the joints in motion. Times the joints' masses, see `joint_masses`, it gives the gains.
+        Rate at which an error decays, rad/s; by default 0.2 / period, as springs alone hold the
+        joints in motion. It gives the gains, together with the joints' masses (`joint_masses`).
     damping : float or one for each joint
         1 is the least without overshoot.
     proportional, derivative : float or one for each joint, optional

@@ -1,4 +1,4 @@
-"""Construction of an environment's `World`, the machine and its task, from a user's arguments."""
+"""Construction of a Gymnasium environment's `World`, a machine with its task, from arguments."""
 
 from __future__ import annotations
 
@@ -16,17 +16,16 @@ from pteron.motion import Motion, limits_of, longest_step
 from pteron.workspace import home_pose, pose_margins
 
 _STEP = 5e-4
-"""Length of the integration's steps, s: Runge and Kutta's method is then exact to some
-micrometres."""
+"""Step of the integration, s, with which Runge and Kutta's method is exact to some micrometres."""
 
 _LIVELY = 20.0
-"""Acceleration, m/s^2, that drives without `max_force` can give along every coordinate at once."""
+"""Acceleration, m/s^2, along all coordinates at once, for which drives without `max_force` do."""
 
 _LEAST = 0.2
 """Least margin of the poses at which episodes start and that are targets."""
 
 _SPREAD = 0.25
-"""Distance of these poses from home, at most, as a share of the longest leg."""
+"""Greatest distance of these poses from home, as a share of the longest leg."""
 
 
 def world_of(

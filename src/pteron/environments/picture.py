@@ -17,7 +17,7 @@ from pteron.motion import Guide, joint_guides, joint_points
 from pteron.plots import robot_figure
 
 _POSES = 32
-"""Random starts by which the length of guides in pictures is chosen."""
+"""Random poses that the sliders' guides must reach, which sets the length that is drawn."""
 
 
 class EnvironmentPicture:
@@ -32,7 +32,7 @@ class EnvironmentPicture:
         return joint_guides(self._world.robot, self._world.started(generators, None).pose)
 
     def of(self, state: EpisodeState) -> NDArray[np.uint8]:
-        """Return a machine's state (m,), with a line from its tool to the target.
+        """Return pixels (height, width, 3) of a state (m,), with a line from tool to target.
 
         All pictures have the size of the one in which the machine is at home.
         """

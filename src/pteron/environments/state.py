@@ -1,4 +1,4 @@
-"""The state of an environment's machines: pose, velocity, target and clock."""
+"""The state of one or many machines in a Gymnasium environment: pose, velocity, target, clock."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class EpisodeState:
-    """The state of machines: pose, velocity and target (..., m), clock (...) in s."""
+    """Pose, velocity and target (..., m) of machines, and the time of their episodes (...), s."""
 
     pose: Array
     velocity: Array
@@ -23,7 +23,7 @@ class EpisodeState:
     clock: Array
 
     def put(self, chosen: Bools, others: EpisodeState) -> EpisodeState:
-        """Return these states with others in the place of those that are chosen, (B,)."""
+        """Return these states with `others` in place of the chosen ones, a mask (B,)."""
         found = self.pose.copy(), self.velocity.copy(), self.target.copy(), self.clock.copy()
         new = others.pose, others.velocity, others.target, others.clock
         for into, values in zip(found, new, strict=True):

@@ -1,4 +1,4 @@
-"""The dynamics of a Gymnasium environment, for many machines at once: starts, steps, rewards."""
+"""The world of a Gymnasium environment: starts, steps and rewards, for many machines at once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pteron.motion import Motion, advance
 from pteron.workspace import pose_margins
 
 LEVER = 0.1
-"""Length that counts as much as a radian in the distance of poses, m."""
+"""Length that counts as much as a radian in the distance between poses, m."""
 
 SPEED, TURN = 10.0, 100.0
 """Speeds of the platform, m/s and rad/s, above which an episode ends."""
@@ -28,7 +28,7 @@ EFFORT = 0.01
 """Weight of the mean square of the action in the reward."""
 
 ENDS = 0.02
-"""Margin below which an episode ends."""
+"""Margin to singularities and limits (see `PoseMargins`) below which an episode ends."""
 
 _ANGLE = np.pi / 4.0
 """Greatest angle of starts and targets from home, rad."""
@@ -42,7 +42,7 @@ _SHARES = (1.0, 0.5, 0.25, 0.125)
 
 @dataclass(frozen=True)
 class World:
-    """A machine under a sampled controller that sets the forces of its drives.
+    """A machine whose drives' forces an agent sets at every sample, and the task of the agent.
 
     Attributes
     ----------
