@@ -1,7 +1,7 @@
-"""Calibration of a machine's geometry from measurements, with what they cannot show said aloud.
+"""Calibration of a machine's geometry from measurements, with a report of what they cannot show.
 
-`plan` chooses the poses to measure, `read_measurements` reads what was measured, and `calibrate`
-finds the geometry: a `Calibration`.
+`plan` chooses the poses to measure, `read_measurements` reads a log of them, and `calibrate` finds
+the geometry: a `Calibration`.
 """
 
 from pteron.calibration.calibrate import calibrate as calibrate

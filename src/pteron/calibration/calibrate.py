@@ -1,4 +1,4 @@
-"""`calibrate`: a machine's geometry from measurements, judged at rows that the fit did not see."""
+"""`calibrate`: finds a machine's geometry from measurements and judges it at held-out rows."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from pteron.manipulator import RobotLike, as_manipulator
 Array = NDArray[np.float64]
 
 _EVERY = 5
-"""One row in so many is held out where no other log is given."""
+"""One row in so many is held out of the fit where no other log is given."""
 
 _PER_VALUE = 1.5
-"""Numbers measured for each that can be seen, below which every row is needed for the fit."""
+"""Measured numbers for each unknown below which no row is held out."""
 
 _TRIED_ROWS = 5000
-"""Most rows of the fit that is judged; more say little more."""
+"""Most rows of the fit that is judged at the held-out rows; more change it little."""
 
 _RANK_ROWS = 400
 """Rows, evenly spread, at which the singular values are taken."""

@@ -1,8 +1,8 @@
-"""Measurements in the files that controllers write: found by their contents.
+"""Measurements from the files of Klipper, RepRapFirmware, Marlin and LinuxCNC, told by contents.
 
-Klipper's printer.cfg has stable positions, steps from the end stops, which are readings. The others
-log where the controller takes the tool to be: the readings there follow from the machine as drawn,
-as the controller counts by the same geometry. Where it touched, the tool's height is 0.
+Klipper's printer.cfg has stable positions, steps from the end stops, which are joint readings. The
+others log tool positions, computed by the controller from the geometry as drawn: the readings there
+follow from the same geometry. Where the probe touched, the tool's height is 0.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 _TABLES = (".csv", ".parquet")
 _LARGEST = 1 << 28
-"""Bytes of a log that are read."""
+"""Most bytes that are read of a log."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _KLIPPER = re.compile(

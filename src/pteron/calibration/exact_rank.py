@@ -1,4 +1,7 @@
-"""The rank of measurements' slopes in exact arithmetic, modulo primes, at random poses."""
+"""The number of combinations of unknowns that a calibration's measurements can show, exactly.
+
+It is the rank of the residuals' slopes at random poses, in integers modulo random primes.
+"""
 
 from __future__ import annotations
 
@@ -25,20 +28,20 @@ Array = NDArray[np.float64]
 Matrix = list[list[int]]
 
 _SPARE = 4
-"""Rows beyond the columns."""
+"""Random rows of each kind beyond the number of columns."""
 
 _PRIMES = 2
-"""Primes modulo which the rank is found; it is the greater of both."""
+"""Primes modulo which the rank is found; the greater of the ranks counts."""
 
 _ATTEMPTS = 20000
-"""Poses tried for one that serves."""
+"""Random poses tried for one at which the square roots exist modulo the prime."""
 
 _FINE = 10**6
-"""Greatest denominator of a number of the surroundings."""
+"""Greatest denominator of the fractions that stand for numbers of marks, planes and anchors."""
 
 
 class RowKind(NamedTuple):
-    """All that the slopes of a row depend on beside its pose."""
+    """The kind of a row: all but its pose that its slopes depend on."""
 
     positions: tuple[bool, ...]
     angles: tuple[bool, ...]

@@ -1,7 +1,7 @@
-"""The most probable values of what a calibration seeks: Gauss and Newton's steps with priors.
+"""The most probable values of a calibration's unknowns, by Gauss and Newton's method with priors.
 
 Rows whose residuals are too large for their noise count less (Huber) and, far beyond, not at all.
-Noise that nobody gave is found from the residuals, by kind of measurement.
+Noise that is not given is found from the residuals, by kind of measurement.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ _START = {"position": 1e-4, "angle": 1e-4, "height": 1e-4, "distance": 1e-4}
 """Noise that is assumed before any is found, m and rad."""
 
 _FLOOR = 1e-7
-"""Least noise, m and rad: with less, rounding hides what the tolerances say of the rest."""
+"""Least noise, m and rad: with less, rounding would outweigh the tolerances."""
 
 _CHUNK = 4096
-"""Rows at a time."""
+"""Rows that are evaluated at a time."""
 
 _STEPS = 30
 _SETTLED = 1e-4
-"""Share of an interval within which a step of all unknowns ends the search."""
+"""A step smaller than this share of every unknown's interval ends the search."""
 
 _DOUBTED = 0.99
 """Quantile of a row's squared residuals beyond which it counts less."""
 
 _LOST = 30.0
-"""Cost of a row whose readings lead to no pose, in variances: as of one that hardly fits."""
+"""Cost of a row whose readings lead to no pose, in variances, as if it hardly fitted."""
 
 _STRAY = 30.0
-"""Deviations from which on a row may stray from a step that serves all others."""
+"""Standard deviations beyond which a row may be left out of a step that improves all others."""
 
 _FEW = 0.05
-"""Most of all rows that may."""
+"""Greatest share of the rows that may be left out so."""
 
 _OUTLYING = 1e-5
 """Probability of a faultless row, over their number, below which it is left out."""
 
 _ROUNDS = 12
-"""Searches for noise and outlying rows; two or three do."""
+"""Most alternations of fit and search for noise and outliers; two or three usually do."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""All that a calibration seeks, as values: machine, zeros, scales, marks, planes and frames."""
+"""A calibration's unknowns and a guess of their values: machine, zeros, scales, marks, frame, ...
+
+`Guess.moved` takes a step in the unknowns; `Block` groups those that are moved together.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +21,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number that is sought.
+    """One number that a calibration seeks.
 
     Attributes
     ----------
     name : str
         "legs[2].lower_length", "zeros[1]", "planes.bed.offset", "instrument about z".
     group : str
-        What a user frees and gives a tolerance as one, or "setup" for what measurements refer to.
+        Unknowns that share `free` and `prior`; "setup" for marks, planes, anchors and frame.
     unit : str
         "m", "rad" or "".
     tolerance : float
-        Standard deviation about the drawing, before anything is measured; inf: none.
+        Standard deviation about the value as drawn, before anything is measured; inf: none.
     """
 
     name: str
@@ -40,7 +43,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Guess:
-    """Values of all that is sought.
+    """Values of all unknowns of a calibration.
 
     Attributes
     ----------

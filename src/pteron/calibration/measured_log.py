@@ -1,4 +1,4 @@
-"""Logs of measurements in files: CSV, Parquet, or as controllers write them.
+"""`read_measurements`: reads a calibration's measurements from CSV, Parquet or controllers' files.
 
 A row is a pose: the joints' readings and what was measured there. docs/calibration-logs.md has the
 columns.

@@ -1,7 +1,7 @@
-"""Measurements of a machine at many poses: the joints' readings, and what an instrument saw there.
+"""Measurements of a machine at many poses: the joints' readings and an instrument's values there.
 
-A row is a pose. Any of a position, angles, a height and a distance may be measured in it, the
-others are NaN. `Setup` says what they refer to: marks on the platform, planes, anchors, a frame.
+A row is a pose. A position, angles, a height and a distance may be measured in it; what is not, is
+NaN. `Setup` has what they refer to: marks on the platform, planes, anchors, the instrument's frame.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from pteron.bodies.vectors import Vector
 from pteron.manipulator import Manipulator
 
 TOOL = ""
-"""The name of the mark, plane or anchor of a row that names none: the tool, the only plane."""
+"""Name of the mark or plane of a row that names none: the tool, and the plane z = 0."""
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Place:
-    """A point that measurements speak of: a mark on the platform, or an anchor in the base frame.
+    """A point that measurements refer to: a mark on the platform, or an anchor in the base frame.
 
     Parameters
     ----------
     at : vector
-        Where it is, or, if it is not known, where it is sought from, m.
+        Its position or, where it is not known, the start of the search for it, m.
     known : bool
         Whether it is known; else it is found with the geometry.
     """
@@ -58,7 +58,7 @@ class Plane:
 
 @dataclass(frozen=True)
 class Setup:
-    """What the measurements of a log refer to, as the TOML file beside it says.
+    """Noise and reference points of a log's measurements, from the TOML file beside the log.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""The part of a geometry that measurements show: an exact rank, and in words what they do not.
+"""Observability: which combinations of a geometry's values measurements show, and which not.
 
-The rank of the residuals' slopes at random poses is found modulo primes, on the machine's geometry
-in exact numbers, as that of base parameters is; singular values at the measured poses confirm it,
-and tell what is weak.
+Their number is a rank, found exactly (modulo primes) at random poses by `exact_rank`; singular
+values at the measured poses confirm it, and tell which combinations are weak. Those that are not
+shown are put in words by `unseen`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _ROUNDING = 1e-9
 """Singular value, relative to the greatest, up to which a direction counts as unseen."""
 
 _NAMED = 6
-"""Most weak combinations that are told."""
+"""Most weak combinations that are named."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class Observability:
     Attributes
     ----------
     rank : int
-        How many combinations of the values they show, if there are poses enough.
+        Number of combinations of the values that enough such measurements show.
     columns : int
-        How many values there are.
+        Number of values.
     primes : tuple of int
-        Those modulo which the rank is found; none where a row's kind has no exact form.
+        Primes modulo which the rank is found; none where a row's kind has no exact form.
     rows : int
-        Random rows modulo each of them.
+        Number of random rows modulo each of them.
     at_poses : int
         The rank at the measured poses, by singular values.
     smallest_kept, largest_dropped : float
@@ -85,16 +85,16 @@ class Observability:
 def observability_of(
     start: Guess, given: Measurements, blocks: Sequence[Block], slopes: Array, seed: int = 0
 ) -> Observability:
-    """Return what measurements show.
+    """Return the combinations of values that measurements show.
 
     Parameters
     ----------
     start : Guess
         The machine.
     given : Measurements
-        What was measured, and at which readings.
+        The measurements.
     blocks : sequence of Block
-        What is sought.
+        The unknowns.
     slopes : array, shape (R, p)
         Of the residuals at the measured poses, in standard deviations of their noise and of the
         tolerances: a singular value below 1 is a combination of which the tolerance says more.

@@ -1,4 +1,7 @@
-"""Plans of measurements: the poses that say most, in a box of poses that is proved to serve."""
+"""`plan`: chooses the most informative poses to measure for a calibration.
+
+They lie in a box of poses that is proved to be in reach and away from singularities.
+"""
 
 from __future__ import annotations
 
@@ -21,26 +24,26 @@ from pteron.workspace import Box, home_pose, prove
 Array = NDArray[np.float64]
 
 Measure = Literal["poses", "positions", "heights", "distances"]
-"""The quantity to measure: all coordinates, the tool's place, its height, or a distance to it."""
+"""The quantity to measure: the pose, or the tool's position, height or distance to an anchor."""
 
 Criterion = Literal["D", "worst"]
-"""Least volume of the joint region of all values; or the least of the tool's greatest error."""
+"""What is minimised: the volume of the values' confidence region, or the tool's greatest error."""
 
 _CANDIDATES = 1500
-"""Poses among which those of a plan are chosen."""
+"""Random poses from which those of a plan are chosen."""
 
 _TO_THE_EDGE = 1.0 / 3.0
-"""Power of random numbers between 0 and 1 that crowds candidates towards a box's faces."""
+"""Exponent of random numbers in [0, 1] that crowds candidates towards the box's faces."""
 
 _TYPE_I = 0.1
 _TYPE_II = 0.05
-"""Margins to singularities that are proved: the machine is not quite as drawn."""
+"""Least measures that are proved in the box, above 0 as the machine is not quite as drawn."""
 
 _MOST = 20_000
 """Undecided boxes at which a proof is given up."""
 
 _HALVINGS = 6
-"""Steps of the search for the size of the box."""
+"""Bisections in the search for the size of the box."""
 
 _WIDENINGS = 4
 """Times that each of its sides may then grow by half."""

@@ -1,7 +1,7 @@
-"""Faults of measurements that the drawing shows before any fit: units, order, frame, marks.
+"""Likely mistakes in measurements, found before any fit: wrong units, swapped legs or marks, frame.
 
-What is measured lies within noise and tolerances of what the machine as drawn would give; where it
-does not, each likely mistake is undone, to see if it then does.
+Measurements should lie within noise and tolerances of what the machine as drawn would give; where
+they do not, each likely mistake is undone on trial, and told where they then do.
 """
 
 from __future__ import annotations
@@ -23,20 +23,21 @@ from pteron.errors import DataError, UnlikelyValue
 Array = NDArray[np.float64]
 
 _FAR = 25.0
-"""Squared residuals of a middle row, in variances of noise and tolerances, that ask for a fault."""
+"""Median over rows of the mean squared residual, in variances of noise and tolerances, from which
+mistakes are tried."""
 
 _NEAR = 9.0
-"""The same that a fault leaves which explains it."""
+"""The same below which a mistake, undone, explains the residuals."""
 
 _ROWS = 16
-"""Rows looked at, evenly spread."""
+"""Rows that are examined, evenly spread."""
 
 _NOISE = 1e-4
-"""Noise assumed, m and rad: small beside what tolerances do."""
+"""Assumed noise, m and rad: small beside the effect of tolerances."""
 
 
 def raw_fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> str | None:
-    """Return the mistake that explains measurements which the drawing cannot; else None."""
+    """Return the mistake, in words, that explains measurements far from the drawing; else None."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
         return _fault(given, blocks, robot_guess)
@@ -61,7 +62,7 @@ def _fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> 
 
 
 def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
-    """Return a middle row's squared residuals over their number, in variances; inf: no pose."""
+    """Return the rows' median of the mean squared residual, in variances; inf: no pose."""
     try:
         poses = starting_poses(guess, rows)
     except DataError:

@@ -1,7 +1,7 @@
-"""Faults that residuals show after a fit: rows that do not fit, zeros that slipped, and more.
+"""Faults that residuals show after a calibration's fit: rows that do not fit, slipped zeros, ...
 
-Each fault would add a value to those that are sought. Its column of slopes tells, without another
-fit, by how much the squared residuals fell if it were sought too (a score test).
+Most faults are one more unknown. Its column of slopes tells, without another fit, by how much the
+squared residuals would fall if it were sought too (a score test).
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from pteron.calibration.result import Finding
 Array = NDArray[np.float64]
 
 _ROWS = 3000
-"""Most rows that are looked at, evenly spread."""
+"""Most rows that are examined, evenly spread."""
 
 _CHANCE = 1e-6
-"""Probability, over the number of faults tried, of a finding without a fault."""
+"""Probability, over all faults tried, of a finding where there is no fault."""
 
 _SHARE = 0.2
-"""Least share of the squared residuals that a fault explains."""
+"""Least share of the squared residuals that a reported fault explains."""
 
 _NOISY = 4.0
-"""Mean square along one leg's coordinate, in variances, from which on its model is doubted."""
+"""Mean square along one leg's coordinate, in variances, above which its model is doubted."""
 
 _LISTED = 8
-"""Most rows named that do not fit."""
+"""Most outlying rows that are named."""
 
 
 class _Score(NamedTuple):
@@ -45,7 +45,7 @@ class _Score(NamedTuple):
 def residual_faults(
     start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
 ) -> tuple[Finding, ...]:
-    """Return the faults that residuals show, the one that explains most first."""
+    """Return the faults that residuals show, first the one that explains most."""
     outliers = _outliers(fit, given)
     scores = sorted(_scores(start, fit, blocks, given), reverse=True, key=lambda s: s.improvement)
     scores = scores or list(_bad_leg(start, fit, blocks, given))

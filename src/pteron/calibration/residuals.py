@@ -1,7 +1,8 @@
-"""Residuals of measurements, with their slopes against all that is sought.
+"""Residuals of a calibration's measurements, and their slopes against all unknowns.
 
-The pose of a row is the one that its readings lead to, so that x' = -J^-1 (dq/dtheta theta'): every
-measurement, of whatever kind, is a function of that pose and of a mark on the platform.
+The pose x of a row follows from its readings q by direct kinematics, so that unknowns theta move it
+by dx = -J^-1 (dq/dtheta) dtheta. Every measurement is a function of that pose and of a mark on the
+platform.
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 _STEPS = 12
-"""Newton's steps to a pose; from a measured or an earlier one two or three do."""
+"""Most of Newton's steps to a pose; from a measured or an earlier one two or three do."""
 
 _CLOSED = 1e-12
-"""Share of the machine's size that a step of Newton's is below when the pose is found."""
+"""Newton's step, as a share of the machine's size, below which the pose is found."""
 
 
 class Rows(NamedTuple):

@@ -22,15 +22,15 @@ from pteron.manipulator import Manipulator
 Array = NDArray[np.float64]
 
 Origin = Literal["data", "both", "tolerance"]
-"""The maker of a value: the measurements, its ordinary tolerance, or both."""
+"""The source of a value: the measurements, the drawing with its tolerance, or both."""
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
 
 _BY_DATA = 0.3
-"""Share of the tolerance up to which what is left of it counts as made by data."""
+"""Deviation after the fit, as a share of the tolerance, up to which the data made a value."""
 
 _BY_TOLERANCE = 0.9
-"""The share from which on the tolerance made the value."""
+"""The share from which on the value is that of the drawing, within its tolerance."""
 
 _QUANTILE = float(norm.ppf(0.975))
 

@@ -1,4 +1,4 @@
-"""Where a calibration begins: the poses of readings on the machine as drawn, frames and planes."""
+"""The start of a calibration: poses of the readings on the machine as drawn, frame and planes."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _FEW = 3
 """Positions that fix a frame, unless they are in line."""
 
 _TURNED = 0.5
-"""rad between a measured pose and the one that readings lead to from where they are not alike."""
+"""Angle, rad, between a measured pose and that of its readings from which they differ."""
 
 _PLANE = 3
-"""Marks of heights that fix a plane."""
+"""Least heights that fix a plane's normal."""
 
 
 def starting_poses(guess: Guess, given: Measurements) -> Array:
     """Return the pose (N, m) of each row on the machine as drawn.
 
-    It is the one that Newton's method finds from the measured pose, or from the home pose, if no
-    singularity lies between; else the nearest to home of all that the joints allow.
+    Newton's method finds it from the measured pose, or from the home pose. Where that leads far
+    away, or across a singularity, it is the assembly mode nearest to the start.
 
     Raises
     ------

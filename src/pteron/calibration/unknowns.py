@@ -1,4 +1,4 @@
-"""The choice of what a calibration seeks, and ordinary tolerances of it."""
+"""The choice of a calibration's unknowns, and the tolerances that are assumed of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.errors import DataError
 from pteron.manipulator import Manipulator
 
 GROUPS: tuple[str, ...] = tuple(group for group in get_args(Group) if group not in AXIAL)
-"""The groups that may be freed as one."""
+"""The groups of unknowns that a user's `free` may name."""
 
 TOLERANCES: dict[str, float] = {
     "lengths": 1e-3,
@@ -31,7 +31,7 @@ TOLERANCES: dict[str, float] = {
 and 0.5 degrees; 0.1 % of scale."""
 
 _WIDE = {"m": 10.0, "rad": 10.0}
-"""Tolerances of frames, marks, planes and anchors that are not known: as good as none."""
+"""Tolerances of frames, marks, planes and anchors that are not known: practically none."""
 
 
 def blocks_of(
@@ -40,7 +40,7 @@ def blocks_of(
     free: Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
 ) -> tuple[Block, ...]:
-    """Return what is sought, in blocks.
+    """Return the unknowns of a calibration, in blocks.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Combinations of values that measurements do not show, in words."""
+"""Combinations of unknowns that a calibration's measurements do not show, in words."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from pteron.calibration.variations import AXIAL
 Array = NDArray[np.float64]
 
 _PART = 0.02
-"""Share of a combination's greatest part from which a part is named."""
+"""Least part of a combination that is named, as a share of its greatest."""
 
 _NAMED = 6
-"""Most values that are named of a combination, and most combinations of many values."""
+"""Most values that are named of a combination, and most combinations that have no common name."""
 
 _WHOLE = 0.9995
-"""A part from which on it counts as the greatest one, 1."""
+"""A part, over the greatest one, that counts as 1."""
 
 _INSIDE = 1e-5
-"""Share of a combination outside the unseen ones up to which it is one of them."""
+"""Part of a combination outside the space of unseen ones up to which it counts as one of them."""
 
 
 def unseen_combinations(
     start: Guess, blocks: Sequence[Block], axes: Array, tolerances: Array
 ) -> tuple[str, ...]:
-    """Return the combinations that the rows of `axes` span, in words; how many a line stands for.
+    """Return the combinations that the rows of `axes` span, in words, with a number where several.
 
     Parameters
     ----------

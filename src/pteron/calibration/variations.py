@@ -1,8 +1,8 @@
 """The ways in which a machine's geometry may differ from its drawing, and machines that differ so.
 
 Points, lengths and directions of every leg vary, as `LegKind.quantities` names them; a direction
-turns, and takes with it what is perpendicular to it by definition. What the machine's kind does not
-allow, as a planar leg's axis to leave its plane's normal, does not vary.
+turns, and what is perpendicular to it by definition turns along. What the machine's kind does not
+allow, such as a tilt of a planar leg's axis, does not vary.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from pteron.manipulator import Manipulator
 Array = NDArray[np.float64]
 
 Group = Literal["zeros", "scales", "lengths", "points", "directions", "tool", "radius", "angles"]
-"""Values that a user frees, and gives a tolerance, as one."""
+"""Names of groups of values, as `free` and `prior` of `calibrate` take them."""
 
 AXIAL = ("radius", "angles")
-"""Groups of guide points about the platform's axis."""
+"""Groups of guide points in cylinder coordinates: their common radius, and their angles."""
 
 _TRIED = 1e-3
-"""m or rad by which each variation is tried: a machine that this makes impossible keeps to it."""
+"""Amount, m or rad, by which each variation is tried; one that gives no machine is left out."""
 
 _ALONG = 1e-9
-"""An axis whose cosine with a direction is within this of 1 is along it."""
+"""Difference from 1 of the cosine up to which a direction lies along an axis."""
 
 _AXES = ("x", "y", "z")
 

@@ -1,4 +1,4 @@
-"""The verdict on a calibration: by errors at held-out rows, by faults, and by what was seen."""
+"""The verdict on a calibration: from errors at held-out rows, faults, and values far off."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pteron.calibration.observability import Observability
 from pteron.calibration.result import Finding, Grade, HeldOut, Verdict
 
 _AT_THE_NOISE = 1.3
-"""Held-out error over what noise and intervals expect up to which the geometry is trusted."""
+"""Held-out error, over the one expected from noise and intervals, up to which it is trusted."""
 
 _FAR = 2.0
-"""The same from which on it is not."""
+"""The same ratio above which it is not trusted."""
 
 _OFF = 5.0
-"""Tolerances from the drawing from which on a value is doubted."""
+"""Distance from the drawing, in tolerances, above which a value is doubted."""
 
 
 def verdict_of(

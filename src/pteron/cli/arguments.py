@@ -1,4 +1,4 @@
-"""Arguments and options that several subcommands share, and functions that read them."""
+"""Reading of arguments that subcommands share: lists of numbers, a machine and its working mode."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Failure = Literal["raise", "nan"]
 """Whether a row that fails ends the command or is left empty."""
 
 MOTION = ("--pose", "--velocity", "--acceleration", "--wrench")
-"""The options that give a state."""
+"""The options that give a state of motion, as several numbers each."""
 
 VECTORS = (*MOTION, "--from", "--to", "--around", "--speed", "--force", "--jerk")
-"""The options that take as many numbers as follow them."""
+"""The options that take all numbers that follow them."""
 
 
 class Command(TyperCommand):

@@ -27,7 +27,7 @@ TOLERANCE = 0.05
 """Default of the greatest undecided share of a volume: it takes some seconds."""
 
 _SHAPES = {1: ("length", "interval"), 2: ("area", "square"), 3: ("volume", "cube")}
-"""What is proved at an orientation, by how many ways the platform moves, and the shape in it."""
+"""The size that is proved and the shape inscribed in it, by the number of the pose's lengths."""
 
 _MAY_BE_SINGULAR = (
     "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."

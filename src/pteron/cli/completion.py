@@ -1,4 +1,4 @@
-"""Shell completion of arguments: machines and files, parameters, functions and indices."""
+"""Shell completion of arguments: names of machines, files, parameters, functions and indices."""
 
 from __future__ import annotations
 

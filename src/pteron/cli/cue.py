@@ -1,4 +1,4 @@
-"""`pteron cue`: the motion of a vehicle as a motion of its simulator's platform."""
+"""`pteron cue`: the motion of a simulator's platform that shows a vehicle's motion (cueing)."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _MEASURES = {
     "type_ii": "type-II measure",
     "passive_clearance": "passive clearance (of half the range)",
 }
-"""Names of limits where those of the code will not do."""
+"""Names of limits in the output, where they are not those of the code."""
 
 
 def excite(

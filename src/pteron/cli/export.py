@@ -11,7 +11,7 @@ from pteron.cli.terminal import note, show, show_json, written
 from pteron.errors import DataError
 
 _TRUSTED = "trustworthy"
-"""The verdict of an identification that needs no warning."""
+"""The verdict on an identified model with which its export needs no warning."""
 
 Output = Literal["force", "torque", "percent"]
 """A copy of `pteron.export.command_units.Output`: importing that would slow the command line."""

@@ -1,4 +1,4 @@
-"""The command `pteron`: its subcommands, and the exit code that each ends with."""
+"""The command `pteron`: its subcommands, and the exit code of each way to end."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _SLOW = 0.5
 """Time between samples above which a warning is given, s."""
 
 _UNLIKE = 3.0
-"""Greatest ratio, or inverse of it, of a motion's length by its poses and by its velocities."""
+"""Greatest ratio of a motion's length by its velocities to that by its poses, or inverse of it."""
 
 
 def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:

@@ -1,4 +1,4 @@
-"""Motions that `pteron cycle` plans: pick-and-place cycles, lines, motions of the joints."""
+"""The motions that `pteron cycle` plans: pick-and-place cycles, straight lines, joint motions."""
 
 from __future__ import annotations
 

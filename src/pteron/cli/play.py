@@ -1,4 +1,4 @@
-"""`pteron play`: a page that shows a motion of the machine in 3-D."""
+"""`pteron play`: an HTML page that shows a motion of the machine in 3-D."""
 
 from __future__ import annotations
 

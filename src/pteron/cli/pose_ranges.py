@@ -1,4 +1,4 @@
-"""Poses' coordinates as a person types them, such as z=0,phi=-1:1: fixed values and ranges."""
+"""Reading of fixed values and ranges of pose coordinates, typed such as z=0,phi=-1:1."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, show_json, table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
-"""Keys of the report's file with a value for each sample of the cycle, too long to print."""
+"""Keys of report.json with a value for each sample of the motion, too long to print."""
 
 
 def report(

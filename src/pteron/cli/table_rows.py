@@ -1,4 +1,4 @@
-"""Rows of a table that a subcommand works through in chunks, and the table of its results."""
+"""Rows of a table of poses or joints: their results, computed in chunks, and the table of these."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Design: searches for a machine's best dimensions, with proofs of their results."""
+"""Searches for a machine's best dimensions, with proofs of their results."""
 
 from pteron.design.design import Design as Design
 from pteron.design.differences import Change as Change

@@ -1,4 +1,4 @@
-"""One design of a search: the machine with some values of the variables, and its quantities."""
+"""One design of a search: a machine with its quantities, such as workspace, margins and forces."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from pteron.workspace.margins import joint_limits
 from pteron.workspace.samples import cube, shape_samples
 
 _IN_CUBE = 5
-"""Poses along each edge of the cube, where that is the workspace."""
+"""Sample poses along each edge of the largest cube, where that stands for the workspace."""
 
 
 class DriveMotion(NamedTuple):
-    """Motion of joints and forces of drives at the workspace's corners."""
+    """Joint rates and drives' forces at the workspace's corners."""
 
     rates: Array
     forces: Array

@@ -1,4 +1,4 @@
-"""Evolutionary search with pymoo, an optional extra: generations of designs, the best of them."""
+"""NSGA-II by pymoo, an optional extra: it proposes the generations of a search for designs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _pymoo(module: str) -> Any:
 
 
 def non_dominated(costs: Array) -> NDArray[np.int_]:
-    """Return which rows (N, M) of costs no other row betters in every one, in their order."""
+    """Return the numbers of the rows (N, M) of costs that no other row dominates, ascending."""
     sorting = _pymoo("util.nds.non_dominated_sorting").NonDominatedSorting()
     found = sorting.do(costs, only_non_dominated_front=True)
     return np.sort(np.asarray(found, dtype=int))
@@ -28,8 +28,8 @@ def non_dominated(costs: Array) -> NDArray[np.int_]:
 def one_thread() -> Iterator[None]:
     """Let linear algebra use one thread: several add up in another order, so that bits differ.
 
-    Dask's workers do so by themselves. Without threadpoolctl, of the extra `design`, it is as the
-    environment says (OPENBLAS_NUM_THREADS).
+    Dask's workers do so by themselves. Without threadpoolctl, of the extra `design`, the number of
+    threads stays that of the environment (OPENBLAS_NUM_THREADS).
     """
     try:
         from threadpoolctl import threadpool_limits

@@ -1,4 +1,4 @@
-"""The Pareto front of a search: the designs that no other one betters in every objective."""
+"""The Pareto front of a search: the designs that no other dominates in the objectives."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class Front:
     task : Task
         The task of the search.
     table : polars.DataFrame
-        A row for each design of the front: its variables, the quantities asked for, and what it
-        misses, which is nothing; the best of the first objective comes first.
+        A row for each design of the front: its variables, the quantities asked for, and misses of
+        requirements, which are 0; the best of the first objective comes first.
     evaluated : int
-        Number of designs it was found among.
+        Number of designs that were evaluated.
     kept : int
-        Number of them that keep all that is asked.
+        Number of these that keep all that is asked.
     """
 
     task: Task

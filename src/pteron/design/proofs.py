@@ -1,8 +1,8 @@
-"""Proofs that all poses of a design's cube, or of its required workspace, can be used.
+"""Proofs that all poses of a design's largest cube, or of its required workspace, can be used.
 
-A search tests points; here interval arithmetic covers all that lies between them
-(`pteron.workspace.prove`), under the floors that the search asks for. A counterexample goes back to
-the search for the cube, as a pose that it must not hold, until the cube found is proved.
+A search tests points; here interval arithmetic (`pteron.workspace.prove`) covers all poses between
+them, under the floors (least measures) of the search. A counterexample is excluded from the cube,
+which is sought anew until it is proved.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.samples import Samples, cube, fixed_samples
 
 _SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
-"""Shares of the edge found that are tried, the largest first: at all of it some condition is zero,
-and undecided."""
+"""Shares of the cube's edge that are tried in turn: at the whole edge some condition is zero, which
+cannot be decided."""
 
 _MOST = 200_000
 """Boxes after which a proof is given up."""

@@ -1,4 +1,4 @@
-"""Quantities by which designs are compared, such as size or margins, with units and meanings."""
+"""The quantities that a design search may improve or bound, such as size, margins and forces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pteron.workspace import clearance
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number that says something of a design.
+    """One quantity of a design.
 
     Attributes
     ----------
@@ -29,8 +29,7 @@ class Quantity:
     of : callable
         Takes a `Design`; NaN where there is none.
     of_machine : callable or None
-        The same from the machine alone, where its poses do not matter: then searches can follow its
-        slope.
+        The same from the machine alone, where its poses do not matter: then gradients are known.
     """
 
     unit: str

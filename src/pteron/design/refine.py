@@ -23,16 +23,16 @@ _EXCHANGES = 8
 """Most times that counterexamples of the result's proof join its conditions."""
 
 _FIRST = 5
-"""Points along a cube's edge at which its conditions are asked at first."""
+"""Points along a cube's edge at which its conditions are evaluated at first."""
 
 
 def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     """Return a design with a better objective, or the same where none is found.
 
-    Its unknowns are the variables together with the cube's centre and edge. Quantities of the
-    machine alone are held to first order, those of its poses are not: whoever asks evaluates the
-    design again. Where a proof of the workspace or the cube fails, it is sought once more, with the
-    counterexample among its conditions.
+    The unknowns are the variables together with the cube's centre and edge. Quantities of the
+    machine alone are held to first order, those of its poses are not: the caller evaluates the
+    design again. Where a proof of the workspace or the cube fails, the design is sought once more,
+    with the counterexample among its conditions.
 
     Parameters
     ----------

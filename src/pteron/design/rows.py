@@ -11,13 +11,13 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 
 MISSES = "misses "
-"""Beginning of the names of columns that say by how much a requirement is missed."""
+"""Prefix of the columns with the amounts by which requirements are missed."""
 
 FAILED = 1e6
-"""Miss of all requirements by a design that is no machine, or has no such quantity."""
+"""Amount for a design that is no possible machine, or has no such quantity."""
 
 ROUNDING = 1e-9
-"""Miss that counts as none."""
+"""Amount that counts as none."""
 
 
 def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:

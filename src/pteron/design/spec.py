@@ -1,4 +1,4 @@
-"""The file of a design search: variables, requirements and objectives."""
+"""The TOML file of a design search, as pydantic models: variables, requirements and objectives."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
 
 _ABSENT = "no such file; it should describe a search for a design"
-"""The message where there is no such file."""
+"""The message where the file is missing."""
 
 _ROUNDING = 1e-9
 """Share of a bound by which it may be missed."""

@@ -1,9 +1,9 @@
-"""Inertia of links whose length a search changes.
+"""Inertia of links whose length a design search changes.
 
-A longer or shorter link is taken to have the same section, drawn out along its own x: mass and the
-centre's distance along x grow with the length, and what lies across x keeps its place. So the
-moment of inertia grows with the length's third power, as a slender rod's does, but for the share of
-the centre's distance across x, which grows with the mass. Sliders, platform and drives are kept.
+A longer or shorter link keeps its section and is drawn out along its own x: mass and the centre's
+distance along x grow with the length, distances across x stay. So the moment of inertia grows with
+the length's third power, as a slender rod's does, but for the share of the centre's distance across
+x, which grows with the mass. Sliders, platform and drives are kept.
 """
 
 from __future__ import annotations

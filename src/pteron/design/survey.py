@@ -1,4 +1,4 @@
-"""`survey`: any number of designs, spread evenly over the variables' ranges, written to Parquet."""
+"""`survey`: evaluates designs that are spread evenly over the variables' ranges, into Parquet."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def survey(
 ) -> Front:
     """Evaluate many designs, and return the front of them.
 
-    They are the points of Sobol's sequence, moved by a vector that the spec's seed gives: they
-    cover the ranges more evenly than random ones, and more of them go on where fewer ended.
+    They are the points of Sobol's sequence, shifted by a vector that the spec's seed gives: they
+    cover the ranges more evenly than random ones, and a larger count continues a smaller one.
 
     Parameters
     ----------

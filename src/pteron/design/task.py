@@ -1,4 +1,4 @@
-"""The task of a search: its file, checked against the machine that it begins with."""
+"""The task of a design search: its file, checked against the machine that it begins with."""
 
 from __future__ import annotations
 

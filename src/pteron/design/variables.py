@@ -1,4 +1,4 @@
-"""Variables of a search: numbers of a machine's geometry that move as one, within a range."""
+"""Variables of a design search: numbers of a machine's geometry that move as one, in a range."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STEP = 1e-6
 
 @dataclass(frozen=True)
 class Variable:
-    """Numbers that move as one.
+    """Numbers of the geometry that move as one.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Variable:
     places : tuple of Place
         The numbers.
     by : {"value", "factor", "offset"}
-        Whether they get the value itself, their start times it, or their start and it.
+        Whether they become the value, their start times it, or their start plus it.
     low, high : float
         Its range.
     start : float

@@ -1,6 +1,7 @@
-"""The paper, as CasADi expressions: each equation once, for one pose, generic over legs.
+"""Kinematics, dynamics, indices and control as CasADi expressions for one pose and any legs.
 
 Nothing here knows of batches, files or errors, and nothing branches on a value. A machine's numbers
-may be numbers or symbols (`Machine.of`, `Machine.symbols`), so that the same lines serve this
-machine, every machine of its topology, and exact arithmetic. Equation numbers are the paper's.
+may be numbers or symbols (`Machine.of`, `Machine.symbols`), so that the same lines serve one
+machine, all machines of its topology, and exact arithmetic. Equation numbers are those of the paper
+on the Quadrupteron's dynamics.
 """

@@ -1,8 +1,8 @@
 """Clearances between a machine's bodies: least distances of their centre lines.
 
 A body is one straight segment or more: a leg's links and rods, a slider's guide within its limits,
-the platform as arms from P to its points. Two bodies that share a joint are left out, and so are
-guides from each other, which do not move.
+the platform as arms from P to its points. Left out are pairs of bodies that share a joint, and
+pairs of guides, which do not move.
 
 The squared distance of two segments is a convex quadratic over the unit square of the places s and
 t on them. Its least value is at its stationary point, where that is inside, else on one of the four
@@ -35,10 +35,10 @@ Kind = Literal["guide", "upper", "lower", "platform"]
 """Kinds of bodies: a slider's guide, an upper link or crank, a last link or rods, the platform."""
 
 _COINCIDENT = 1e-9
-"""m between points, or guides, that are one."""
+"""Distance below which points, or guides, count as one, m."""
 
 _TINY = 1e-24
-"""m^2, or a squared sine: what a square is at least where it divides."""
+"""Least value of a square (m^2, or a squared sine) by which is divided."""
 
 
 @dataclass(frozen=True)

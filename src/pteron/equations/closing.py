@@ -19,16 +19,16 @@ from pteron.legs.leg import Circle, LegEquations, Plane, Sphere, Turned
 from pteron.platforms.motion import PlatformMotion
 
 _STEPS = 4
-"""Newton's steps that a controller takes: they reach rounding from some hundredths of the size."""
+"""Newton's steps of a controller: from some hundredths of a machine's size they reach rounding."""
 
 _CLOSED = 1e-6
-"""Greatest share missed before the last of them, which squares it: enough for single precision."""
+"""Greatest relative miss before the last step, which squares it: enough for single precision."""
 
 _STEADY = 0.01
 """Greatest relative difference of the determinants of the last two steps.
 
-Next to a pose they are alike. Where there is none, next to a singularity, so little may be missed
-that it counts as closed, but each step's determinant is half of the last one's or less.
+Near a pose they are alike. Where no pose exists, next to a singularity, the miss may be small
+enough to count as closed, but each step halves the determinant or more.
 """
 
 
@@ -36,7 +36,7 @@ _NOTHING = 1e-9
 """Length that counts as zero beside any machine, m."""
 
 _KEPT = 1e-300
-"""Share of a sum that changes no number but keeps what is none."""
+"""Factor of a term that is added to carry NaN along: no number changes by it."""
 
 
 class Rows(NamedTuple):

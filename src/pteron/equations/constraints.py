@@ -1,6 +1,6 @@
-"""The couples by which the legs keep the platform from turning otherwise than it should.
+"""The constraint measure: how well the legs' couples keep the platform from forbidden turns.
 
-A leg that lets what it carries turn about some axes only holds couples across these, whether its
+A leg whose end can turn about some axes only exerts couples perpendicular to these, whether its
 joint is held or not. Where the legs' couples no longer span the turns that the platform must not
 make, it is free to make them: a constraint singularity (Zlatanov, Bonev and Gosselin, "Constraint
 singularities of parallel mechanisms", ICRA 2002).
@@ -20,7 +20,7 @@ _ACROSS = 1e-9
 
 
 def constraint_rows(machine: Machine, state: State) -> Expression | None:
-    """Return the couples (K, u) over the turns that they must hold; None where one is not told.
+    """Return the couples (K, u) on the turns they must prevent; None where a leg's is not known.
 
     The columns are the turns of the platform: all three where it does not turn, those across its
     axis k where it does or where the machine is planar. Then come the turns about k of its parts

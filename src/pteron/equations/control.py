@@ -1,14 +1,12 @@
-"""One sample of a controller: what is wanted, what is measured, and what it has to remember.
+"""One sample of a controller: its inputs, gains and memory, and the errors e = q_d - q of joints.
 
-The wanted motion is the platform's, the measured one the joints'. Errors are those of the joints,
-e = q_d - q. A law of control has no state of its own: what it must know at the next sample goes out
-as its memory, and comes in again. The laws themselves are in `laws`.
+The wanted motion is the platform's, the measured one the joints'. A control law has no state of its
+own: its memory goes out at one sample and comes in at the next. The laws themselves are in `laws`.
 
-A controller holds its forces for a period while the machine moves on, so that forces which suit the
-state at the sample come half a period late on average. Hence the model is taken in the middle of
-the period: the wanted motion is carried there by its Taylor series, with the change of the wanted
-acceleration since the last sample for the third derivative, and the measured joints by what the
-wanted ones do meanwhile. The errors are those at the sample.
+A controller holds its forces for a period while the machine moves on. So the model is taken in the
+middle of the period: the wanted motion is carried there by its Taylor series, with the change of
+the wanted acceleration since the last sample for the third derivative, and the measured joints by
+the change of the wanted ones. The errors are those at the sample.
 """
 
 from __future__ import annotations
@@ -26,8 +24,8 @@ from pteron.equations.drives import Drives, joint_motion
 from pteron.equations.machine import Machine, State
 
 Per = Literal["joint", "coordinate", "parameter", "pair", "law"]
-"""The owner of each number in a part of a vector: a joint, one of the pose's coordinates, a
-parameter that is estimated, a pair of these, or the law as a whole."""
+"""The owner of each number in a part of a vector: a joint, a coordinate of the pose, a parameter
+that is estimated, a pair of these, or the law as a whole."""
 
 Layout = Mapping[str, Mapping[str, Per]]
 """The parts of a vector, in order, for each law by name."""

@@ -1,7 +1,6 @@
-"""Forces of the drives beside those of the rigid bodies: friction and the motors' inertia.
+"""Drives: their friction and motors' inertia, and the acceleration that their forces give.
 
-The platform's acceleration under the forces of the drives follows. `Drive` says what the numbers
-of a drive are.
+The numbers of a drive are those of `pteron.legs.drive.Drive`.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ class Drives(NamedTuple):
 def drive_numbers(robot: Manipulator) -> NDArray[np.float64]:
     """Return the numbers (7 n,) of a machine's drives for `Drives.of`.
 
-    A leg without a drive has neither friction nor a rotor.
+    A leg without a drive has no friction and no motor inertia.
     """
     rows = []
     for leg in robot.legs:

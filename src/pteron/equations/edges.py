@@ -1,7 +1,7 @@
-"""The edges of where a machine works: of reach and of limits, each one expression.
+"""The conditions of reach and of joints' limits at a pose, each an expression >= 0 where it holds.
 
-A pose serves where none of them is negative. They are smooth inside, so that they can be bounded
-over a box of poses; they are no distances, but for some. `reach` and `passive_margins` have those.
+They are smooth inside, so that they can be bounded over a box of poses, but most are no distances:
+for these see `reach` and `passive_margins` in `equations.kinematics`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pteron.equations.machine import Machine
 
 
 class Edge(NamedTuple):
-    """An edge of reach, or a limit."""
+    """A condition of reach, or of a limit."""
 
     leg: int
     """Its leg, from 1; 0 for the platform's angles."""

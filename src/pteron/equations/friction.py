@@ -1,4 +1,4 @@
-"""Viscous friction in the passive joints, as forces that it asks of the actuators."""
+"""Viscous friction in the passive joints: the actuator forces that it needs, by virtual work."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Indices of performance of a machine at a pose, each one number.
+"""Performance indices of a machine at a pose, such as the condition number, as expressions.
 
-Most read the homogeneous Jacobian, in which no unit is mixed with another: joint rates are speeds
+Most use the homogeneous Jacobian, in which no unit is mixed with another: joint rates are speeds
 in m/s, of a slider or of a crank's end, and the platform's turning counts as the speed at a
-length L from P. What each index means, with its source, is in `pteron.indices`.
+length L from P. The meaning and source of each index is in `pteron.indices`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Positions, reach, margins, Jacobians and joint motions: Eqs. (4) to (12), and back."""
+"""Kinematics, inverse and direct: positions, reach, margins, Jacobians, rates; Eqs. (4) to (12)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.equations.machine import Machine, State
 from pteron.legs.leg import Joint, Passive, Reach
 
 FAR = 1e3
-"""The margin where there is no limit, m: controllers and optimisers want finite numbers."""
+"""The margin where there is no limit, m: finite, as controllers and optimisers need it."""
 
 
 def inverse_position(machine: Machine, pose: Expression) -> Expression:
@@ -23,7 +23,7 @@ def inverse_position(machine: Machine, pose: Expression) -> Expression:
 
 
 def reach(machine: Machine, pose: Expression) -> list[Reach]:
-    """Return whether each leg reaches the pose, how far it is from its edge, and how bent."""
+    """Return whether each leg reaches a pose, its margin to the edge, and how bent it is."""
     rest = ca.SX.zeros(machine.freedom)
     points = machine.platform.motion(pose, rest, rest).points
     return [leg.reach(c.position) for leg, c in zip(machine.legs, points, strict=True)]

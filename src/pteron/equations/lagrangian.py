@@ -1,7 +1,6 @@
-"""Mass matrix, Coriolis matrix, energies and forward dynamics, in platform coordinates.
+"""Mass matrix, Coriolis matrix, energies and forward dynamics, in platform coordinates x.
 
-M x'' + C x' + g = J^T F + wrench. The forces themselves come from `virtual_work`; only M and the
-energies are written here.
+M x'' + C x' + g = J^T F + wrench, with h = C x' + g taken from `virtual_work`.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from pteron.equations.virtual_work import generalized_forces
 def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> Expression:
     """Return M (m, m): the sum of J_b^T M_b J_b over the bodies.
 
-    The mass of a body whose reference point is a platform point is the platform's to carry.
+    The mass of a body whose reference point is a platform point is added to the platform's.
     """
     legs, inertia = machine.moments(parameters)
     state = machine.state(pose)

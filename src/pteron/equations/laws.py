@@ -1,7 +1,6 @@
-"""Laws of control: the forces of the drives at one sample, and what is remembered of it.
+"""Control laws: the drives' forces at one sample, and the memory for the next.
 
-`equations.control` says what a law is given, and what the errors e and e' and the middle of the
-period are.
+`equations.control` has a law's inputs, the joints' errors e and e', and the middle of the period.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A machine as the equations see it: its legs, platform, closure and gravity, in expressions."""
+"""A machine as CasADi expressions: the equations of its legs, platform and closure, and gravity."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Machine:
     """The equations of a machine's parts."""
 
     robot: Manipulator
-    """The machine whose topology this is; what limits its passive joints is read from it."""
+    """The machine, or one of the same topology; limits of passive joints are read from it."""
     legs: tuple[LegEquations, ...]
     platform: PlatformEquations
     closure: Closure

@@ -1,8 +1,8 @@
-"""Forces in which one velocity meets another: M a + C(x, v) w + g, by polarisation.
+"""Forces M a + C(x, v) w + g with two velocities v and w, as adaptive control needs them.
 
-C v is quadratic in v, and with Christoffel's symbols C(x, v) w is symmetric in v and w. So it is
-C(u) u of their mean less that of half their difference, and needs no equation of its own. The same
-holds for what the joints' accelerations are at x'' = 0.
+C(x, v) v is quadratic in v, and with Christoffel's symbols C(x, v) w is symmetric in v and w. So it
+is C(x, u) u for the mean of v and w less that for half their difference (polarisation). The same
+holds for J'(x, v) w, the joints' accelerations at x'' = 0.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Closures of a platform that may turn any way, in Study's coordinates, along a path of machines.
+"""Homotopy continuation of poses: closures in Study's coordinates along a path of machines.
 
 A pose is z = (x, y), up to scale: the platform's rotation is the quaternion x, and its point P is
 the vector part of 2 y x* / (x.x); the products below are those of quaternions, x.y = 0. A closure

@@ -1,10 +1,10 @@
-"""Internal forces: what each joint of a leg passes on, by Newton and Euler, body by body.
+"""Equations A w = b of the forces in the legs' joints, by Newton and Euler, body by body.
 
 A leg is cut at its platform point c. The unknowns w are the force f and the moment m, about c, that
-each leg exerts on the platform. Down the leg every joint passes on these and what the bodies beyond
-it need. A passive joint passes on nothing along its own freedom, and the platform is in
-equilibrium: these are equations A w = b. Where A has fewer independent rows than unknowns the
-machine is overconstrained, and only a norm, or the links' elasticity, tells the rest.
+each leg exerts on the platform. Each joint of the leg transmits these and what the bodies beyond it
+need. A passive joint transmits nothing along its own freedom, and the platform is in equilibrium:
+these are the equations. Where A has fewer independent rows than unknowns the machine is
+overconstrained, and only a norm, or the links' elasticity, decides the rest.
 """
 
 from __future__ import annotations

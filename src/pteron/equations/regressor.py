@@ -1,7 +1,7 @@
-"""The dynamics as the paper's Eq. (15) writes it: J^-T [ J^T Om_p  J_u^T Om_u  J_l^T Om_l  Om_e ].
+"""The regressor as the paper's Eq. (15) writes it: J^-T [ J^T Om_p  J_u^T Om_u  J_l^T Om_l  Om_e ].
 
-`virtual_work` gives the same regressor at less cost. This form stands here as the paper's own, to
-check that one and to measure the paper's claim about it: `Terms` keeps its factors apart.
+Om are the wrenches on sliders, links and platform per unit of their parameters. `virtual_work`
+gives the same regressor at less cost; this form checks it. `Terms` keeps the factors apart.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Distances to type-II singularities, to first order or in closed form: for maps, pose by pose.
+"""Distances from a pose to type-II singularities, to first order, or in closed form for an angle.
 
-The nearest zero of the type-II measure mu is |mu| / |d mu / dx| away, to first order: less and less
-wrong the nearer it is. Where det J is a multiple of A cos(phi) + B sin(phi) the angle is exact.
+The nearest zero of the type-II measure mu is |mu| / |d mu / dx| away, to first order: the nearer,
+the more exactly. Where det J is a multiple of A cos(phi) + B sin(phi) the angle is exact.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pteron.equations.kinematics import FAR
 from pteron.equations.machine import Machine
 
 _TINY = 1e-30
-"""Added to a squared slope: it keeps 0/0 out where measure and slope are both zero."""
+"""Added to a squared slope, against 0/0 where measure and slope are both zero."""
 
 
 def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expression]:
@@ -38,6 +38,6 @@ def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expressio
 
 
 def _first_order(measure: Expression, slope: Expression, most: float) -> Expression:
-    """Return |mu| over its slope, which is made as steep as it is where the way is the longest."""
+    """Return |mu| over its slope, with a least slope that makes the distance `most` at most."""
     least = measure / most
     return ca.fabs(measure) / ca.sqrt(ca.dot(slope, slope) + least * least + _TINY)

@@ -22,7 +22,7 @@ _SWEEPS = {0: 0, 1: 0, 2: 1, 3: 4, 4: 5, 5: 6, 6: 6}
 """Sweeps, by the number of columns, that bring random and graded matrices to rounding."""
 
 _TINY = 1e-300
-"""Beside it nothing counts that is not zero: it keeps 0/0 out."""
+"""Added to a denominator, against 0/0: it changes no other number."""
 
 
 def singular_values(matrix: Expression) -> list[Expression]:

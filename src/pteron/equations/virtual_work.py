@@ -1,10 +1,10 @@
 """Inverse dynamics by virtual work, Eqs. (13) and (14), in factored form.
 
-Each leg answers to its platform point alone: its bodies' wrenches become a force on that point and
-a force at its joint. So J_u and J_l of Eq. (13) are never multiplied out: they are their rows
-against (c', omega), times d(c', omega)/dx'. The paper's F_b of Eq. (14) acts on a body; all forces
-here are what the bodies need, -F_b. Given one column of parameters this is the inverse
-dynamics; given the identity matrix instead, the same lines return the regressor of Eq. (15).
+The wrenches that a leg's bodies need become a force at its joint and a load at its platform point,
+by rows against (c', omega), the velocity of that point and the platform's angular velocity; J_u and
+J_l of Eq. (13) are never multiplied out. The paper's F_b of Eq. (14) acts on a body; forces here
+are those that bodies need, -F_b. One column of parameters gives the inverse dynamics, the identity
+matrix the regressor of Eq. (15).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Performance of a machine at a pose: indices, stiffness, errors and reactions."""
+"""Performance of a machine at a pose: indices, stiffness, pose errors and joint reactions."""
 
 from pteron.indices.compliance import Stiffness as Stiffness, stiffness as stiffness
 from pteron.indices.conditioning import (

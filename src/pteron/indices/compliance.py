@@ -1,4 +1,4 @@
-"""Stiffness at the tool, and natural frequencies, from the elasticity of actuators and links."""
+"""`stiffness`: compliance at the tool and natural frequencies, from elastic actuators and links."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 _GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
-"""Gauss points along a beam: its energy is quadratic in the place, so that two are exact."""
+"""Gauss points along a beam: its energy is quadratic along it, so that two are exact."""
 
 _FREE = 1e-12
-"""Compliance of a self-stress, as a share of the largest, below which it costs no energy."""
+"""Compliance to a self-stress, as a share of the largest, below which it counts as none."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Stiffness:
     Attributes
     ----------
     compliance : array, shape (..., m, m)
-        C: how the tool's pose changes per unit of a wrench on it: m/N, rad/N and rad/(N m). Of a
+        C: change of the tool's pose per unit of a wrench on it: m/N, rad/N and rad/(N m). Of a
         platform that tilts (..., 6, 6): displacement and turn in base axes per force and moment.
     frequencies : array, shape (..., m)
         Natural frequencies of the bodies' masses, in platform coordinates, on these springs, Hz,

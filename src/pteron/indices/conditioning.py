@@ -1,4 +1,4 @@
-"""The global conditioning index: how well conditioned a machine is over its reach."""
+"""The global conditioning index: the mean over reach of 1 / kappa, kappa the condition number."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pteron.workspace import bounding_box
 from pteron.workspace.margins import distance_to_limits
 
 _GROUPS = 16
-"""Independent scrambled sequences, whose spread is the standard error."""
+"""Independent scrambled sequences of poses, whose spread gives the standard error."""
 
 
 @dataclass(frozen=True)

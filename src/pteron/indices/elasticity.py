@@ -1,4 +1,4 @@
-"""Elasticity of a machine: actuators as springs, links as beams."""
+"""Elasticity of a machine, for `stiffness`: actuators as springs, links as beams."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The indices of performance: what each one means, in which unit, and where it comes from."""
+"""The table of performance indices: the meaning, unit and source of each, from `indices.toml`."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def indices_of(robot: RobotLike) -> tuple[str, ...]:
 
 
 def _lacking(robot: Manipulator, index: Index) -> str:
-    """Return what of an index a platform does not do; nothing where it has the index."""
+    """Return the motion that an index asks for and a platform lacks, in words; or nothing."""
     if index.turning and not robot.platform.angles:
         return "turning, but this {} platform does not turn"
     if index.moving and not robot.platform.lengths:
@@ -90,7 +90,7 @@ def _lacking(robot: Manipulator, index: Index) -> str:
 
 
 def expect_index(robot: RobotLike, name: str) -> Index:
-    """Return the index of a name that a machine has, or say which ones it has."""
+    """Return the index of that name, or refuse one that does not exist or suit the machine."""
     robot = as_manipulator(robot)
     if name not in INDICES:
         raise DataError(f"index: {name!r} is not known; choose from {', '.join(INDICES)}")

@@ -1,6 +1,6 @@
-"""Internal forces of the legs that hold given loads, solved for many states at a time.
+"""Forces and moments of the legs on the platform that balance given loads, for many states.
 
-Reactions and stiffness both use them.
+`joint_reactions` and `compliance` use them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _RANK = 1e-10
 
 
 class Equations(NamedTuple):
-    """Outputs of the kernel "reactions", for B states; see `equations.reactions`."""
+    """Outputs of the kernel "reactions" for B states, in its order; see `equations.reactions`."""
 
     rows: Array
     right: Array
@@ -33,15 +33,15 @@ class Equations(NamedTuple):
 
 
 class Held(NamedTuple):
-    """The internal forces that hold K loads, as far as statics determines them."""
+    """The legs' forces and moments that balance K loads, as far as statics determines them."""
 
     forces: Array
     """(B, 6 n, K): a force and a moment of each leg on the platform."""
     stresses: Array
-    """(B, 6 n, r): self-stresses, at right angles with moments over the size; zero where a state
+    """(B, 6 n, r): self-stresses, orthogonal with moments divided by `size_of`; zero where a state
     has fewer than others."""
     missed: Array
-    """(B, S, K): what the legs cannot hold, moments over the size."""
+    """(B, S, K): the part of the loads that the legs cannot hold, moments divided by `size_of`."""
 
 
 _BLOCK = 1024

@@ -1,4 +1,4 @@
-"""Reactions: the forces and moments in every joint and guide, at rest or in motion."""
+"""`reactions`: forces and moments in all joints and guides of the legs, at rest or in motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from pteron.shapes import OnFailure, PoseLike
 
 @dataclass(frozen=True)
 class Reactions:
-    """Forces and moments in the legs' joints, on the side of the platform from that of the base.
+    """Forces and moments in the legs' joints: those of the base's side on the platform's side.
 
     Attributes
     ----------
@@ -36,10 +36,10 @@ class Reactions:
         For each leg its joints from the base to the platform: P0, R1, R2, R3, R4 of a P-R-R-R leg,
         whose first joint is its guide.
     points : array, shape (..., n, j, 3)
-        Where, m, in the base frame: of a guide where its slider is; NaN for a joint that a leg has
-        not, here and in what follows.
+        Their places, m, in the base frame: of a guide that of its slider; NaN, here and below, for
+        a joint that a leg does not have.
     forces, moments : array, shape (..., n, j, 3)
-        N, and N m about that point, in the base frame. What an actuator gives is among them.
+        N, and N m about that point, in the base frame, the actuators' forces included.
     actuators : array, shape (..., n)
         Forces of the actuators, N or N m: that of `inverse_dynamics`.
     redundancy : int

@@ -1,4 +1,4 @@
-"""Errors of the pose from errors of the joints, backlash and tolerances of the dimensions."""
+"""`pose_error`: errors of the tool's pose from errors of joints, backlash and tolerances."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pteron.shapes import Numbers, OnFailure, PerCoordinate, PoseLike
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Tolerances of a machine: each number is +- from its nominal value, or a deviation.
+    """Tolerances of a machine: each number is a limit (+-) about the nominal value, or a deviation.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sensitivities: the change of the pose with each dimension of a machine, its joints held."""
+"""`geometric_sensitivities`: derivatives of the pose by a machine's dimensions, its joints held."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Sensitivities:
         Names of the dimensions: "leg 1: upper_length", "leg 1: guide_point x", "leg 2: direction
         about y".
     roles : tuple of {"point", "length", "angle"}
-        Its role.
+        The role of each.
     units : tuple of str
-        m or rad of each; of what slides on a platform m/rad.
+        The unit of each, m or rad; of what slides on a platform m/rad.
     matrix : array, shape (..., m, p)
-        d pose / d dimension at P.
+        d pose / d dimension, with the position of the platform's point P.
     tool : array, shape (..., m, p)
-        The same of the tool's centre point.
+        The same, with the position of the tool's centre point.
     """
 
     names: tuple[str, ...]
