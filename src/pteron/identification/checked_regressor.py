@@ -1,4 +1,4 @@
-"""Checks of a regressor and forces that a user brings, of any robot, which become observations."""
+"""A user's own regressor and forces, of any robot, checked and turned into `Observations`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drive gains, newtons per unit of motor current, from motions with and without a known payload."""
+"""Drive gains, N or N m per unit of current, from motions with and without a known payload."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
 
 _UNSEEN = 1e-10
-"""Singular value, relative to the largest, below which gains are not told from inertia."""
+"""Singular value, relative to the largest, below which gains cannot be told from inertia."""
 
 _ITERATIONS = 50
 """Most iterations; gains that have not settled by then are refused."""

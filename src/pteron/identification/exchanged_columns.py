@@ -1,4 +1,4 @@
-"""Search for columns of a log that are exchanged or of flipped sign: fits with these put right."""
+"""Search for exchanged columns or wrong signs in a log: a fit with them put right is far better."""
 
 from __future__ import annotations
 

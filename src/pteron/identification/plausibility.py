@@ -1,4 +1,4 @@
-"""Plausibility of identified values: whether they can be the machine's, whatever the forces say."""
+"""Plausibility of identified values: warnings of values that cannot be this machine's."""
 
 from __future__ import annotations
 

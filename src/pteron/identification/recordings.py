@@ -1,4 +1,4 @@
-"""Recordings: logs in memory, or files read in pieces, divided into parts to fit and to check."""
+"""Recordings: logs in memory, or files read in pieces, divided into a part to fit and a rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Identification with a regressor of the user's own: any machine whose forces are W values."""
+"""`estimate`: identification with a user's own regressor; forces are regressor @ values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The result of `identify`: values, the machine that has them, a verdict, and how it was found."""
+"""`Identification`, the result of `identify`: values, the machine that has them, and a verdict."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bodies that parameters describe, as a cone program needs them: scales, margins, targets."""
+"""The rigid bodies that inertial parameters describe, as cone programs need them, and a check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The result of `consistent_model`: a machine of real bodies, and its distance from the fit."""
+"""`Consistency`, the result of `consistent_model`: real bodies, and their distance from the fit."""
 
 from __future__ import annotations
 

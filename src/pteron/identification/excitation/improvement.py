@@ -1,4 +1,7 @@
-"""Improvement of random motions in stages, until they keep their limits between samples too."""
+"""Improvement of random motions in stages: better conditioning, limits kept between samples too.
+
+`optimal_excitation` runs the stages of several starts in processes of their own.
+"""
 
 from __future__ import annotations
 

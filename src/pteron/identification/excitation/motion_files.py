@@ -1,4 +1,4 @@
-"""The files of an exciting motion: tables, each with the TOML file that will describe its log."""
+"""Files of an exciting motion: tables for a controller, and TOML files to describe their logs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`optimal_excitation`: random motions are drawn, the best are improved, the best is returned."""
+"""`optimal_excitation`: exciting trajectories, found by improving the best of random motions."""
 
 from __future__ import annotations
 

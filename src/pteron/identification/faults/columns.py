@@ -1,8 +1,7 @@
 """Columns of the regressor for faults of a log or of a machine, such as delayed forces.
 
-A small fault adds its size times a column that the fit itself tells: a delay of the forces, for
-one, adds its time times minus their derivative. `FaultColumns` puts such columns behind the
-model's.
+A small fault adds to the forces its size times a column that follows from the fit: a delay of the
+forces adds its time times minus their derivative. `FaultColumns` puts these behind the model's.
 """
 
 from __future__ import annotations

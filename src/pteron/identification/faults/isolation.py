@@ -1,4 +1,4 @@
-"""Fault isolation: which faults a fit's residuals show by name, how large, and what they spoil."""
+"""Fault isolation: the faults that a fit's residuals show, by name, with size and effect."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from pteron.identification.logs.description import TimeFormat, TimeUnit
 from pteron.tables import Table, declaration
 
 PER_SECOND: dict[str, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "100 ns": 1e7, "ns": 1e9}
-"""Units of time, each with how many make a second."""
+"""Units of time, with their number in a second."""
 
 _EPOCHS: tuple[tuple[float, float, TimeUnit], ...] = (
     (1e8, 1e10, "s"),

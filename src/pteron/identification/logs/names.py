@@ -1,4 +1,4 @@
-"""Names of columns: the words, numbers and units in them, as Pteron and other programs write them.
+"""Words, numbers and units in the names of columns, as Pteron and other programs write them.
 
 Beside Pteron's own ``rho1`` and ``Rho_1 (mm)`` these are names of controllers, ``Axis1.ActPos`` or
 ``Axis 1 Actual Position [mm]``, and of ROS, ``/joint_states/position[0]`` or ``field.effort0``.

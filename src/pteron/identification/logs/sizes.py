@@ -1,4 +1,4 @@
-"""Checks of a log's units: joints, poses and time steps that the machine cannot have."""
+"""Checks of a log's units: joints, poses or steps too large for the machine, or joints at rest."""
 
 from __future__ import annotations
 
