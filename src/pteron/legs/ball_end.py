@@ -1,7 +1,4 @@
-"""Legs that end in a ball joint at a tilting platform: their keys, cone and hinges.
-
-`held_plane` and `UPRIGHT` are for planar legs of a tripod (P-R-S, R-P-S, R-R-S).
-"""
+"""Keys, cone, hinges and plane of legs that end in a ball joint at a tilting platform."""
 
 from __future__ import annotations
 

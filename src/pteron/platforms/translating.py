@@ -18,7 +18,7 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
 class Translating(PlatformEquations):
-    """c = p + s, with s constant."""
+    """c = p + s: a leg's point is P's place and a constant vector."""
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
 

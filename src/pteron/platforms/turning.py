@@ -19,7 +19,7 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
 class Turning(PlatformEquations):
-    """c = p + R(phi) s0, with R a rotation about k."""
+    """c = p + R(phi) s0: a leg's point from P's place, a turn about k and its platform point."""
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z", "phi")
 

@@ -31,9 +31,9 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
     Any invertible combination of a base set is a base set. The masses that the lower links' m and
     m gamma_x amount to are left to the joints, and m_u to the slider, where there is a choice;
     among what remains (the lower links' masses or the platform's own parameters, for one) columns
-    are exchanged as long as the reduced model gets cheaper. It is a local search, from two starts,
-    of which the better is taken as it is where the platform tilts;
-    what `base_parameters` keeps by itself is never cheaper than its result.
+    are exchanged as long as the reduced model gets cheaper: a local search from two starts. Where
+    the platform tilts the starts are not improved. The result is never dearer than the choice of
+    `base_parameters`.
 
     Parameters
     ----------

@@ -1,7 +1,4 @@
-"""Coefficients of base parameters in symbols of the geometry, such as 1/ll1^2 of I_l1.
-
-They follow from the mass transfers (`transfers`).
-"""
+"""Coefficients of base parameters in symbols of the geometry, such as 1/ll1^2 (mass transfers)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A guard of the viewer's server: it answers requests of its own pages only.
+"""A guard of the viewer's server against requests of foreign pages (DNS rebinding).
 
 A browser lets any page open a socket to any server, and the owner of a name can make it point at
 127.0.0.1, so that a foreign page seems one of this machine's. Both show in a request: in its

@@ -1,4 +1,4 @@
-"""The rigid bodies that inertial parameters describe, as cone programs need them, and a check."""
+"""Rigid bodies of inertial parameters, scaled for cone programs; `real_bodies` checks them."""
 
 from __future__ import annotations
 

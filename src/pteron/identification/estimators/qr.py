@@ -27,7 +27,7 @@ _PLAIN = 1e5
 
 @dataclass(frozen=True)
 class QrFactor:
-    """The triangular factor R of [W F], with the columns of W scaled to unit length."""
+    """The triangular factor R of [W F], regressor and forces, W's columns scaled to length 1."""
 
     factor: Array
     """R of the scaled W (p, p)."""

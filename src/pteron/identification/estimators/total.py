@@ -1,4 +1,4 @@
-"""Total least squares, for noise in the regressor as well as in the forces."""
+"""Total least squares, for noise in the regressor W as well as in the forces F."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SmallestCorrections(NamedTuple):
 
 
 def smallest_corrections(upper: Array, exact: int, noise: Array) -> SmallestCorrections:
-    """Return what makes W and F agree with the smallest corrections, in units of their noise.
+    """Return the values for which the least corrections, in units of noise, make W and F agree.
 
     `upper` is the triangular factor (p + 1, p + 1) of W, its `exact` columns without noise first,
     and F. `noise` are the standard deviations of the p - `exact` noisy columns and of the forces.

@@ -1,7 +1,4 @@
-"""Improvement of random motions in stages: better conditioning, limits kept between samples too.
-
-`optimal_excitation` runs the stages of several starts in processes of their own.
-"""
+"""Improvement of random motions in stages: better conditioning, limits kept between samples too."""
 
 from __future__ import annotations
 

@@ -24,9 +24,8 @@ FaultName = Literal[
     "passive",
 ]
 """Faults by name: forces that are late, the scale of one force, that of all forces, the direction
-of gravity, its size or the rate of the clock, lengths, friction that falls with speed, drives that
-give, friction or offsets that drift, friction that grows with the load, friction in passive joints.
-"""
+of gravity, its size or the rate of the clock, lengths, friction that falls with speed, elastic
+drives, friction or offsets that drift, friction that grows with the load, passive friction."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters."""

@@ -1,4 +1,4 @@
-"""A log's motion with a fit's forces, and their slopes by lengths, gravity and joint positions."""
+"""A log's motion with the fitted forces and their slopes, from which faults' `columns` are made."""
 
 from __future__ import annotations
 

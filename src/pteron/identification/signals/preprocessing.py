@@ -1,4 +1,4 @@
-"""The preprocessing of a log: filters and rates as the user chooses them, the rest by the data."""
+"""Preprocessing of a log: differentiator, filters and rates, chosen by the user or by the data."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ _ROUNDING = 1e-6
 noise."""
 
 _SPIKES = 10
-"""Samples in a row that may be elsewhere all the same."""
+"""Samples in a row that may be elsewhere without an end of the repetition."""
 
 _MOVES = 0.5
 """Least travel in the part, as a share of each joint's span: at rest everything repeats."""

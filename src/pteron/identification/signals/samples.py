@@ -23,7 +23,7 @@ BLOCK = 1 << 15
 
 @dataclass(frozen=True)
 class SampleBlock:
-    """States and measured forces (R, n), N, at a log's own samples; no other block has the `fresh`.
+    """States and measured forces (R, n), N, at a log's samples; `fresh` rows are in no other block.
 
     `smooth` (R,) is that of `Differentiated`.
     """

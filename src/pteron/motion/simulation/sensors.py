@@ -1,4 +1,4 @@
-"""Encoders of the joints, and the rates computed from their readings."""
+"""Simulated encoders of the joints: rounded coordinates, and rates from their differences."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Sensors:
 
 
 class Encoders:
-    """Encoders during a simulation, with their last readings, from which they compute rates.
+    """Encoders during a simulation: they compute rates from their last readings.
 
     The angle of a crank that may go all the way round jumps by a turn: of such ones, `round_ones`
     (n,), readings go on by the shorter way.
