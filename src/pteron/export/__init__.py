@@ -1,4 +1,4 @@
-"""Exports: code for controllers, files for physics engines, models for other tools."""
+"""Exports of a machine: code for controllers, files for physics engines, models for other tools."""
 
 from pteron.export.c import Real as Real, export_c as export_c
 from pteron.export.casadi_functions import (

@@ -1,7 +1,7 @@
 """Export of C99 for a controller: a header and a source, with a test program and a CMakeLists.txt.
 
-No allocation, no static state, one exit a function, nothing but math.h. Comparisons are those of
-C99's macros, which are quiet for NaN: a plain `<` sets off the trap for invalid operations.
+The code has no allocation, no static state, one exit a function, nothing but math.h. Comparisons
+are C99's macros, which are quiet for NaN: a plain `<` raises the flag of invalid operations.
 """
 
 from __future__ import annotations

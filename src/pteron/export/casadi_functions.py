@@ -35,7 +35,7 @@ _NAMES = {
     "inverse_dynamics": "inverse_dynamics",
     "forward_dynamics": "forward_dynamics",
 }
-"""Names of the exported functions, and of the library's that they are."""
+"""The library's function behind each exported function, by the latter's name."""
 
 _LOADED = ("inverse_dynamics", "forward_dynamics")
 """Exported functions that take a wrench on the platform too."""

@@ -1,4 +1,4 @@
-"""Units of what drives are told and count: forces or torques, readings of the joints."""
+"""Units of the drives' commands (forces, motor torques, per cent) and of their joint readings."""
 
 from __future__ import annotations
 

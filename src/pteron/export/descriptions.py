@@ -1,4 +1,4 @@
-"""Texts in generated code: what functions compute, what their inputs and outputs mean, tables."""
+"""Texts in generated code: headers, summaries of functions, meanings of inputs and outputs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import has_readings
 
 SUMMARIES = loads((files("pteron.export") / "summaries.toml").read_text(encoding="utf-8"))
-"""Summaries of functions; the others have that of the library's function of the same name."""
+"""Summaries by function; others have that of the library's public function of the same name."""
 
 MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
 """Added where poses are returned, one a row."""

@@ -1,8 +1,8 @@
 """Export of an FMU of FMI 3.0: a machine with its drives, for model exchange and co-simulation.
 
-The exported C is inside, with `fmu.c` around it, and compiled for the platform that writes it. That
-is done here and not by CasADi's DaeBuilder, which (3.8) writes model exchange alone, and which
-cannot end a simulation where a leg does not reach.
+The exported C is inside, with `fmu.c` around it, and compiled for the computer that writes it.
+CasADi's DaeBuilder (3.8) would write model exchange alone, and could not end a simulation where a
+leg does not reach.
 """
 
 from __future__ import annotations

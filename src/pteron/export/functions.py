@@ -1,7 +1,7 @@
-"""The choice of functions to export, and for each all that a writer of code needs.
+"""The choice of functions to export as code, and for each all that C or Structured Text needs.
 
-That is its graph of operations with names, what each argument means, the machine's own values for
-arguments such as `parameters`, and test vectors: states with the results to expect there.
+That is its graph of operations with names, the meaning of each argument, the machine's own values
+for arguments such as `parameters`, and test vectors: states with the results to expect there.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""The statements of a graph in Structured Text, guarded so that none can trap.
+"""Statements in Structured Text for a graph of operations, guarded so that none can stop a PLC.
 
-A controller may stop on the square root of a negative number, on a division by zero and on an
-overflow, so none of them can happen here. A radicand and a divisor are compared before they are
-used; and where the sizes of the factors do not rule out that a product leaves the range of LREAL,
-the larger factor is compared too. A comparison that fails puts a harmless number in place and
+A PLC may stop on the square root of a negative number, on a division by zero and on an overflow.
+So a radicand and a divisor are compared before they are used, and where a product might leave the
+range of LREAL, so is its larger factor. A comparison that fails puts a harmless number in place and
 clears a flag.
 """
 
@@ -41,7 +40,7 @@ INPUT_POWER, _DIVISOR, _FACTOR = 6, -20, 30
 """Powers of ten: no input and no factor is larger, no divisor smaller."""
 
 _EXPONENT = "69.0"
-"""Exponents of e below it have powers smaller than 10^`_FACTOR`."""
+"""Largest exponent of e that is used: its power is below 10^`_FACTOR`."""
 
 _ZERO = "0.0"
 """Zero as LREAL."""

@@ -1,7 +1,7 @@
 """Base parameters for exported code: a machine's own, or those that `pteron identify` found.
 
-They are the set that `pteron identify` prints, in its order and units, whatever the code computes
-with: another base set costs fewer operations, and one follows from the other by a constant matrix.
+They are the set that `pteron identify` prints, in its order and units. The code may compute with
+another set that costs fewer operations; a constant matrix leads from the one to the other.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
 
 _NAME = "base_parameters"
-"""The input of code, and the key of the file, that has them."""
+"""Name of the base parameters as an input of the code, and as a key of the identified file."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Export of kinematics for LinuxCNC: a component around the exported C, with INI and HAL lines.
 
-The component has the three functions that LinuxCNC 2.8 and 2.9 ask of a kinematics module, and
-converts their millimetres and degrees. A machine whose joints are linear in x, y and z may use
-LinuxCNC's own matrixkins instead, for which the numbers are written too.
+The component has the three functions that LinuxCNC 2.8 and 2.9 require of a kinematics module, and
+converts millimetres and degrees. A machine whose joints are linear in x, y and z may use LinuxCNC's
+own matrixkins instead, for which the numbers are written too.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from pteron.platforms import Platform
 from pteron.platforms.joints import platform_joints
 
 _MILLIMETRES = 1000.0
-"""LinuxCNC's unit of length, how many in a metre."""
+"""Units of length of LinuxCNC in a metre."""
 
 _DEGREES = 180.0 / math.pi
-"""LinuxCNC's unit of angles, how many in a radian."""
+"""Units of angle of LinuxCNC in a radian."""
 
 _LONGEST = 26
 """Characters of a module's name before "kins": rtapi.h has 31 in all (RTAPI_NAME_LEN)."""

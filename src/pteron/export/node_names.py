@@ -1,8 +1,7 @@
 """Names for the intermediate quantities of a function, so that generated code can be read.
 
-What the equations call by name is looked for among the values that the function computes: a node
-that equals a named quantity in several random states is that quantity, however the sums in it were
-regrouped to save operations.
+A node of the function that equals a named quantity of the equations in several random states gets
+its name, however the sums in it were regrouped to save operations.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ _TYPE_I, _TYPE_II = 0.01, 0.001
 """Least type-I and type-II measures of random poses that are tried."""
 
 _SHARE = 0.5
-"""The share of the best pose's measure that a good pose has."""
+"""Least measure of a good pose, as a share of the best pose's."""
 
 
 def start_pose(robot: Manipulator) -> Array:

@@ -1,7 +1,7 @@
 """Export of IEC 61131-3 Structured Text for a PLC: one function block a file, which never traps.
 
-Inputs beyond a range are refused before anything is computed; `guards` rules out the rest. Where a
-guard fails the outputs stay as they were.
+Inputs beyond a range are refused before anything is computed; `guards` rules out all other causes
+of a stop. Where a guard fails the outputs stay as they were.
 """
 
 from __future__ import annotations

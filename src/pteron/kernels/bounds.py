@@ -1,10 +1,10 @@
-"""Bounds on a machine's functions in boxes of poses, by the narrower of two forms of intervals.
+"""Proved bounds on a machine's functions in boxes of poses, by the narrower of two interval forms.
 
 The natural form (see `kernels.intervals`) is too wide by about the box's width. The mean-value form
-f(m) + f'(X) (X - m), m being the box's middle, is too wide by about its square: for every
-x in the box X there is an f'(y), y between m and x, of which f(x) - f(m) is the product with x - m.
-It is taken where f is proved to be defined and continuous in all of the box, and f' defined; where
-f has a kink, the interval of f' holds the slopes of both sides.
+f(m) + f'(X) (X - m), m being the middle of the box X, is too wide by about its square: every x in X
+has f(x) - f(m) = f'(y) (x - m) for some y between m and x. It is taken where f is proved to be
+defined and continuous in all of the box, and f' defined; where f has a kink, the interval of f'
+holds the slopes of both sides.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 @dataclass(frozen=True)
 class Bounded:
-    """A function of poses with its gradient.
+    """A function of poses with its gradient, called for bounds on its outputs in boxes.
 
     Parameters
     ----------

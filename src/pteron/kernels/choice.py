@@ -1,4 +1,4 @@
-"""`numeric`: the kernel behind a public function, on CasADi's virtual machine first, then in C."""
+"""`numeric`: the kernels of the public functions, on CasADi's virtual machine first, then in C."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _AT_EXIT = 3.0
 """Seconds that a process waits at its end for a compiler in the background: most take less."""
 
 _AT_WORK = threading.Semaphore(1)
-"""One compilation at a time; other callers ask again later."""
+"""It admits one compilation at a time; other callers ask again later."""
 
 
 def numeric(

@@ -1,4 +1,4 @@
-"""Compilers run as subprocesses, which another thread can end with all that they started."""
+"""Running of compilers as subprocesses, which another thread can end with all that they started."""
 
 from __future__ import annotations
 

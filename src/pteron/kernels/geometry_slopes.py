@@ -1,7 +1,7 @@
-"""Joint coordinates with their slopes against the pose and against the machine's geometry.
+"""Kernel of joint coordinates and their slopes against the pose and the machine's geometry.
 
-The geometry, as `equations.machine.numbers` has it, is an input: calibration moves it, and exact
-arithmetic tells what of it measurements show.
+The geometry, in the order of `equations.machine.numbers`, is an input: calibration changes it, and
+evaluates the slopes in exact arithmetic for the rank of measurements.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""A CasADi function as a list of named operations: what printers, fields and passes walk through.
+"""A CasADi function as a graph of named operations, for code printers and other arithmetics.
 
-All of these need no more than single-assignment nodes in order, and what goes where. Nodes are
-sorted into stages, so that what depends on shared inputs alone is done once for a batch, and
-sines and cosines of the inputs leave the loop that a compiler vectorises.
+Nodes are single assignments, in order. They are sorted into stages, so that what depends on shared
+inputs alone is done once for a batch, and sines and cosines of the inputs leave the loop that a
+compiler vectorises.
 """
 
 from __future__ import annotations

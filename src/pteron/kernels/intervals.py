@@ -1,13 +1,11 @@
-"""Target `intervals`: bounds that are proved on what a function gives in boxes of its inputs.
+"""Target `intervals`: proved bounds on a function's outputs in boxes of its inputs.
 
-A box holds every state between two corners. The graph of a CasADi function is walked with NumPy
-arrays of intervals, one operation at a time for many boxes; why the bounds hold, rounding and all,
-and what is said where the function is undefined, stands in `kernels.interval_arithmetic`.
+A box holds every state between two corners. The graph of a CasADi function is evaluated with NumPy
+arrays of intervals, one operation at a time for many boxes. `kernels.interval_arithmetic` shows
+that the bounds hold in spite of rounding, and how a function that is undefined is marked.
 
 This is the natural form: intervals in place of numbers. It is exact, but for rounding, where every
-input occurs once, and else too wide, as x - x is; `kernels.bounds` has a narrower one beside it.
-
-What is enclosed is the real function of the graph: its constants are the floats that they are.
+input occurs once, and else too wide, as x - x is; `kernels.bounds` adds a narrower form.
 """
 
 from __future__ import annotations
@@ -26,7 +24,7 @@ from pteron.kernels.interval_arithmetic import RULES, Interval, constant
 from pteron.kernels.kernel import Array, Kernel, as_array
 
 _CHUNK = 1 << 13
-"""Boxes at a time: what a step reads and writes stays in the processor's cache."""
+"""Boxes at a time: what an operation reads and writes stays in the processor's cache."""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
 """Target `jax`: a pure function of arrays, which jits, maps, differentiates and runs on a GPU.
 
-The function is elementwise from its inputs' components to its outputs', so that XLA fuses it. Not
-into one loop: on the CPU XLA makes 23 of the inverse dynamics, since it does not repeat a root or a
-quotient that several expressions use, and so it moves 1016 bytes a state where 128 would do;
-components apart, or blocks of states, made it no better.
+The function is elementwise from its inputs' components to its outputs', so that XLA fuses it into
+loops: on the CPU 23 for the inverse dynamics, since it does not repeat a root or a quotient that
+several expressions use.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from pteron.kernels.kernel import Kernel, unmasked
 from pteron.kernels.named_columns import by_name
 
 _TRUTHS = ("less", "less_equal", "equal", "unequal", "not", "and", "or")
-"""Operations whose values are numbers in an expression; JAX's truth values add up as truths."""
+"""Operations whose truth values are made 1.0 or 0.0: in JAX they would not add up as numbers."""
 
 _PRINTED = (
     PYTHON
@@ -32,7 +31,7 @@ _PRINTED = (
 )
 
 _ROUNDED = ("float32", "float64")
-"""Type of an array and of the kernel it is given to, where digits are lost unseen."""
+"""The types of an array and of a kernel with which digits would be lost without notice."""
 
 
 class Traced(Kernel):

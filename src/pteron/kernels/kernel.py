@@ -1,4 +1,4 @@
-"""Kernels: CasADi functions made executable, with shapes and cost, and checks of their inputs."""
+"""Base classes of kernels: CasADi functions made executable for batches, with checks of inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables given where an array is expected: their columns are picked by name."""
+"""Tables that are given where an array is expected: their columns are picked by name."""
 
 from __future__ import annotations
 

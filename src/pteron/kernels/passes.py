@@ -1,7 +1,7 @@
-"""A pass over the graph of a function that saves operations, so that equations can be plain.
+"""`optimised`: rewrites a CasADi function to fewer operations, so that equations can be plain.
 
 An equation says what it means: a lever times a force, a length times a sine, a sum over the legs.
-What a person would do to it by hand to save operations is done here, once, for every equation:
+The savings that a person would make by hand are made here, once, for every equation:
 
     0.04*a*x - 0.04*b*y        ->  0.04*(a*x - b*y)         a factor of several terms, taken out
     x + y - z  and  w - y - x  ->  s = x + y; s - z, w - s  a part of two sums (or two products)
@@ -9,18 +9,18 @@ What a person would do to it by hand to save operations is done here, once, for 
     a/2.5                      ->  0.4*a                    a number's quotient is a product
     a/x  and  b/x              ->  r = 1/x; a*r, b*r        one division, which takes longer
 
-Such savings do not show in a graph of pairs, hence the sums of many terms of `terms`. Three steps
-are repeated on them for as long as they save something:
+A graph of pairs does not show such savings, the sums of many terms of `terms` do. Three steps are
+repeated on them for as long as they save something:
 
     flatten   a sum that is used once, in a sum, becomes part of it
     factor    the factor that most terms of a sum have is taken out of them, again and again
     share     the pair that most sums hold becomes a sum of its own, again and again
 
 Products are flattened and shared like sums; divisions are saved last, for one operation more each.
-This is the greedy algebraic elimination of common
-subexpressions of A. Hosangadi, F. Fallah and R. Kastner, IEEE Transactions on CAD 25 (2006)
-2012-2022. No product of sums is multiplied out and nothing is divided that was not divided before,
-so that a result differs from the plain one by the rounding of its terms only.
+This is the greedy algebraic elimination of common subexpressions of A. Hosangadi, F. Fallah and
+R. Kastner, IEEE Transactions on CAD 25 (2006) 2012-2022. No product of sums is multiplied out and
+nothing is divided that was not divided before, so that a result differs from the plain one by the
+rounding of its terms only.
 """
 
 from __future__ import annotations

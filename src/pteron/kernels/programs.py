@@ -40,7 +40,7 @@ _HUGE = 1e75
 """Inputs or outputs beyond this count as not finite: their squares might overflow."""
 
 _TINY = 1e-300
-"""A leg at the very edge of its reach has discriminant 0, which is above minus this: it reaches."""
+"""A leg reaches a pose where its discriminant is above minus this: so at 0, the edge, it does."""
 
 REDUCIBLE = (
     *("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward"),

@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 
 LIMIT = 1e5
-"""rad; for larger angles q pi/2 has too few digits, and the C library's functions serve."""
+"""Angle, rad, above which q pi/2 has too few digits and the C library's functions serve."""
 
 _PARTS = (1.5707963267923333, 2.5633441515839558e-12, 1.0562999066987428e-23)
 """pi/2; the first two have 37 bits, so that their product with q is exact up to the limit."""

@@ -1,7 +1,7 @@
-"""A function as sums of many terms and products of many factors, instead of pairs of them.
+"""A function as a graph of sums of many terms and products of many factors, for `passes`.
 
-In a graph of pairs, a + (b + c), neither a part that two sums have in common nor a factor that
-several terms have in common can be seen. Here they can: `passes` works on this form.
+A graph of pairs, a + (b + c), hides parts that two sums, and factors that several terms, have in
+common.
 """
 
 from __future__ import annotations

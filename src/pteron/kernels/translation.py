@@ -22,7 +22,7 @@ _ARITHMETIC: dict[str, Callable[..., int]] = {
 """Operations that become sums and products; others are nodes of their own."""
 
 _BINARY = ca.SX.binary
-"""An eighth of the time of `*` and the like, which try first if what is given is an array."""
+"""It takes an eighth of the time of `*` and the like, which first check for arrays."""
 
 
 def read(function: ca.Function) -> tuple[TermGraph, list[int]]:

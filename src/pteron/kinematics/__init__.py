@@ -18,6 +18,12 @@ from pteron.kinematics.direct import (
     working_mode as working_mode,
 )
 from pteron.kinematics.following import follow as follow
+from pteron.kinematics.inverse import (
+    inverse_kinematics as inverse_kinematics,
+    jacobian as jacobian,
+    link_jacobians as link_jacobians,
+    link_vectors as link_vectors,
+)
 from pteron.kinematics.joints import (
     JointMotion as JointMotion,
     joint_accelerations as joint_accelerations,
@@ -31,12 +37,6 @@ from pteron.kinematics.pose_conversions import (
     twist as twist,
     twist_jacobian as twist_jacobian,
     velocity_of as velocity_of,
-)
-from pteron.kinematics.position import (
-    inverse_kinematics as inverse_kinematics,
-    jacobian as jacobian,
-    link_jacobians as link_jacobians,
-    link_vectors as link_vectors,
 )
 from pteron.kinematics.random_poses import random_poses as random_poses
 from pteron.kinematics.singularities import singular_orientations as singular_orientations

@@ -1,8 +1,8 @@
-"""Machines whose layout is singular at every pose (det J = 0): the test, the reason, the proof.
+"""`architecture`: whether a machine is singular at every pose (det J = 0), with reason and proof.
 
-One pose at which det J is not zero disproves it. It is proved by exact arithmetic, for a geometry
-that is meant in simple numbers, or by the closed form A cos(phi) + B sin(phi) of P-R-R-R legs, up
-to rounding; else it is concluded from many random poses.
+One pose at which det J is not zero disproves it. It is proved by exact arithmetic, for geometries
+in simple numbers, or by the closed form det J = A cos(phi) + B sin(phi) of P-R-R-R legs, up to
+rounding; else it is concluded from many random poses.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _VANISHING = 1e-10
 """Type-II measures, or singular values over the largest, below this are rounding."""
 
 _SAMPLES = 64
-"""Random poses in reach at which det J is looked at."""
+"""Random poses in reach at which det J is evaluated."""
 
 
 _PRIMES = (

@@ -1,25 +1,25 @@
-"""Every pose of given joint coordinates, for platforms with one angle that have no closed form.
+"""Direct kinematics without closed form: every pose (assembly mode) of given joint coordinates.
 
-Platforms that tilt are in `tilting_assembly`.
+Platforms with one angle phi are solved here, those that tilt by `tilting_assembly`.
 
 With their joints held, n legs keep points of the platform on spheres, circles or planes, in n - 1
-dimensions. Moved by what phi makes of the points' offsets these meet at P. A sphere, circle or
+dimensions. Moved by the points' offsets at phi these meet at P. A sphere, circle or
 plane is a row s = (w, m, h) with w v.v + m.v + h = 0, and <s, s'> = m.m' - 2 (w h' + w' h) is the
 cosine of the angle at which two of them meet. The n rows have one null vector (v.v, v, 1) up to
 scale, and it is a point exactly if the Gram matrix G of their products is singular:
 
     det G(phi) = 0,  G = G_0 + G_c cos(phi) + G_s sin(phi),
 
-as the products depend on the distances between centers and planes alone. So 2 n solutions phi, real
-or not, are all there are: 8 modes of four legs and 6 of three, and 4 if one leg alone is no plane.
-They are the eigenvalues of a quadratic eigenvalue problem in tan(phi / 2); of a platform that
-slides in phi, with 2 solutions for each leg that is no plane.
+as the products depend on the distances between centers and planes alone. So there are 2 n solutions
+phi, real or complex: 8 modes of four legs and 6 of three, and 4 if all legs but one are planes.
+They are the eigenvalues of a quadratic eigenvalue problem in tan(phi / 2). Where phi slides the
+platform's halves there are 2 for each leg that is no plane.
 
 Two modes may have one phi: where all cranks of a Par4 have one angle, its tips lie in a plane, of
 which the modes are mirror images. The rows then have two null vectors, a line, which meets the
 spheres twice, and det G has a double zero, of which rounding leaves half the digits. Hence at each
-phi, real but for a margin, both points of the line of the two smallest singular values are tried,
-and Newton's steps on the closures themselves, which are regular there, decide.
+phi that is nearly real both points of the line of the two smallest singular values are tried, and
+Newton's steps on the closures themselves, which are regular there, decide.
 """
 
 from __future__ import annotations
@@ -36,46 +36,45 @@ _BATCH = 4096
 
 
 _HUGE = 1e30
-"""Sizes of the machine beyond which joints have no pose; det G stays finite."""
+"""Size of numbers in the rows beyond which joints have no pose, so that det G stays finite."""
 
 _COINCIDING = 1e-10
-"""Least size of a row, in numbers about 1, after those before it are taken out: ten digits of a
-smaller one are rounding."""
+"""Least size of a row after Gram-Schmidt on those before it, from a size of about 1: ten digits of
+a smaller one are rounding."""
 
 _VANISHING = 1e-14
-"""The size of det G, of orthonormal rows, below which it is all rounding: the platform can move
-with the joints held."""
+"""Size of det G, of orthonormal rows, below which it is rounding: the platform can move with the
+joints held."""
 
 _MARGIN = 5e-3
-"""rad from the real axis within which a zero of det G may be real: a fourfold one loses 3/4 of the
+"""Imaginary part, rad, up to which a zero of det G may be real: a fourfold one loses 3/4 of its
 digits."""
 
 _NEAR = 0.1
 """Greatest miss of a closure, as a share of the terms, that is worth Newton's steps."""
 
 _ROUNDING = 1e-13
-"""Greatest miss in the end: as much as two modes that meet do within 1e-7 of where they are."""
+"""Greatest miss of a pose: as much as two modes that meet have within 1e-7 of their places."""
 
 _STEPS = 20
 """Newton's steps at most: they end where a pose misses no less than before."""
 
 _SPAN = np.pi
-"""rad: where a platform slides, what half a turn of alpha is divided at."""
+"""Scale of a sliding platform's angle, rad: phi = `_SPAN` tan(alpha)."""
 
 _SAME = 1e-6
 """Two poses within this, in rad and sizes of the machine, may be one, found twice."""
 
 _APART, _LEAST = 6.0, 2e-16
-"""Factor and floor of the miss that tells two modes apart. Between two that meet the closures are
-missed, by a quarter of the square of their distance or so: this must be so many times what both
-poses miss, and no less than rounding. It tells modes apart to some 1e-7 of the size, where joints
-are themselves known to half of the digits of that."""
+"""Factor and floor of the miss that tells two modes apart. At the middle between two modes the
+closures are missed by about a quarter of the square of their distance: this must be so many times
+what both poses miss, and no less than rounding. It separates modes to some 1e-7 of the size."""
 
 _TURN_ROUNDING = 1e-14
-"""rad."""
+"""Rounding of an angle of half a turn, rad."""
 
 _ALIKE = 1e-9
-"""m or rad by which coordinates differ that do not tell the order of two poses."""
+"""Difference of coordinates, m or rad, that does not decide the order of two poses."""
 
 
 def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:

@@ -1,4 +1,4 @@
-"""The constraint measure: how firmly the legs hold the platform's orientation."""
+"""The constraint measure: how well the legs' couples hold the platform's orientation."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pteron.shapes import Numbers, OnFailure, PoseLike
 def constraint_measure(
     robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Numbers:
-    """Return the constraint measure: 0 where the platform may turn otherwise than it should.
+    """Return the constraint measure: 0 where the platform is free to turn about a forbidden axis.
 
-    Each leg holds couples, whatever its joint does: a P-R-R-R leg across its revolute axes, a pair
+    Each leg exerts couples, whatever its joint does: a P-R-R-R leg across its revolute axes, a pair
     of parallel rods about bar x rod. The measure is the volume that they span, each of length 1 or
     less, over the largest. It depends on the pose where rods are parallel pairs; of legs with
-    revolute joints alone it is the layout's.
+    revolute joints alone it is the same at every pose.
 
     Parameters
     ----------

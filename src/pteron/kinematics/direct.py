@@ -1,4 +1,4 @@
-"""Direct kinematics: joint coordinates to poses, and the modes (branches) that poses are in."""
+"""Direct kinematics: poses from joint coordinates; assembly modes and working modes of poses."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from pteron.manipulator.variants import with_elbows
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
 
 _SAME_JOINT = 1e-6
-"""m or rad within which a pose gives the joints back: far above rounding, even near a singularity,
-where the other branch, which it is to tell apart, is no other."""
+"""Difference of joints, m or rad, up to which a pose reproduces them: far above rounding. A leg's
+other branch differs by more, but at a singularity, where both are one."""
 
 
 def direct_kinematics(

@@ -1,7 +1,7 @@
-"""Evaluation of public functions: one kernel a call, and errors that name a state it refuses.
+"""`evaluated`: calls a public function's kernel, and raises an error that names the state at fault.
 
 The kernel returns its values and, for each state, a status: 1 where they count, 0 where they do
-not. The particulars of a bad state are worked out only where there is one.
+not. The reason is worked out only where a state fails.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _COINCIDENT = 1e-6
 """Share of a leg's length within which its two ends count as coincident, in messages."""
 
 _TYPED: tuple[type, ...] = (list, tuple)
-"""Types that a person writes; a program's arrays are not checked for likely units."""
+"""Types that a person types; arrays are not checked for unlikely units."""
 
 _MILLIMETRES = 20.0
-"""A pose that misses a leg's reach by so many times its size was perhaps given in millimetres."""
+"""A pose this many leg sizes out of reach was perhaps given in millimetres."""
 
 
 def evaluated(

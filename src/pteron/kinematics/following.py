@@ -19,9 +19,9 @@ def follow(
 ) -> PerCoordinate:
     """Return the poses along a motion of the joints, in the assembly mode of a pose to start from.
 
-    From each pose a line through the last two leads near the next one, and Newton's steps onto it;
-    where they do not converge the joints' step is halved. A mode ends where the machine is singular
-    (type II), and the motion with it.
+    Each pose is extrapolated from the last two and found by Newton's steps; where they do not
+    converge the joints' step is halved. A mode ends where the machine is singular (type II), and
+    the motion with it.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Make the machines in general complex numbers, with all their poses, that paths start from.
+"""Script that makes the start machines of `pose_paths`: random complex numbers, all poses known.
 
-`python -m pteron.kinematics.generic_machines` writes `generic_machines.npz` anew; the library only
-reads it. From a machine that has a random pose paths lead round by other random machines and back,
-each time to poses that may be others (monodromy), until as many are known as there are.
+`python -m pteron.kinematics.generic_machines` writes `generic_machines.npz`; the library only reads
+it. From a machine with one random pose, paths lead by way of other random machines back to it, to
+poses that may be new (monodromy), until all are known.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ _ALL = {
     Closed(6, 0, True): 40,
     Closed(6, 0, True, paired=True): 16,
 }
-"""The number of poses that machines of each kind have."""
+"""The number of poses of machines of each kind."""
 
 _COMPLEX = 0.25
-"""Size of the imaginary parts, and of what is added to the real ones, of numbers about 0.6."""
+"""Size of the random complex numbers added to real ones of about 0.6."""
 
 _APART = 1e-5
-"""Sine of the angle between z that are two poses."""
+"""Least sine of the angle between the vectors z of two poses that count as different."""
 
 
 def random_machine(closed: Closed, rng: np.random.Generator) -> tuple[Complex, Complex]:
-    """Return a machine (7 k,) and one pose of it."""
+    """Return a machine, k closures of 7 numbers each, and one pose z of it."""
     x = rng.normal(size=4)
     y = rng.normal(size=4) if closed.moves else np.zeros(4)
     x, y = x / np.linalg.norm(x), 0.3 * (y - x * (x @ y) / (x @ x))

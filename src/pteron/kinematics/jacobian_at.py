@@ -8,7 +8,7 @@ import numpy as np
 
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluated
-from pteron.kinematics.position import jacobian
+from pteron.kinematics.inverse import jacobian
 from pteron.manipulator import Manipulator
 
 

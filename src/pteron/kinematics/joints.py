@@ -1,4 +1,4 @@
-"""The screws, rates and accelerations of every joint at given poses, passive joints included."""
+"""Screws, rates and accelerations of all joints, passive ones included, from the platform's."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def joint_screws(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "r
     array, shape (..., n, j, 6)
         Screws (omega, v), from the base to the platform. A P-R-R-R leg has P, R1, R2, R3 and, for
         3T1R, R4; an R-S-S leg R and the two universal joints of its rod. NaN for a joint that a leg
-        has not.
+        does not have.
 
     Raises
     ------

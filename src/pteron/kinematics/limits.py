@@ -32,9 +32,9 @@ class LimitedJoint:
     unit : str
         Unit of the numbers, "m" or "rad".
     value, least, most : float
-        Its coordinate, and the limits of it.
+        Its coordinate, and its limits.
     only_most : bool
-        Whether it is never below zero, as the angle in a cone, and only its greatest value a limit.
+        Whether only `most` is a limit, as of a cone's angle, which is never below 0.
     """
 
     leg: int

@@ -1,10 +1,9 @@
-"""A machine's geometry in exact arithmetic modulo a prime: decimals, and directions of length one.
+"""A machine's geometry in integers modulo a prime, for exact tests: lengths and unit vectors.
 
 A number of a file is the decimal that it prints as, to a picometre. A direction's components are
 taken for square roots of simple fractions, such as 0.6 or sqrt(3) / 2, whose squares sum to one;
-other directions are not recognised. A root of a product is the product of the primes' roots, so
-that any choice of these is a conjugate of the geometry that is meant: what is zero for one is for
-all.
+other directions are not recognised. A root of a product is the product of its prime factors' roots,
+so that any choice of signs gives a conjugate geometry: a number that is zero in one is in all.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Poses to positions and rotations, and back; their rates to twists, and back.
+"""Conversion of poses to positions and rotations, and of their rates to twists, and back.
 
 A rotation is a matrix (..., 3, 3) that takes vectors of the platform's frame to the base frame, or
 a quaternion (..., 4), scalar last, or tilt and torsion (..., 3).
@@ -36,12 +36,12 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 }
 
 _ROUNDING = 1e-7
-"""m, rad and their rates, by which what is given may differ from what the motion can have; more is
-no rounding, not even that of numbers of 32 bits."""
+"""Difference, m, rad or their rates, up to which a position, rotation or twist that the platform
+cannot have counts as rounded: also in numbers of 32 bits."""
 
 
 def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
-    """Return where P is, in the base frame; of a tripod the planes tell x and y.
+    """Return the position of P in the base frame; of a tripod the legs' planes give x and y.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""All poses of platforms that may turn any way, at the ends of paths from a machine that is known.
+"""Direct kinematics of tilting platforms by homotopy: all poses, followed from a known machine.
 
-`equations.pose_paths` is the page that explains them. Beside this file lie, for each kind of
-closures, a machine in general complex numbers and its poses; `generic_machines` finds others.
+`equations.pose_paths` has the method. The file `generic_machines.npz` beside this one has, for each
+kind of closures, a start machine in complex numbers with its poses; `generic_machines` makes it.
 """
 
 from __future__ import annotations
@@ -29,34 +29,34 @@ _STEPS = 500
 """Most steps of a path: one in a thousand takes more than a third of it."""
 
 _GONE, _FIRST = 0.1, 0.05
-"""The straight line before a path, and its first step."""
+"""Straight extrapolation before a path's start, and its first step, in the path's parameter."""
 
 _LEAST = 1e-8
-"""A path whose steps are shorter is lost: it leads to no pose, or all but meets another."""
+"""Step below which a path is lost: it leads to no pose, or almost meets another path."""
 
 _TRIALS = 4
-"""Most bundles of paths for a machine of which some were lost."""
+"""Most attempts to follow all paths to a machine, where some were lost."""
 
 _ALIKE = 1e-6
-"""Sine of the angle between two z below which they are one."""
+"""Sine of the angle between two poses z below which they count as one."""
 
 _REAL = 1e-3
-"""Greatest imaginary part of a z, |z| = 1, from which Newton's steps may lead to a real one."""
+"""Greatest imaginary part of a pose z, |z| = 1, that Newton's steps may make real."""
 
 _REFINING = 2
 """Pairs of Newton's steps at the end of a path."""
 
 _CONVERGED = 1e-7
-"""Greatest last one: next to another pose the end of a path may not be told from the other's."""
+"""Greatest last step: next to another pose a path's end may not be told from the other's."""
 
 _POLISHING = 8
-"""Newton's steps of a real pose."""
+"""Most of Newton's steps to a real pose."""
 
 _ROUNDING = 2e-14
-"""Greatest miss, as a share of its terms, of a pose that is no farther proved: two that meet."""
+"""Greatest miss, as a share of its terms, of a pose that is not proved, where two poses meet."""
 
 _NO_ROTATION = 1e-7
-"""|x| of |z| = 1 below which P is nowhere."""
+"""Size of z's rotation part x, |z| = 1, below which P would be at infinity."""
 
 
 class Generic(NamedTuple):

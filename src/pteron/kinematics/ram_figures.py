@@ -1,10 +1,10 @@
-"""Figures of six rams' ends that make a hexapod singular at every pose, and why they do.
+"""Test whether a hexapod of six rams is singular at every pose by the figures of the rams' ends.
 
 Against a twist at the base's origin a ram from a to p + R b has the row (d, a x d) over its length,
-d = p + R b - a. It is linear in the products of (1, a) with (1, b). So where these 16 numbers of
-six rams depend on each other, so do the rows, in the same shares at every pose: as where both
-figures lie on conics of a plane, of which a projective map takes one to the other (Roeschel and
-Mick, Characterisation of architecturally shaky platforms, 1998).
+d = p + R b - a. It is linear in the products of (1, a) with (1, b). So where these 16 numbers are
+linearly dependent for the six rams, so are the rows, at every pose: as where both figures lie on
+plane conics, and a projective map takes one to the other (Roeschel and Mick, Characterisation of
+architecturally shaky platforms, 1998).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Poses in reach, drawn at random from the box about a ball that holds them all."""
+"""Sampling of random poses in reach, from a box about the ball that holds them all."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ATTEMPTS = 250
 """Batches drawn before it is concluded that poses in reach are too rare."""
 
 _MANY = 50
-"""Poses that are not found by a last stroke of luck."""
+"""Number of wanted poses from which a search that finds few ends after a quarter of its batches."""
 
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
@@ -32,16 +32,16 @@ _LEADING = 20
 """Steps of Newton's method that lead a pose to joint coordinates."""
 
 _TILT = 0.5
-"""rad from level to which a platform that tilts is drawn, where its file does not limit it."""
+"""Greatest tilt drawn, rad, of a platform whose file does not limit it."""
 
 _SEEN = 1000
-"""Poses that tell how often limits are kept."""
+"""Poses that show how often limits are kept."""
 
 _PARALLEL = 1e-3
 """Squared angle, about, between guides that count as parallel."""
 
 _SELDOM = 0.1
-"""Share of poses up to which a passive joint that keeps its limits is named in a message."""
+"""Share of poses at which a passive joint keeps its limits, below which a message names it."""
 
 
 def drawn_poses(

@@ -1,6 +1,6 @@
 """Type-II singularities, where the actuators, held still, no longer hold the platform.
 
-Here are the largest type-II measure of a machine, and the platform's singular angles.
+`best_type_ii` finds a machine's largest measure, `singular_orientations` the singular angles phi.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
-"""Size of the type-II measure that, if no angle in reach has a larger one, counts as zero."""
+"""Size of the type-II measure that counts as zero where no angle in reach has a larger one."""
 
 
 _DRAWN = 4096
 """Random poses among which the best type-II measure is sought."""
 
 _FOREMOST = 6
-"""Random poses, the best ones, that are improved by a local search."""
+"""The best of these poses, each improved by a local search."""
 
 _TRIES = 200
 """Evaluations of the measure in each local search."""

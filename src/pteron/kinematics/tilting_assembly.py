@@ -1,7 +1,7 @@
-"""Every pose of given joint coordinates of a machine whose platform tilts.
+"""Direct kinematics of machines whose platforms tilt: every pose of given joint coordinates.
 
-With its joint held a leg keeps its platform point on a sphere, or on a circle where a plane of the
-base holds it too; `pose_paths` finds where they all meet.
+With its joint held a leg keeps its platform point on a sphere, or, where it stays in a plane of the
+base, on a circle; `pose_paths` finds the poses that fit all of these.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from pteron.manipulator import Manipulator
 from pteron.platforms.nearest_pose import nearest_pose
 
 _HUGE = 1e30
-"""Sizes beyond which joints have no pose."""
+"""Size of the spheres' centres and radii beyond which joints have no pose."""
 
 _ANOTHER = 1e-6
-"""Greatest difference, in sizes of the machine and of rotations, from the pose that is meant."""
+"""Greatest difference of a position, over the size, and a rotation from those of coordinates."""
 
 
 def tilting_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], Array]:

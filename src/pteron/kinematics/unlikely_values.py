@@ -1,4 +1,4 @@
-"""Values that are possible but unlikely: lengths in millimetres, angles in degrees."""
+"""Tests for values that are possible but likely in another unit, millimetres or degrees."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import COORDINATES
 
 _WOUND = 6.0 * np.pi
-"""rad, three turns: beyond them the coordinate of a crank is likelier in degrees."""
+"""Angle of a crank, rad, beyond which it is likelier in degrees: three turns."""
 
 
 def unlikely_length(robot: Manipulator) -> float:
-    """Return the length, m, above which one of a pose or a part was rather given in millimetres."""
+    """Return the length, m, above which one of a pose or a part was likely in millimetres."""
     return 10.0 * max(
         hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
     )

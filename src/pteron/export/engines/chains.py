@@ -1,4 +1,4 @@
-"""The legs of a machine at a pose, as numbers: joint axes, bodies' frames and platform points."""
+"""The legs of a machine at a pose, as numbers for engines' files: joint axes and bodies' frames."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class LegStance:
     axes, points : tuple of array, shape (3,)
         Axis, and a point on it, of each of these joints, m.
     references : dict of array, shape (3,)
-        Where the reference point of each body is.
+        Position of each body's reference point.
     along, across : dict of array, shape (3,)
         Each body's x, and its z if it turns in a plane.
     end : array, shape (3,)
         The platform point.
     coordinate : float
-        The actuated joint's.
+        Coordinate of the actuated joint.
     numbers : tuple of int
         The places of these joints in the leg's chain. A driven joint that passes a moment on to the
         platform, and no force on to a point, carries nothing of the leg, and is not among them.

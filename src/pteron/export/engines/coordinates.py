@@ -1,4 +1,4 @@
-"""Coordinates of all joints of the opened mechanism (a `Tree`), for poses of the platform."""
+"""Coordinates of all joints of the opened mechanism (a `Tree`, for engines) from platform poses."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pteron.platforms.joints import platform_joints
 from pteron.shapes import PoseLike
 
 _LONG = 1e-3
-"""Share of its own length that a vector must have across an axis, to tell an angle about it."""
+"""Least part of a vector across an axis, as a share of its length, to give an angle about it."""
 
 
 def coordinates(opened: Tree, poses: PoseLike) -> Array:
     """Return the coordinates of the tree's joints with all loops closed.
 
-    Passive joints of legs are found one after the other from the home pose on: a joint that turns
-    from what comes next in its leg, a joint that slides from where the next one is.
+    Passive joints of legs are found one after the other, by comparison with the home pose: a joint
+    that turns from the direction to the next joint, one that slides from the next one's place.
 
     Parameters
     ----------

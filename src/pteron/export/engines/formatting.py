@@ -16,7 +16,7 @@ from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
 
 _DIGITS = 15
-"""Decimals written: beyond them is rounding. m, rad, or components of a unit vector."""
+"""Decimals that are written, of m, rad or components of a unit vector: others are rounding."""
 
 COLORS = ("0.13 0.47 0.71 1", "0.84 0.37 0.05 1", "0.17 0.55 0.24 1", "0.55 0.35 0.64 1")
 """Colours of the legs, in turn: red, green, blue and opacity."""

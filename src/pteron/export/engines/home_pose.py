@@ -1,4 +1,4 @@
-"""The pose in which an exported machine stands: its joints in the middle of their ranges."""
+"""The home pose of a machine in engines' files: the one given, or joints in mid-range."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 
 _GOOD = 0.1
-"""Least measure of distance from singularities for the middle of the joints' ranges to be taken."""
+"""Least singularity measures at which the middle of the joints' ranges is taken."""
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
-"""Numbers of random poses and their least measures, tried in turn."""
+"""Numbers of random poses, and least measures of them, that are tried in turn otherwise."""
 
 _ALIKE = 1e-9
 """Difference below which two measures count as equal."""

@@ -1,4 +1,4 @@
-"""Inertia that a machine's model leaves open, completed to the bodies in space that engines want.
+"""Inertia of bodies in space for physics engines, completed from the model's fewer parameters.
 
 A body that moves in a plane acts by its mass, its centre of mass in the plane and one moment of
 inertia; a slider by its mass alone; a rod without a spin. What is added here acts on no motion that

@@ -1,4 +1,4 @@
-"""Links, drives and shapes for URDF and SDF: a link a joint, frames by roll, pitch and yaw."""
+"""Links, drives and shapes for URDF and SDF: one link for each joint, frames by roll-pitch-yaw."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The parts of the opened mechanism, a tree: bodies on joints, and the points that close loops.
+"""The parts of a `Tree`, a machine with its loops cut open: bodies, joints, drives, loop closings.
 
-Everything is in the base frame with the machine at its home pose, where every loop is closed: an
-engine's file may place its bodies there, or take their joints back to zero by `place`.
+Engines' files are written from it. Everything is in the base frame with the machine at its home
+pose, where all loops are closed; `at_zero` takes the joints back to zero.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class TreeJoint:
     Attributes
     ----------
     name : str
-        The actuated joints' are those of the robot's logs, the platform's those of its pose.
+        For actuated joints as in the robot's logs, for the platform's as in its pose.
     slides : bool
         Whether it slides along its axis, and does not turn about it.
     axis, point : array, shape (3,)

@@ -1,7 +1,7 @@
 """The platform's bodies in the opened mechanism: its main part, parts that do not turn, gears.
 
-Platforms that slide have two halves. The pieces have together the platform's mass, first moment and
-moment of inertia, as the equations take them (`Platform.joined`).
+Platforms that slide have two halves. All bodies together have the platform's mass, first moment and
+moment of inertia (`Platform.joined`).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _SIDE = 0.05
 """Side of the cube that stands for a part that does not turn, m."""
 
 Pieces = tuple[list[TreeBody], list[int], list[Closing]]
-"""Bodies; which of them each leg carries; where parts of the platform close with it."""
+"""Bodies; the number of the one at the end of each leg; points at which they close with others."""
 
 
 def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:

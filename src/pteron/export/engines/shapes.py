@@ -1,4 +1,4 @@
-"""Shapes of the machine at its home pose: bars, boxes, guides and axles."""
+"""Shapes that show a machine in engines' files, at its home pose: bars, boxes, guides and axles."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _THICK = 0.011
 """Radius of a link, as a share of the machine's size; other shapes are in proportion."""
 
 _APART = 0.018
-"""Half the distance of parallel rods, as a share of the machine's size: files do not say it."""
+"""Half the drawn distance of parallel rods, as a share of the machine's size."""
 
 _SPARE = 0.25
 """Length of a guide without limits, each way, as a share of the machine's size."""
 
 _OVERLAP = 0.55
-"""Each part of a telescope has this share of the whole."""
+"""Length of each of the two parts of a telescopic body, as a share of the whole."""
 
 _SAME = 1e-6
 """Distance below which points count as one, m."""

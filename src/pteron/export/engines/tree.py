@@ -1,12 +1,11 @@
-"""The opened mechanism: legs and platform as chains of bodies from the base, cut where they meet.
+"""`tree`: a machine as an opened mechanism, the legs and the platform as chains from the base.
 
-Each leg is cut at its platform point, where its last body ends; the joints beyond are left out, as
-the platform's own chain says how it moves: it slides along the pose's lengths and turns by its
-angles. Of an articulated platform each part that does not turn is a body of its own, which slides
-without turning and is closed with the platform at its hinge. Gears, and halves of a platform that
-slide, are coupled to phi.
+Each leg is cut at its platform point, where its last body ends. The joints beyond are left out: the
+platform has a chain of its own, which slides along the pose's lengths and turns by its angles. Of
+an articulated platform each part that does not turn is a body of its own, closed with the platform
+at its hinge. Gears, and halves of a platform that slide, are coupled to the angle phi.
 
-No kind of leg is asked for: all is read from `LegMotion.chain` and `LegMotion.bodies` (`legs.leg`).
+Any kind of leg is served: all is read from `LegMotion.chain` and `LegMotion.bodies` (`legs.leg`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Printers' firmware: Klipper's configuration, M665 and M666 of Marlin and RepRapFirmware."""
+"""Files for 3D printers' firmware: Klipper's configuration, Marlin's and RepRapFirmware's M665."""
 
 from pteron.export.printers.configuration import export_klipper as export_klipper
 from pteron.export.printers.gcode import (

@@ -1,4 +1,4 @@
-"""The bed, at which Klipper's z is 0: a level that a Delta reaches well."""
+"""Choice of a Delta's bed for Klipper: the level, z = 0 there, that its platform reaches well."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
 _BELOW = 1e-3
-"""Depth below the bed from which rotary_delta.py takes a machine to home, m."""
+"""Depth below the bed at which Klipper's rotary_delta.py begins to home a machine, m."""
 
 _GOOD = 0.05
 """Least measure of poses at the bed: the type-I measure, or twice the type-II measure."""
@@ -26,8 +26,8 @@ _LEVELS, _RINGS, _DIRECTIONS = 200, 20, 24
 def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[float, float]:
     """Return P's z at the bed, and the radius about the axis that is good there: at most `reach`.
 
-    It is at 0 where a machine can work at 0 and below the end stops; else it is the lowest level
-    between two on which P goes far.
+    The tool is at 0 there if the machine can work at 0 and below the end stops; else the bed is the
+    lowest level between `low` and `high` on which P goes far.
 
     Raises
     ------

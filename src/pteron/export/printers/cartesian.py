@@ -28,7 +28,7 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 
 ZERO = 5e-13
-"""Coefficients below it are left out: over a metre they make less than a picometre."""
+"""Size of coefficients below which they are left out: over a metre less than a picometre."""
 
 _LEAST_DETERMINANT = 1e-5
 """The determinant below which Klipper (generic_cartesian.py) says that the steppers cannot move all

@@ -1,4 +1,4 @@
-"""The spheres on which a Delta's platform moves, as Klipper describes them."""
+"""The spheres on which a Delta's platform moves while one joint is held, as firmware has them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pteron.legs.leg import Sphere
 from pteron.manipulator import Manipulator
 
 SAME = 1e-6
-"""Deviation, in metres or of a unit vector, from the regular machine that Klipper takes."""
+"""Deviation, m or of a unit vector, up to which a machine is as regular as Klipper assumes."""
 
 
 @dataclass(frozen=True)

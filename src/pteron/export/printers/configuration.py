@@ -1,9 +1,8 @@
-"""Export of a Klipper configuration: of generic_cartesian, delta or rotary_delta kinematics.
+"""Export of a configuration for Klipper, a printer firmware: its kinematic sections.
 
-What Klipper, a printer firmware, computes is in its klippy/kinematics/ (generic_cartesian.py with
-kinematic_stepper.py, delta.py, rotary_delta.py) and klippy/chelper/ (kin_generic.c, kin_delta.c,
-kin_rotary_delta.c). It takes machines that move x, y and z alone: those whose joints are linear in
-the pose, and Deltas as regular as its own few numbers say.
+The kinematics are `generic_cartesian`, `delta` or `rotary_delta`; Klipper's formulas are in its
+klippy/kinematics/ and klippy/chelper/. It takes machines that move x, y and z alone: those whose
+joints are linear in the pose, and Deltas as regular as its few numbers can describe.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Sections of Klipper's kinematics `delta`, as its delta.py and chelper/kin_delta.c compute it."""
+"""Configuration sections of Klipper's kinematics `delta`: see its delta.py and kin_delta.c."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""M665 and M666 of a linear Delta, as Marlin and RepRapFirmware read them.
+"""Export of the G-code M665 and M666 for Marlin and RepRapFirmware: a linear Delta's geometry.
 
-Both have towers X, Y and Z at 210, 330 and 90 degrees, each with a correction of its angle, and the
-numbers of `LinearDelta` otherwise. Marlin (delta.cpp, M665.cpp, M666) counts its end stops down
-from the lowest one's height, so that M666 is 0 or less; RepRapFirmware (LinearDeltaKinematics.cpp)
-from their mean.
+Both have towers X, Y and Z at 210, 330 and 90 degrees, each with a correction of its angle, and
+else the numbers of `LinearDelta`. Marlin (delta.cpp, M665.cpp, M666) counts its end stops down from
+the lowest one's height, so that M666 is 0 or less; RepRapFirmware (LinearDeltaKinematics.cpp) from
+their mean.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from pteron.export.printers.sections import reading_comment
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _TOWERS = (210.0, 330.0, 90.0)
-"""Where the firmware has its towers X, Y and Z, degrees."""
+"""Angles of the firmware's towers X, Y and Z, degrees."""
 
 _MOST_TURN = 60.0
-"""Degrees by which a tower may stand beside its place in the firmware."""
+"""Greatest correction of a tower's angle, degrees."""
 
 
 def marlin_lines(robot: RobotLike) -> list[str]:

@@ -1,9 +1,9 @@
-"""The linear Delta as printers' firmware has it: ten numbers, and what they miss of a machine.
+"""The numbers by which printers' firmware describes a linear Delta, fitted to a machine.
 
-Towers stand on one radius about the z axis, carriage i at the height z + sqrt(arm_i^2 - (x - R cos
-a_i)^2 - (y - R sin a_i)^2) over the bed, z = 0, and at end_i where its end stop is. Klipper, Marlin
-and RepRapFirmware have these numbers alike. A machine whose towers lean, or stand on different
-radii, gets those with which its tool is least far from where the firmware takes it to be.
+Towers stand on one radius R about the z axis at angles a_i; carriage i is at the height z +
+sqrt(arm_i^2 - (x - R cos a_i)^2 - (y - R sin a_i)^2) over the bed, z = 0, and at end_i where its
+end stop is. Klipper, Marlin and RepRapFirmware share these numbers. A machine whose towers lean, or
+stand on different radii, gets those with the least error of its tool's position.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class LinearDelta:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """What is said of a machine that these numbers do not describe wholly."""
+        """The comment on a machine that these numbers describe with an error; else nothing."""
         if self.deviation <= SAME:
             return ()
         return (

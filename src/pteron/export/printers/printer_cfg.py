@@ -1,4 +1,4 @@
-"""Klipper's printer.cfg read: its sections, and the linear Delta that it describes."""
+"""Reading of Klipper's printer.cfg: its sections, and the linear Delta that it describes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pteron.legs import Drive, LegKind
 from pteron.manipulator import Manipulator, load
 
 _SAVED = "#*#"
-"""The beginning of lines that SAVE_CONFIG wrote; they come before what stands above them."""
+"""Prefix of the lines that SAVE_CONFIG wrote; they override the lines above them."""
 
 _ANGLES = (210.0, 330.0, 90.0)
 """Degrees at which Klipper's towers stand where the file does not say."""
@@ -25,7 +25,7 @@ _STEPS = 200
 """Full steps a turn where the file does not say."""
 
 _EFFECTOR = 0.02
-"""Distance of the rods' ends from P, m: Klipper knows the towers' less theirs alone."""
+"""Assumed radius of the rods' ends about P, m: Klipper has only the towers' radius less it."""
 
 
 def printer_cfg(text: str, source: str = "printer.cfg") -> configparser.RawConfigParser:

@@ -1,4 +1,4 @@
-"""Sections of Klipper's kinematics `rotary_delta`, as its rotary_delta.py computes it."""
+"""Configuration sections of Klipper's kinematics `rotary_delta`, see its rotary_delta.py."""
 
 from __future__ import annotations
 

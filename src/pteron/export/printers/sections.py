@@ -1,4 +1,4 @@
-"""Sections of a Klipper configuration: their entries, texts and units."""
+"""Sections of a Klipper configuration: entries, number formats, comments and refusals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
 INSTEAD = "use --linuxcnc, or --c for a controller of your own"
-"""Advice at the end of refusals."""
+"""Advice at the end of error messages."""
 
 
 @dataclass(frozen=True)

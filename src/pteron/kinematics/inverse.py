@@ -1,4 +1,4 @@
-"""Inverse kinematics: poses to joint coordinates, link vectors and Jacobians."""
+"""Inverse kinematics: joint coordinates, link vectors and Jacobians from poses."""
 
 from __future__ import annotations
 
