@@ -17,7 +17,7 @@ class SpatialMoments(NamedTuple):
     """The parameters of a body in space, rows (1, K) under each other."""
 
     m: Expression
-    """(1, K)."""
+    """(1, K): mass."""
     h: Expression
     """(3, K): mass times centre of mass, in the body's frame."""
     i: Expression

@@ -20,7 +20,7 @@ PARALLEL_TOLERANCE = 1e-9
 """Sine of the angle under which two unit vectors count as parallel."""
 
 _VANISHING = 1e-9
-"""Singular value of unit vectors below which they do not span another direction."""
+"""Singular value of stacked unit vectors below which they do not span its direction."""
 
 _ROUNDING = 4 * math.ulp(1.0)
 """Difference from length 1 up to which a vector is kept as it is given."""

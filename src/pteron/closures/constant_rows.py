@@ -30,7 +30,7 @@ _ROUNDING = 1e-14
 
 
 class ConstantRows(Closure):
-    """Legs that all have a constant row, under a platform that does or does not turn."""
+    """Legs with constant rows, under a platform that translates in space and may turn about k."""
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:

@@ -23,7 +23,7 @@ from pteron.platforms.motion import PlatformEquations
 
 
 class TurningLoci(Closure):
-    """Three legs, or four, under a platform with one angle, and rows that depend on the pose."""
+    """Three legs, or four, under a platform with one angle, where `ConstantRows` does not fit."""
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)

@@ -17,7 +17,7 @@ from pteron.platforms.motion import PlatformEquations
 
 
 class TwoLoci(Closure):
-    """Two legs under a platform that translates in a plane, one at least a planar leg."""
+    """Two legs under a 2T platform."""
 
     modes = 2
 

@@ -1,4 +1,4 @@
-"""Slotine and Li's adaptive control, whose estimates are base parameters and drives' friction."""
+"""Slotine and Li's adaptive control: it learns base parameters and, if asked, drives' numbers."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ _STEP = 5e-4
 """Step of the integration, s, with which Runge and Kutta's method is exact to some micrometres."""
 
 _LIVELY = 20.0
-"""Acceleration, m/s^2, along all coordinates at once, for which drives without `max_force` do."""
+"""Acceleration, m/s^2, along all coordinates at once, assumed of drives without `max_force`."""
 
 _LEAST = 0.2
 """Least margin of the poses at which episodes start and that are targets."""

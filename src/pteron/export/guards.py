@@ -40,7 +40,7 @@ INPUT_POWER, _DIVISOR, _FACTOR = 6, -20, 30
 """Powers of ten: no input and no factor is larger, no divisor smaller."""
 
 _EXPONENT = "69.0"
-"""Largest exponent of e that is used: its power is below 10^`_FACTOR`."""
+"""Largest exponent that EXP is given: e to it is below 10^`_FACTOR`."""
 
 _ZERO = "0.0"
 """Zero as LREAL."""
