@@ -205,7 +205,6 @@ def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
 
 
 def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
-    """Yield the results of Klipper's probe."""
     offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
     for match in _KLIPPER.finditer(text):
         x, y, word, z = match.groups()

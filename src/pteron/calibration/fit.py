@@ -97,7 +97,6 @@ class Fit:
 
 
 def _kinds(given: Measurements) -> list[str]:
-    """Return the kinds of measurements that there are."""
     parts = given.positions, given.angles, given.heights, given.distances
     return [kind for kind, part in zip(KINDS, parts, strict=True) if not np.isnan(part).all()]
 

@@ -269,7 +269,6 @@ def _undescribed(found: Measurements) -> Iterator[str]:
 
 
 def _unlikely(robot: Manipulator, found: Measurements) -> Iterator[str]:
-    """Yield what is possible in measurements, but unlikely."""
     size = 0.1 * unlikely_length(robot)
     measured = np.concatenate([found.positions, found.angles], axis=-1)
     names = (*robot.joint_names, *_POSITION, *robot.platform.angles)
@@ -303,7 +302,6 @@ def _unlikely(robot: Manipulator, found: Measurements) -> Iterator[str]:
 
 
 def _joined(parts: Sequence[Measurements], sources: Sequence[str]) -> Measurements:
-    """Return the rows of several logs, one log after the other."""
     setup: Setup = joined_setups([part.setup for part in parts], sources)
     if len(parts) == 1:
         return parts[0]

@@ -326,7 +326,6 @@ def _worst(tool: Array, covariance: Array) -> float:
 
 
 def _in_order(poses: Array, home: Array, robot: Manipulator) -> list[int]:
-    """Return an order of poses: always on to the nearest one."""
     left, at, order = list(range(len(poses))), home, []
     size = np.where(robot.platform.angular, 1.0 / max(leg.size for leg in robot.legs), 1.0)
     while left:

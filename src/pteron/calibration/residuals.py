@@ -328,7 +328,6 @@ def _solved(matrix: Array, right: Array) -> Array:
 
 
 def _skew(v: Array) -> Array:
-    """Return the matrices (N, 3, 3) of v x."""
     zero = np.zeros(len(v))
     x, y, z = v.T
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)

@@ -265,7 +265,6 @@ def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, 
 
 
 def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:
-    """Return the angles of a pose by name."""
     pairs = zip(robot.coordinates, pose.tolist(), strict=True)
     return {name: value for name, value in pairs if name in robot.platform.angles}
 

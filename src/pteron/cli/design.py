@@ -96,7 +96,6 @@ def _found(
 
 
 def _write(summary: Summary, folder: Path) -> list[Path]:
-    """Write the results to a folder, and return their paths."""
     from pteron.atomic import write_texts
     from pteron.json_values import json_ready
     from pteron.plots import save_figure

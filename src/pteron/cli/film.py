@@ -83,7 +83,6 @@ def film(
 
 
 def _sides(text: str) -> tuple[int, int]:
-    """Return width and height from a text such as 960x720."""
     parts = text.lower().replace("\u00d7", "x").split("x")
     try:
         width, height = (int(part) for part in parts)

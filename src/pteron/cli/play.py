@@ -77,7 +77,6 @@ def play(
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:
-    """Return a motion by its name, or from a file."""
     from pteron.motion import pick_and_place
     from pteron.playback import Playback
 

@@ -159,7 +159,6 @@ def _overloads(loaded: Manipulator, motion: Motion) -> tuple[str, ...]:
 
 
 def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dict[str, Any]:
-    """Return the figures of a simulation, SI units."""
     import numpy as np
 
     robot, error = found.robot, found.error
@@ -199,7 +198,6 @@ def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dic
 
 
 def _pictures(found: Simulation) -> dict[str, str]:
-    """Return the pictures of a simulation, by their files' names."""
     from pteron.plots import forces_figure, svg_file, tracking_figure
 
     units = ", ".join(dict.fromkeys(leg.joint.force_unit for leg in found.robot.legs))

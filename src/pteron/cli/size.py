@@ -140,7 +140,6 @@ def _data(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> d
 
 
 def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
-    """Return a table with a row for each motor and joint."""
     import polars as pl
 
     rows = [
@@ -225,7 +224,6 @@ def _rotors(found: Sizing) -> list[rich.table.Table]:
 
 
 def _choice(found: Sizing, fits: tuple[Fit, ...]) -> list[rich.table.Table]:
-    """Return the best motors of the list for each joint."""
     if not fits:
         return []
     rows = []

@@ -191,7 +191,6 @@ def deliver(
 
 
 def _show(robot: Manipulator, result: Table, shown: Sequence[str], *, single: bool) -> None:
-    """Print the first rows for a person, with units."""
     known = robot.column_units
     units = [known.get(name, "") for name in shown]
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]

@@ -213,7 +213,6 @@ def _checked_out(out: str | None) -> str:
 
 
 def _warnings(robot: Manipulator) -> list[str]:
-    """Return warnings about the machine's geometry."""
     from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 
     return [str(singular_everywhere(robot))] if is_singular_everywhere(robot) else []

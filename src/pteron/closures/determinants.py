@@ -96,7 +96,6 @@ _Three = tuple[int, ...]
 
 
 def _triples(columns: Sequence[Expression]) -> dict[_Three, Expression]:
-    """Return the triple products of three-vectors, by their places in order."""
     crosses = _crosses(columns)
     return {
         (i, j, k): ca.dot(crosses[i, j], columns[k])
@@ -114,7 +113,6 @@ def _others(three: _Three) -> _Three:
 
 
 def _sign(order: Sequence[int]) -> int:
-    """Return the sign of a permutation."""
     return -1 if sum(a > b for a, b in combinations(order, 2)) % 2 else 1
 
 

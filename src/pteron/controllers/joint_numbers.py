@@ -33,7 +33,6 @@ def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] |
 
 
 def _number(message: str, value: object) -> float:
-    """Return a finite number above zero."""
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):

@@ -131,7 +131,6 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         return list(seed)
 
     def _start(self, chosen: Bools, options: dict[str, Any] | None) -> None:
-        """Start the episodes of chosen environments."""
         generators = [self._generators[i] for i in np.flatnonzero(chosen).tolist()]
         new = self.world.started([rng for rng in generators if rng is not None], options)
         self._state = new if self._state is None else self._state.put(chosen, new)
