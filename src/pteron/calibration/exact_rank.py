@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess, across
-from pteron.calibration.variations import AXIAL, slope_terms
+from pteron.calibration.measurements import position_axes
+from pteron.calibration.variations import AXIAL, slope_matrix, slope_terms
 from pteron.kernels import NoSquareRoot, PrimeField, evaluate, general_program
 from pteron.kernels.geometry_slopes import slope_columns, slopes_program
 from pteron.kernels.programs import bare
@@ -25,7 +26,8 @@ from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.exact_regressor import is_square
 
 Array = NDArray[np.float64]
-Matrix = list[list[int]]
+Residues = NDArray[np.object_]
+"""Numbers modulo a prime, as Python's integers."""
 
 _SPARE = 4
 """Random rows of each kind beyond the number of columns."""
@@ -71,11 +73,11 @@ def exact_rank(
     for _ in range(_PRIMES):
         prime = next(primes)
         drawn = _Drawn(start, blocks, prime, rng)
-        found: Matrix = []
+        found: list[list[int]] = []
         try:
             while len(found) < count + _SPARE * len(kinds):
                 for kind in kinds:
-                    found += drawn.rows(kind)
+                    found += (np.array(drawn.rows(kind)) % prime).tolist()
         except ZeroDivisionError:
             return None, (), 0
         kept, _ = dependencies(found, range(count), prime)
@@ -85,13 +87,13 @@ def exact_rank(
 
 
 class _State(NamedTuple):
-    place: list[int]
-    turned: Matrix
-    twists: Matrix
+    place: Residues
+    turned: Residues
+    twists: Residues
     """(6, m)."""
-    poses: Matrix
+    poses: Residues
     """(m, p): slopes of the pose at given readings."""
-    slopes: Matrix
+    slopes: Residues
     """(6, p): of the twist."""
 
 
@@ -106,9 +108,9 @@ class _Drawn:
         robot = start.robot
         self.geometry = exact_geometry(robot)
         self.vector = self.geometry.within(self.field)
-        self.layout = bare(robot)
+        layout = bare(robot)
         self.count = blocks[-1].where.stop
-        self.deltas = general_program(self.layout, "discriminants").function
+        self.deltas = general_program(layout, "discriminants").function
         whole = slopes_program(robot).function
         self.angular = [leg.joint.unit == "rad" for leg in robot.legs]
         symbols = whole.sx_in()
@@ -118,93 +120,60 @@ class _Drawn:
             for q, round_ in zip(ca.horzsplit(outputs[0]), self.angular, strict=True)
         ]
         self.program = ca.Function("slopes", symbols, [ca.horzcat(*joints), *outputs[1:]])
-        self.columns = slope_columns(self.layout)
-        self.changes = next((b.changes for b in blocks if b.kind == "geometry"), ())
-        self.steps = self._geometry_slopes()
-        axes = self.geometry.axes
-        self.frame = [[n.within(self.field) for n in axis] for axis in axes]
+        self.columns = slope_columns(layout)
+        changes = next((b.changes for b in blocks if b.kind == "geometry"), ())
+        terms, vector = slope_terms(layout, changes), np.array(self.vector, dtype=object)
+        self.steps: Residues = slope_matrix(layout, changes, terms, vector) % prime
+        self.frame: Residues = np.array(
+            [[n.within(self.field) for n in axis] for axis in self.geometry.axes], dtype=object
+        )
 
-    def _geometry_slopes(self) -> list[dict[int, int]]:
-        """Return d(geometry)/d(variation): for each variation its entries by number."""
-        found: list[dict[int, int]] = [{} for _ in self.changes]
-        for term in slope_terms(self.layout, self.changes):
-            value = term.sign
-            for factor in term.factors:
-                value = value * self.vector[factor] % self.prime
-            entries = found[term.variation]
-            entries[term.row] = (entries.get(term.row, 0) + value) % self.prime
-        return found
-
-    def rows(self, kind: RowKind) -> Matrix:
-        """Return the rows of a random pose."""
-        robot, p = self.start.robot, self.prime
+    def rows(self, kind: RowKind) -> list[Residues]:
+        """Return the rows (p,) of a random pose."""
+        robot = self.start.robot
         state = self._state(kind)
         point, moved = self._mark(kind.mark, state)
-        found: Matrix = []
+        found: list[Residues] = []
         own = self.geometry.frame
-        lengths = [name for name in robot.coordinates if name in "xyz"]
-        base = np.eye(3) if len(lengths) in (0, 3) else np.array(robot.platform.frame)
         frame = next((b.where for b in self.blocks if b.kind == "frame"), None)
         if any(kind.positions):
-            rows = [list(row) for row in moved]
+            rows = moved.copy()
             if frame is not None:
-                for k in range(3):
-                    rows[k][frame.start + k] -= 1
-                for k, row in enumerate(_skew(point)):
-                    for j, value in enumerate(row):
-                        rows[k][frame.start + 3 + j] += value
-            found += [
-                self._along(axis, rows)
-                for axis, seen in zip(base @ own.T, kind.positions, strict=True)
-                if seen
-            ]
+                rows[:, frame] += np.hstack([-np.eye(3, dtype=object), _skew(point)])
+            axes = self._numbers(position_axes(robot) @ own.T)
+            found += list(axes[list(kind.positions)] @ rows)
         if any(kind.angles):
-            angular = np.flatnonzero(robot.platform.angular).tolist()
+            angular = np.flatnonzero(robot.platform.angular)
             if frame is None:
-                found += [
-                    state.poses[k] for k, seen in zip(angular, kind.angles, strict=True) if seen
-                ]
+                found += list(state.poses[angular[list(kind.angles)]])
             else:
-                turning = [list(row) for row in state.slopes[3:]]
-                for k in range(3):
-                    turning[k][frame.start + 3 + k] -= 1
-                for k in angular:
-                    weights = [state.twists[3 + j][k] for j in range(3)]
-                    found.append(_combined(weights, turning))
+                turning = state.slopes[3:].copy()
+                turning[:, frame.start + 3 : frame.stop] -= np.eye(3, dtype=object)
+                found += list(state.twists[3:, angular].T @ turning)
         if kind.height:
             plane = self.start.planes[kind.plane]
-            row = self._along(own @ plane[:3], moved)
+            row = self._numbers(own @ plane[:3]) @ moved
             for block in self.blocks:
                 if block.kind == "plane" and block.name == kind.plane:
-                    for k, tilt in enumerate(across(plane[:3]).T):
-                        weights = self._numbers(own @ tilt)
-                        row[block.where.start + k] = sum(
-                            a * b for a, b in zip(weights, point, strict=True)
-                        )
-                    row[block.where.start + 2] = -1
+                    tilts = self._numbers((own @ across(plane[:3])).T)
+                    row[block.where] = [*(tilts @ point), -1]
             found.append(row)
         if kind.distance:
             found.append(self._distance(kind, point, moved))
-        return [[value % p for value in row] for row in found]
+        return found
 
-    def _distance(self, kind: RowKind, point: list[int], moved: Matrix) -> list[int]:
+    def _distance(self, kind: RowKind, point: Residues, moved: Residues) -> Residues:
         if kind.anchor is None:
             other, shifted = self._mark(kind.origin, self._state())
         else:
             # A random place serves: where an anchor is does not matter to a rank.
-            known = self.start.anchors[kind.anchor]
-            other = self._numbers(self.geometry.frame @ known)
-            shifted = [[0] * self.count for _ in range(3)]
+            own = self.geometry.frame
+            other = self._numbers(own @ self.start.anchors[kind.anchor])
+            shifted = np.zeros((3, self.count), dtype=object)
             for block in self.blocks:
                 if block.kind == "anchor" and block.name == kind.anchor:
-                    for k, row in enumerate(self.geometry.frame):
-                        for j, value in enumerate(self._numbers(row)):
-                            shifted[k][block.where.start + j] = value
-        weights = [a - b for a, b in zip(point, other, strict=True)]
-        apart = [
-            [a - b for a, b in zip(x, y, strict=True)] for x, y in zip(moved, shifted, strict=True)
-        ]
-        return _combined(weights, apart)
+                    shifted[:, block.where] = self._numbers(own)
+        return np.asarray((point - other) @ (moved - shifted))
 
     def _state(self, kind: RowKind | None = None) -> _State:
         """Return a random state; where the kind's heights are all the same, one at that height."""
@@ -217,11 +186,15 @@ class _Drawn:
                 squares = evaluate(self.deltas, self.field, [self.vector, pose])[0]
                 if not all(is_square(delta, p) for delta in squares):
                     continue
-                values = evaluate(self.program, self.field, [self.vector, pose])
-                return self._solved(pose, values)
+                return self._solved(pose)
             except (NoSquareRoot, ZeroDivisionError):
                 continue
         raise ZeroDivisionError
+
+    def _values(self, pose: list[int]) -> list[Residues]:
+        """Return the program's outputs at a pose."""
+        values = evaluate(self.program, self.field, [self.vector, pose])
+        return [np.array(value, dtype=object) for value in values]
 
     def _levelled(self, pose: list[int], kind: RowKind) -> list[int]:
         """Return a pose moved along one of its lengths to the height that all rows have."""
@@ -230,136 +203,94 @@ class _Drawn:
         lengths = robot.platform.directions @ plane[:3]
         if not len(lengths):
             return pose
-        own = [name in "xyz" for name in robot.coordinates]
-        along = self._numbers(lengths)
         at = int(np.abs(lengths).argmax())
-        values = evaluate(self.program, self.field, [self.vector, pose])
-        place, turned = values[4], [[values[5][3 * i + j] for j in range(3)] for i in range(3)]
+        along = self._numbers(lengths)[at]
+        *_, place, turned = self._values(pose)[:6]
         if not robot.platform.tilts:
             _, turned, place = self._turning(pose)
-        mark = self._numbers(self.start.marks[kind.mark])
-        arm = [sum(a * b for a, b in zip(row, mark, strict=True)) for row in turned]
-        normal = self._numbers(self.geometry.frame @ plane[:3])
-        point = (a + b for a, b in zip(place, arm, strict=True))
-        height = sum(a * b for a, b in zip(normal, point, strict=True))
+        arm = turned.reshape(3, 3) @ self._numbers(self.start.marks[kind.mark])
+        height = self._numbers(self.geometry.frame @ plane[:3]) @ (place + arm)
         (wanted,) = self._numbers(np.array([plane[3] + (kind.level or 0.0)]))
         moved = list(pose)
-        number = [k for k, length in enumerate(own) if length][at]
-        moved[number] = (pose[number] + (wanted - height) * pow(along[at], -1, p)) % p
+        number = [k for k, name in enumerate(robot.coordinates) if name in "xyz"][at]
+        moved[number] = (pose[number] + (wanted - height) * pow(along, -1, p)) % p
         return moved
 
-    def _solved(self, pose: list[int], values: list[list[int]]) -> _State:
+    def _solved(self, pose: list[int]) -> _State:
         p, robot = self.prime, self.start.robot
         n, m = len(robot.legs), robot.freedom
-        joints, jacobian, slopes, twists, place, axes, *shifts = values
-        width = len(self.columns[0])
-        rates = [[0] * self.count for _ in range(n)]
+        joints, jacobian, slopes, twists, place, turned, *shifts = self._values(pose)
+        against = slopes.reshape(n, -1)
+        rates = np.zeros((n, self.count), dtype=object)
+        geometry = slice(0, 0)
         for block in self.blocks:
-            for k in range(block.where.stop - block.where.start):
-                at = block.where.start + k
-                if block.kind == "geometry":
-                    for i, part in enumerate(self.columns):
-                        rates[i][at] = -sum(
-                            value * slopes[i * width + row - part.start]
-                            for row, value in self.steps[k].items()
-                            if row in part
-                        )
-                elif block.kind == "zeros":
-                    rates[block.legs[k]][at] = 1
-                elif block.kind == "scales":
-                    i = block.legs[k]
-                    rates[i][at] = self.rng.randrange(p) if self.angular[i] else joints[i]
-        square = [[jacobian[i * m + j] for j in range(m)] for i in range(n)]
-        poses = _solve(square, rates, p)
-        if robot.platform.tilts:
-            rows = [twists[k * m : (k + 1) * m] for k in range(6)]
-            turned = [[axes[3 * i + j] for j in range(3)] for i in range(3)]
-        else:
+            if block.kind == "geometry":
+                geometry = block.where
+                for i, part in enumerate(self.columns):
+                    rates[i, geometry] = -against[i] @ self.steps[part.start : part.stop]
+                continue
+            for i, at in zip(block.legs, range(block.where.start, block.where.stop), strict=False):
+                if block.kind == "zeros":
+                    rates[i, at] = 1
+                else:
+                    rates[i, at] = self.rng.randrange(p) if self.angular[i] else joints[i]
+        poses = _solve(jacobian.reshape(n, m), rates, p)
+        rows, turned = twists.reshape(6, -1), turned.reshape(3, -1)
+        if not robot.platform.tilts:
             rows, turned, place = self._turning(pose)
-        moved = [_combined(row, poses) for row in rows]
-        if shifts:
-            for k in range(6):
-                for j, step in enumerate(self.steps):
-                    at = j + next(b.where.start for b in self.blocks if b.kind == "geometry")
-                    moved[k][at] += sum(
-                        value * shifts[0][k * width + row]
-                        for row, value in step.items()
-                        if row < width
-                    )
-        return _State(place, turned, rows, poses, [[v % p for v in row] for row in moved])
+        moved = rows @ poses
+        for shift in shifts:
+            against = shift.reshape(6, -1)
+            moved[:, geometry] += against @ self.steps[: against.shape[1]]
+        return _State(place, turned, rows, poses, moved % p)
 
-    def _turning(self, pose: list[int]) -> tuple[Matrix, Matrix, list[int]]:
+    def _turning(self, pose: list[int]) -> tuple[Residues, Residues, Residues]:
         """Return the twist's rows, the rotation and P of a platform that does not tilt."""
         p, robot = self.prime, self.start.robot
         x0, y0, k = self.frame
-        along = {"x": x0, "y": y0, "z": k}
         names = [name for name in robot.coordinates if name in "xyz"]
-        lengths = [[int(i == j) for j in range(3)] for i in range(3)]
+        lengths = np.eye(3, dtype=object)
         if len(names) < 3:
-            lengths = [along[name] for name in names]
-        rows = [[axis[i] for axis in lengths] for i in range(3)] + [[0] * len(lengths)] * 3
-        place = [
-            sum(c * axis[i] for c, axis in zip(pose, lengths, strict=False)) % p for i in range(3)
-        ]
+            lengths = self.frame[["xyz".index(name) for name in names]]
+        count = len(lengths)
+        rows = np.zeros((6, robot.freedom), dtype=object)
+        rows[:3, :count] = lengths.T
         cos, sin = 1, 0
         if robot.platform.turns:
-            rows = [[*row, 0] for row in rows[:3]] + [
-                [*row, value] for row, value in zip(rows[3:], k, strict=True)
-            ]
+            rows[3:, -1] = k
             t = pose[-1]
             over = pow(1 + t * t, -1, p)
             cos, sin = (1 - t * t) * over % p, 2 * t * over % p
-        x = [(cos * a + sin * b) % p for a, b in zip(x0, y0, strict=True)]
-        y = [(cos * b - sin * a) % p for a, b in zip(x0, y0, strict=True)]
-        return rows, [[x[i], y[i], k[i]] for i in range(3)], place
+        turned = np.stack([cos * x0 + sin * y0, cos * y0 - sin * x0, k], axis=1) % p
+        return rows, turned, np.array(pose[:count], dtype=object) @ lengths % p
 
-    def _mark(self, name: str, state: _State) -> tuple[list[int], Matrix]:
+    def _mark(self, name: str, state: _State) -> tuple[Residues, Residues]:
         """Return a mark's place and its slopes (3, p)."""
-        p = self.prime
-        own = self._numbers(self.start.marks[name])
-        arm = [sum(a * b for a, b in zip(row, own, strict=True)) % p for row in state.turned]
-        moved = [list(row) for row in state.slopes[:3]]
-        for k, weights in enumerate(_skew(arm)):
-            lever = _combined(weights, state.slopes[3:])
-            moved[k] = [(a - b) % p for a, b in zip(moved[k], lever, strict=True)]
+        arm = state.turned @ self._numbers(self.start.marks[name]) % self.prime
+        moved = (state.slopes[:3] - _skew(arm) @ state.slopes[3:]) % self.prime
         for block in self.blocks:
             if block.kind == "mark" and block.name == name:
-                for k, row in enumerate(state.turned):
-                    for j, value in enumerate(row):
-                        moved[k][block.where.start + j] += value
-        return [(a + b) % p for a, b in zip(state.place, arm, strict=True)], moved
+                moved[:, block.where] += state.turned
+        return (state.place + arm) % self.prime, moved
 
-    def _along(self, axis: Array, rows: Matrix) -> list[int]:
-        return _combined(self._numbers(axis), rows)
-
-    def _numbers(self, vector: Array) -> list[int]:
-        return [self.field.number(Fraction(float(v)).limit_denominator(_FINE)) for v in vector]
+    def _numbers(self, values: Array) -> Residues:
+        found = [self.field.number(Fraction(v).limit_denominator(_FINE)) for v in values.flat]
+        return np.array(found, dtype=object).reshape(values.shape)
 
 
-def _combined(weights: Sequence[int], rows: Matrix) -> list[int]:
-    return [
-        sum(w * row[k] for w, row in zip(weights, rows, strict=True)) for k in range(len(rows[0]))
-    ]
-
-
-def _skew(v: Sequence[int]) -> Matrix:
+def _skew(v: Residues) -> Residues:
     x, y, z = v
-    return [[0, -z, y], [z, 0, -x], [-y, x, 0]]
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], dtype=object)
 
 
-def _solve(square: Matrix, right: Matrix, prime: int) -> Matrix:
+def _solve(square: Residues, right: Residues, prime: int) -> Residues:
     """Return square^-1 right modulo a prime; ZeroDivisionError where it is singular."""
-    n = len(square)
-    work = [[*row, *more] for row, more in zip(square, right, strict=True)]
-    for k in range(n):
-        pivot = next((i for i in range(k, n) if work[i][k] % prime), None)
-        if pivot is None:
-            raise ZeroDivisionError
-        work[k], work[pivot] = work[pivot], work[k]
-        inverse = pow(work[k][k], -1, prime)
-        work[k] = [value * inverse % prime for value in work[k]]
-        for i in range(n):
-            if i != k and work[i][k]:
-                factor = work[i][k]
-                work[i] = [(a - factor * b) % prime for a, b in zip(work[i], work[k], strict=True)]
-    return [row[n:] for row in work]
+    n, whole = len(square), np.hstack([square, right])
+    kept, given = dependencies(whole.tolist(), range(whole.shape[1]), prime)
+    if kept != list(range(n)):
+        raise ZeroDivisionError
+    found = np.zeros(right.shape, dtype=object)
+    for column, parts in given.items():
+        for k, value in parts.items():
+            found[k, column - n] = value
+    return found

@@ -84,6 +84,12 @@ def length_columns(robot: Manipulator) -> list[int]:
     return ["xyz".index(name) for name in robot.coordinates if name in "xyz"]
 
 
+def position_axes(robot: Manipulator) -> Array:
+    """Return the axes (3, 3), in rows, along which positions are measured, in the base frame."""
+    whole = len(length_columns(robot)) in (0, 3)
+    return np.eye(3) if whole else np.array(robot.platform.frame)
+
+
 @dataclass(frozen=True)
 class Measurements:
     """N rows of measurements.

@@ -240,8 +240,8 @@ def _first_direction(leg: LegKind) -> str:
 def slope_matrix(
     robot: Manipulator, changes: Sequence[Variation], terms: Sequence[Term], geometry: Array
 ) -> Array:
-    """Return d(geometry)/d(variations) of a machine in floating point."""
-    matrix = np.zeros((len(geometry), len(changes)))
+    """Return d(geometry)/d(variations) of a machine, in floats or in the numbers of a field."""
+    matrix = np.zeros((len(geometry), len(changes)), dtype=geometry.dtype)
     places, _ = _places(robot)
     for k, change in enumerate(changes):
         if change.group in AXIAL:
