@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.calibration.fit import Fit, Fitter
-from pteron.calibration.guess import Block, Guess
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import raw_fault
 from pteron.calibration.residual_faults import residual_faults
@@ -123,7 +123,7 @@ def calibrate(
         robot,
         calibrated(fit.guess),
         values_of(start, fit, blocks),
-        {kind: value for kind, value in fit.noise.items() if _has(measurements, kind)},
+        {kind: value for kind, value in fit.noise.items() if kind in measurements.kinds},
         shown,
         judged,
         findings,
@@ -141,26 +141,12 @@ def _check(joints: int, given: Measurements) -> None:
     if not np.isfinite(given.readings).all():
         row = int(np.argwhere(~np.isfinite(given.readings))[0, 0])
         raise DataError(f"{given.places[row]}: a reading is missing or not finite")
-    parts = given.positions, given.angles, given.heights[:, None], given.distances[:, None]
-    if all(np.isnan(part).all() for part in parts):
+    if not given.kinds:
         raise DataError("measurements: nothing was measured; give a position, an angle, a height")
 
 
-def _has(given: Measurements, kind: str) -> bool:
-    columns = {
-        "position": given.positions,
-        "angle": given.angles,
-        "height": given.heights,
-        "distance": given.distances,
-    }
-    return not np.isnan(columns[kind]).all()
-
-
 def _enough(given: Measurements, blocks: Sequence[Block]) -> bool:
-    counted = sum(
-        int((~np.isnan(part)).sum())
-        for part in (given.positions, given.angles, given.heights, given.distances)
-    )
+    counted = sum(int((~np.isnan(values)).sum()) for values in given.parts.values())
     return counted >= _PER_VALUE * blocks[-1].where.stop and len(given) >= 2 * _EVERY
 
 
@@ -176,7 +162,7 @@ def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurem
     errors: dict[str, dict[str, float]] = {"before": {}, "after": {}, "expected": {}}
     spread = np.einsum("nkp,pq,nkq->nk", new.slopes, fit.covariance, new.slopes, optimize=True)
     for kind, noise in fit.noise.items():
-        here = new.measured & (before.kind_of == kind)
+        here = new.measured & (other.kind_of == kind)
         if here.any():
             for name, squares in (
                 ("before", old.residuals**2),
@@ -190,14 +176,12 @@ def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurem
 def _scaled_slopes(start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements) -> Array:
     """Return slopes at the measured poses on the machine as drawn, by noise and tolerance."""
     slopes = MachineSlopes(start.robot, blocks)
-    chosen = np.unique(np.linspace(0, len(given) - 1, min(len(given), _RANK_ROWS)).astype(int))
+    chosen = evenly(len(given), _RANK_ROWS)
     poses = slopes.poses(start, start.joints(given.readings), fit.poses)
     chosen = chosen[np.isfinite(poses[chosen]).all(axis=1)]
     at = slopes.rows(start, given, poses, chosen)
-    k = given.angles.shape[1]
-    kinds = [*["position"] * 3, *["angle"] * k, "height", "distance"]
-    sizes = np.array([fit.noise[kind] for kind in kinds])
-    tolerances = np.array([u.tolerance for block in blocks for u in block.unknowns])
+    sizes = np.array([fit.noise[kind] for kind in given.kind_of])
+    tolerances = tolerances_of(blocks)
     tolerances[~np.isfinite(tolerances)] = 1.0
     more = np.sqrt(len(given) / max(len(chosen), 1))
     flat = (more * at.slopes / sizes[:, None] * tolerances).reshape(-1, len(tolerances))

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pteron.calibration.measurements import TOOL, Measurements
+from pteron.calibration.measurements import Measurements
 from pteron.errors import DataError, shown
 from pteron.export.linuxcnc import linuxcnc_axes
 from pteron.export.printers.printer_cfg import millimetres_a_step, printer_cfg, setting
@@ -23,8 +23,6 @@ from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import to_readings
 from pteron.toml import told
-
-Array = NDArray[np.float64]
 
 _TABLES = (".csv", ".parquet")
 _LARGEST = 1 << 28
@@ -145,13 +143,12 @@ def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
     if faults:
         raise DataError(told(faults))
     keys, counts, heights, distances, origins = zip(*rows, strict=True)
-    return _measured(
-        robot,
-        to_readings(robot, np.array(ends) + away * np.array(counts)),
-        [f"{source}, {key}" for key in keys],
-        heights=1e-3 * np.array(heights),
+    readings = to_readings(robot, np.array(ends) + away * np.array(counts))
+    return replace(
+        Measurements.of(robot, readings, heights=1e-3 * np.array(heights)),
         distances=1e-3 * np.array(distances),
         origins=np.array(origins),
+        places=tuple(f"{source}, {key}" for key in keys),
     )
 
 
@@ -279,30 +276,5 @@ def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measureme
             )
         )
     heights = 1e-3 * np.array([one.height for one in touched])
-    places = [one.place for one in touched]
-    return _measured(robot, to_readings(robot, joints), places, heights=heights)
-
-
-def _measured(
-    robot: Manipulator,
-    readings: Array,
-    places: Sequence[str],
-    *,
-    heights: Array,
-    distances: Array | None = None,
-    origins: NDArray[np.int64] | None = None,
-) -> Measurements:
-    n = len(readings)
-    unnamed = (TOOL,) * n
-    return Measurements(
-        readings,
-        np.full((n, 3), np.nan),
-        np.full((n, len(robot.platform.angles)), np.nan),
-        heights,
-        np.full(n, np.nan) if distances is None else distances,
-        np.full(n, -1) if origins is None else origins,
-        unnamed,
-        unnamed,
-        unnamed,
-        tuple(places),
-    )
+    found = Measurements.of(robot, to_readings(robot, joints), heights=heights)
+    return replace(found, places=tuple(one.place for one in touched))

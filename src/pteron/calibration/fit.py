@@ -13,17 +13,14 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.calibration.guess import Block, Guess
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.measurements import KINDS, Measurements
 from pteron.calibration.residuals import MachineSlopes, Rows
 from pteron.errors import DataError
 
 Array = NDArray[np.float64]
 
-KINDS = ("position", "angle", "height", "distance")
-"""Kinds of measurements, each with a noise of its own."""
-
-_START = {"position": 1e-4, "angle": 1e-4, "height": 1e-4, "distance": 1e-4}
+_START = 1e-4
 """Noise that is assumed before any is found, m and rad."""
 
 _FLOOR = 1e-7
@@ -96,11 +93,6 @@ class Fit:
     steps: int
 
 
-def _kinds(given: Measurements) -> list[str]:
-    parts = given.positions, given.angles, given.heights, given.distances
-    return [kind for kind, part in zip(KINDS, parts, strict=True) if not np.isnan(part).all()]
-
-
 @dataclass
 class _Sums:
     """The normal equations of a guess."""
@@ -134,12 +126,9 @@ class Fitter:
     ) -> None:
         self.given, self.blocks, self.begin = given, blocks, guess
         self.slopes = MachineSlopes(guess.robot, blocks)
-        tolerances = [u.tolerance for block in blocks for u in block.unknowns]
-        with np.errstate(divide="ignore"):
-            self.prior = 1.0 / np.array(tolerances) ** 2
+        self.prior = 1.0 / tolerances_of(blocks) ** 2
         self.begin_poses = poses
-        k = given.angles.shape[1]
-        self.kind_of = np.array([*["position"] * 3, *["angle"] * k, "height", "distance"])
+        self.kind_of = given.kind_of
         self.readings_noise = given.setup.noise.get("readings", 0.0)
 
     def run(self, before: Fit | None = None) -> Fit:
@@ -151,9 +140,8 @@ class Fitter:
             If it does not settle, or the measurements leave something without a tolerance open.
         """
         setup = self.given.setup.noise
-        noise = {kind: max(setup.get(kind, _START[kind]), _FLOOR) for kind in KINDS}
-        seen = _kinds(self.given)
-        sought = [kind for kind in seen if kind not in setup]
+        noise = {kind: max(setup.get(kind, _START), _FLOOR) for kind in KINDS}
+        sought = [kind for kind in self.given.kinds if kind not in setup]
         kept = np.ones(len(self.given), dtype=bool)
         guess, poses = self.begin, self.begin_poses
         total = np.zeros(len(self.prior))

@@ -87,6 +87,16 @@ class Guess:
         """Return the joint coordinates (N, n) of readings."""
         return self.zeros + self.scales * readings
 
+    def readings(self, joints: Array) -> Array:
+        """Return the readings (N, n) at joint coordinates."""
+        return (joints - self.zeros) / self.scales
+
+    def points(self, marks: Sequence[str], poses: Array) -> Array:
+        """Return where each row's mark is (N, 3) at its pose, in the base frame, m."""
+        place, axes = self.robot.platform.at(poses)
+        own = np.stack([self.marks[name] for name in marks])
+        return np.asarray(place + np.einsum("nij,ni->nj", axes, own))
+
     def moved(self, blocks: Sequence[Block], step: Array) -> Guess:
         """Return the guess after a step in all unknowns."""
         guess = self
@@ -127,6 +137,16 @@ class Block:
             return replace(guess, planes={**guess.planes, self.name: plane})
         turn = Rotation.from_rotvec(step[3:]).as_matrix() @ guess.turn
         return replace(guess, turn=turn, shift=guess.shift + step[:3])
+
+
+def tolerances_of(blocks: Sequence[Block]) -> Array:
+    """Return the tolerances (p,) of all unknowns; inf where there is none."""
+    return np.array([unknown.tolerance for block in blocks for unknown in block.unknowns])
+
+
+def variances(slopes: Array, covariance: Array) -> Array:
+    """Return the variances (N,) of vectors with slopes (N, k, p), for a covariance (p, p)."""
+    return np.asarray(np.einsum("nip,pq,niq->n", slopes, covariance, slopes, optimize=True))
 
 
 def across(normal: Array) -> Array:

@@ -7,13 +7,17 @@ NaN. `Setup` has what they refer to: marks on the platform, planes, anchors, the
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.bodies.vectors import Vector
 from pteron.manipulator import Manipulator
+
+KINDS = ("position", "angle", "height", "distance")
+"""Kinds of measurements, each with a noise of its own."""
 
 TOOL = ""
 """Name of the mark or plane of a row that names none: the tool, and the plane z = 0."""
@@ -77,6 +81,11 @@ class Setup:
     planes: Mapping[str, Plane] = field(default_factory=dict)
     anchors: Mapping[str, Place] = field(default_factory=dict)
     frame_known: bool = True
+
+
+def evenly(count: int, most: int) -> NDArray[np.int64]:
+    """Return the numbers of at most so many rows, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
 def length_columns(robot: Manipulator) -> list[int]:
@@ -170,22 +179,37 @@ class Measurements:
             at = np.asarray(positions, dtype=float)
         unnamed = (TOOL,) * n
         return cls(
-            read,
-            at,
-            given[:, angular],
-            np.full(n, np.nan) if heights is None else np.asarray(heights, dtype=float),
-            np.full(n, np.nan),
-            np.full(n, -1),
-            unnamed,
-            unnamed,
-            unnamed,
-            tuple(f"row {i + 1}" for i in range(n)),
-            None,
-            setup or Setup(),
+            readings=read,
+            positions=at,
+            angles=given[:, angular],
+            heights=np.full(n, np.nan) if heights is None else np.asarray(heights, dtype=float),
+            distances=np.full(n, np.nan),
+            origins=np.full(n, -1),
+            marks=unnamed,
+            planes=unnamed,
+            anchors=unnamed,
+            places=tuple(f"row {i + 1}" for i in range(n)),
+            setup=setup or Setup(),
         )
 
     def __len__(self) -> int:
         return len(self.readings)
+
+    @property
+    def parts(self) -> dict[str, Array]:
+        """All that was measured, (N, K) in all, by kind; NaN where not."""
+        values = self.positions, self.angles, self.heights[:, None], self.distances[:, None]
+        return dict(zip(KINDS, values, strict=True))
+
+    @property
+    def kinds(self) -> list[str]:
+        """The kinds of measurements that there are."""
+        return [kind for kind, values in self.parts.items() if not np.isnan(values).all()]
+
+    @property
+    def kind_of(self) -> NDArray[np.str_]:
+        """The kind of each of a row's numbers (K,)."""
+        return np.repeat(KINDS, [values.shape[1] for values in self.parts.values()])
 
     def rows(self, chosen: NDArray[np.bool_]) -> Measurements:
         """Return rows chosen by a mask, and those that a distance of theirs is measured from."""
@@ -193,25 +217,13 @@ class Measurements:
         kept[self.origins[chosen & (self.origins >= 0)]] = True
         number = np.cumsum(kept) - 1
         origins = np.where(self.origins[kept] >= 0, number[self.origins[kept]], -1)
-        at = np.flatnonzero(kept)
-        unasked = ~chosen[kept]
-
-        def measured(values: Array) -> Array:
-            part = values[kept].copy()
-            part[unasked] = np.nan
-            return part
-
-        return Measurements(
-            self.readings[kept],
-            measured(self.positions),
-            measured(self.angles),
-            measured(self.heights),
-            measured(self.distances),
-            origins,
-            tuple(self.marks[i] for i in at),
-            tuple(self.planes[i] for i in at),
-            tuple(self.anchors[i] for i in at),
-            tuple(self.places[i] for i in at),
-            None if self.times is None else self.times[kept],
-            self.setup,
-        )
+        changed: dict[str, Any] = {
+            name: tuple(np.array(getattr(self, name), dtype=object)[kept])
+            for name in ("marks", "planes", "anchors", "places")
+        }
+        for name in ("positions", "angles", "heights", "distances"):
+            changed[name] = getattr(self, name)[kept]
+            changed[name][~chosen[kept]] = np.nan
+        times = None if self.times is None else self.times[kept]
+        readings = self.readings[kept]
+        return replace(self, readings=readings, origins=origins, times=times, **changed)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.calibration.exact_rank import RowKind, exact_rank
-from pteron.calibration.guess import Block, Guess
+from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.unseen import told, unseen_combinations
 
@@ -111,9 +111,9 @@ def observability_of(
     }
     kinds = tuple(sorted({_kind(given, i, levels) for i in range(len(given))}, key=repr))
     rank, primes, rows = exact_rank(start, blocks, kinds, seed)
-    unknowns = [unknown for block in blocks for unknown in block.unknowns]
-    tolerances = np.array([u.tolerance if np.isfinite(u.tolerance) else 1.0 for u in unknowns])
-    names = [unknown.name for unknown in unknowns]
+    tolerances = tolerances_of(blocks)
+    tolerances[~np.isfinite(tolerances)] = 1.0
+    names = [unknown.name for block in blocks for unknown in block.unknowns]
     weak = [
         f"{told(axes[k] * tolerances, names)} (the tolerance says {1.0 / sizes[k]:.2g} times more)"
         for k in reversed(range(here))

@@ -12,8 +12,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Guess
-from pteron.calibration.measurements import TOOL, Measurements, Place, Plane, Setup
+from pteron.calibration.guess import Guess, tolerances_of, variances
+from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, Plane, Setup
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
 from pteron.errors import DataError, ModelError
@@ -54,7 +54,7 @@ _RISES = 1e-6
 _ABOVE = 0.005
 """Height above a plane to which a probe is lifted between two places, m."""
 
-_NOISE = {"position": 2e-5, "angle": 2e-5, "height": 2e-5, "distance": 2e-5}
+_NOISE = dict.fromkeys(KINDS, 2e-5)
 """Noise that is expected where nobody says it, m and rad."""
 
 
@@ -169,27 +169,21 @@ def plan(
     slopes = MachineSlopes(robot, blocks)
     rows = slopes.rows(start, given, poses, np.arange(len(poses)))
     noise = {**_NOISE, **setup.noise}
-    k = given.angles.shape[1]
-    sizes = [noise[kind] for kind in (*["position"] * 3, *["angle"] * k, "height", "distance")]
-    seen = rows.slopes / np.array(sizes)[:, None]
+    seen = rows.slopes / np.array([noise[kind] for kind in given.kind_of])[:, None]
     used = rows.measured.any(axis=0)
     tool = slopes.pose_slopes(start, given, poses)[1]
-    tolerances = np.array([u.tolerance for block in blocks for u in block.unknowns])
+    tolerances = tolerances_of(blocks)
     if not np.isfinite(tolerances).all():
         raise DataError("prior: a plan needs finite tolerances; give no inf")
     chosen, covariance = _chosen(seen[:, used], tool, tolerances, count, criterion)
     order = _in_order(poses[chosen], home, robot)
     picked = poses[chosen][order]
-    joints = slopes.joints(start, picked)
-    return Plan(
-        robot,
-        measure,
-        picked,
-        (joints - start.zeros) / start.scales,
-        region,
-        _worst(tool, np.diag(tolerances**2)),
-        _worst(tool, covariance),
+    before, after = (
+        float(np.sqrt(variances(tool, known).max()))
+        for known in (np.diag(tolerances**2), covariance)
     )
+    readings = start.readings(slopes.joints(start, picked))
+    return Plan(robot, measure, picked, readings, region, before, after)
 
 
 def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
@@ -256,8 +250,7 @@ def _on_plane(robot: Manipulator, home: Array, setup: Setup) -> tuple[Array, Set
         raise DataError(f"measure: the heights of a {robot.platform.motion} platform do not vary")
     at = _upright(robot)
     tool = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
-    place, axes = robot.platform.at(home[None])
-    point = place[0] + axes[0].T @ tool.marks[TOOL]
+    point = tool.points([TOOL], home[None])[0]
     moved = home.copy()
     if setup.planes:
         plane = next(iter(setup.planes.values()))
@@ -275,11 +268,8 @@ def _imagined(
 ) -> Measurements:
     """Return the measurements that a faultless machine would give at poses."""
     n = len(poses)
-    joints = MachineSlopes(robot, ()).joints(drawn, poses)
-    readings = (joints - drawn.zeros) / drawn.scales
-    name = next(iter(setup.planes), TOOL), next(iter(setup.anchors), TOOL)
+    readings = drawn.readings(MachineSlopes(robot, ()).joints(drawn, poses))
     given = Measurements.of(robot, readings, setup=setup)
-    ones = np.ones(n)
     if measure == "positions":
         return replace(given, positions=np.zeros((n, 3)))
     if measure == "poses":
@@ -290,8 +280,8 @@ def _imagined(
             angles=poses[:, robot.platform.angular],
         )
     if measure == "heights":
-        return replace(given, heights=0.0 * ones, planes=(name[0],) * n)
-    return replace(given, distances=ones, anchors=(name[1],) * n)
+        return replace(given, heights=np.zeros(n), planes=(next(iter(setup.planes), TOOL),) * n)
+    return replace(given, distances=np.ones(n), anchors=(next(iter(setup.anchors), TOOL),) * n)
 
 
 def _chosen(
@@ -308,21 +298,13 @@ def _chosen(
     for _ in range(count):
         spread = np.einsum("nkp,pq->nkq", seen, covariance)
         grown = np.einsum("nkp,njp->nkj", spread, seen) + np.eye(width)
-        if criterion == "D":
-            gain = np.linalg.slogdet(grown)[1]
-        else:
-            gain = np.einsum("nip,pq,niq->n", tool, covariance, tool, optimize=True)
+        gain = np.linalg.slogdet(grown)[1] if criterion == "D" else variances(tool, covariance)
         gain[chosen] = -np.inf
         best = int(gain.argmax())
         chosen.append(best)
         push = np.linalg.solve(grown[best], spread[best])
         covariance = covariance - spread[best].T @ push
     return chosen, covariance
-
-
-def _worst(tool: Array, covariance: Array) -> float:
-    squares = np.einsum("nip,pq,niq->n", tool, covariance, tool, optimize=True)
-    return float(np.sqrt(squares.max()))
 
 
 def _in_order(poses: Array, home: Array, robot: Manipulator) -> list[int]:

@@ -14,8 +14,8 @@ from itertools import combinations, permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Block, Guess
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.start import placed, starting_poses
 from pteron.errors import DataError, UnlikelyValue
@@ -45,7 +45,7 @@ def raw_fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) 
 
 def _fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> str | None:
     some = np.zeros(len(given), dtype=bool)
-    some[np.unique(np.linspace(0, len(given) - 1, min(len(given), _ROWS)).astype(int))] = True
+    some[evenly(len(given), _ROWS)] = True
     rows = given.rows(some)
     now = _misfit(rows, blocks, robot_guess)
     if now < _FAR:
@@ -70,8 +70,7 @@ def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
     start = placed(guess, rows, poses)
     slopes = MachineSlopes(guess.robot, blocks)
     at = slopes.rows(start, rows, poses, np.arange(len(rows)))
-    tolerances = np.array([min(u.tolerance, 1.0) for block in blocks for u in block.unknowns])
-    scaled = at.slopes * tolerances
+    scaled = at.slopes * np.minimum(tolerances_of(blocks), 1.0)
     width = at.residuals.shape[1]
     covariance = scaled @ np.swapaxes(scaled, -1, -2) + _NOISE**2 * np.eye(width)
     whitened = np.linalg.solve(covariance, at.residuals[..., None])[..., 0]

@@ -15,7 +15,7 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, Unknown
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.result import Finding
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def _scores(
     count = blocks[-1].where.stop
     whole = _extended(blocks, given, joints)
     fitter = Fitter(given, whole, start, fit.poses)
-    chosen = np.unique(np.linspace(0, len(given) - 1, min(len(given), _ROWS)).astype(int))
+    chosen = evenly(len(given), _ROWS)
     at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
     r, slopes = fitter.whitened(at, fit.guess, fit.noise)
     own, more = slopes[..., :count], slopes[..., count:]
@@ -175,7 +175,7 @@ def _bad_leg(
     names = start.robot.joint_names
     fitter = Fitter(given, blocks, start, fit.poses)
     kept = np.flatnonzero(fit.kept)
-    chosen = kept[np.unique(np.linspace(0, len(kept) - 1, min(len(kept), _ROWS)).astype(int))]
+    chosen = kept[evenly(len(kept), _ROWS)]
     at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
     sizes = np.array([fit.noise[kind] for kind in fitter.kind_of])
     r, columns = at.residuals / sizes, at.by_reading / sizes[:, None]

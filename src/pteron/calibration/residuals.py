@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.calibration.guess import Block, Guess, across
-from pteron.calibration.measurements import Measurements, length_columns
+from pteron.calibration.measurements import Measurements, length_columns, position_axes
 from pteron.calibration.variations import slope_matrix, slope_terms
 from pteron.equations.machine import numbers
 from pteron.kernels.geometry_slopes import slope_columns, slopes_kernel
@@ -67,11 +67,11 @@ class MachineSlopes:
         self._changes = next((b.changes for b in blocks if b.kind == "geometry"), ())
         self._terms = slope_terms(robot, self._changes)
         self._owner = np.array([change.leg for change in self._changes], dtype=int)
-        platform = robot.platform
         self.size = max(leg.size for leg in robot.legs) or 1.0
-        self._angular = np.flatnonzero(platform.angular)
+        self._angular = np.flatnonzero(robot.platform.angular)
         self._lengths = length_columns(robot)
-        self._axes = np.eye(3) if len(self._lengths) in (0, 3) else np.array(platform.frame)
+        self._axes = position_axes(robot)
+        self._frame = next((b.where for b in blocks if b.kind == "frame"), None)
 
     def poses(self, guess: Guess, joints: Array, start: Array) -> Array:
         """Return the poses (N, m) of joint coordinates by Newton's steps; NaN where they fail."""
@@ -100,11 +100,11 @@ class MachineSlopes:
     def pose_slopes(self, guess: Guess, given: Measurements, poses: Array) -> tuple[Array, Array]:
         """Return the slopes of poses at given joints (N, m, p), and of their marks (N, 3, p)."""
         chosen = np.arange(len(poses))
-        place, turned, slopes, by_joint = self._platform(guess, given, poses, chosen)
-        twist = slopes[:, :6], by_joint[:, :6]
-        _, moved, _ = self._marks(guess, given, chosen, place, turned, *twist)
+        place, turned, slopes = self._platform(guess, given, poses, chosen)
+        _, moved = self._marks(guess, given, chosen, place, turned, slopes)
         lengths = np.eye(3) if len(self._lengths) == 3 else self._axes[self._lengths]
-        return np.concatenate([lengths @ slopes[:, :3], slopes[:, 6:]], axis=1), moved
+        whole = np.concatenate([lengths @ slopes[:, :3], slopes[:, 6:]], axis=1)
+        return whole[..., : self.count], moved[..., : self.count]
 
     def _wrapped(self, missed: Array) -> Array:
         turned = (missed + np.pi) % (2.0 * np.pi) - np.pi
@@ -112,70 +112,55 @@ class MachineSlopes:
 
     def rows(self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers) -> Rows:
         """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
-        robot, setup = guess.robot, given.setup
-        place, turned, slopes, by_joint = self._platform(guess, given, poses, chosen)
-        twist, by_twist = slopes[:, :6], by_joint[:, :6]
-        angular = self._angular
-        n, k = len(chosen), len(angular)
+        n, k = len(chosen), len(self._angular)
         residuals = np.zeros((n, 5 + k))
-        measured = np.zeros((n, 5 + k), dtype=bool)
-        rows = np.zeros((n, 5 + k, self.count))
-        pushed = np.zeros((n, 5 + k, len(robot.legs)))
-        point, moved, by = self._marks(guess, given, chosen, place, turned, twist, by_twist)
+        measured = ~np.isnan(np.hstack([part[chosen] for part in given.parts.values()]))
+        # Against all unknowns, and behind them against the joint coordinates
+        slopes = np.zeros((n, 5 + k, self.count + len(guess.robot.legs)))
+        place, turned, moves = self._platform(guess, given, poses, chosen)
+        point, moved = self._marks(guess, given, chosen, place, turned, moves)
 
-        seen = ~np.isnan(given.positions[chosen])
-        if seen.any():
-            full = np.where(seen, given.positions[chosen], 0.0) @ self._axes
-            if not setup.frame_known:
-                # In the instrument's frame: turn' (p - shift).
-                local = (point - guess.shift) @ guess.turn
-                residuals[:, :3] = (local - full) @ self._axes.T
-                moved_here = np.einsum("ji,njk->nik", guess.turn, moved)
-                frame = next(b for b in self.blocks if b.kind == "frame").where
-                moved_here[:, :, frame.start : frame.start + 3] -= guess.turn.T
-                arms = point - guess.shift
-                moved_here[:, :, frame.start + 3 : frame.stop] += guess.turn.T @ _skew(arms)
-                rows[:, :3] = np.einsum("ij,njk->nik", self._axes, moved_here)
-                pushed[:, :3] = self._axes @ (guess.turn.T @ by)
-            else:
-                residuals[:, :3] = (point - full) @ self._axes.T
-                rows[:, :3] = self._axes @ moved
-                pushed[:, :3] = self._axes @ by
-            measured[:, :3] = seen
-        if k and not np.isnan(given.angles[chosen]).all():
-            rows[:, 3 : 3 + k], pushed[:, 3 : 3 + k] = slopes[:, 6:], by_joint[:, 6:]
-            self._angles(guess, given, poses, chosen, (residuals, rows, measured))
-        over = ~np.isnan(given.heights[chosen])
-        if over.any():
-            at = 3 + k
+        if measured[:, :3].any():
+            # In the instrument's frame: turn' (p - shift).
+            arms = point - guess.shift
+            full = np.where(measured[:, :3], given.positions[chosen], 0.0) @ self._axes
+            residuals[:, :3] = (arms @ guess.turn - full) @ self._axes.T
+            local = guess.turn.T @ moved
+            if (frame := self._frame) is not None:
+                local[:, :, frame.start : frame.start + 3] -= guess.turn.T
+                local[:, :, frame.start + 3 : frame.stop] += guess.turn.T @ _skew(arms)
+            slopes[:, :3] = self._axes @ local
+        if measured[:, 3 : 3 + k].any():
+            slopes[:, 3 : 3 + k] = moves[:, 6:]
+            self._angles(guess, given, poses, chosen, residuals, slopes)
+        if measured[:, -2].any():
             planes = np.stack([guess.planes[given.planes[i]] for i in chosen])
             normals = planes[:, :3]
-            residuals[:, at] = _dot(normals, point) - planes[:, 3] - given.heights[chosen]
-            rows[:, at] = np.einsum("ni,nik->nk", normals, moved)
-            pushed[:, at] = np.einsum("ni,nik->nk", normals, by)
+            residuals[:, -2] = _dot(normals, point) - planes[:, 3] - given.heights[chosen]
+            slopes[:, -2] = np.einsum("ni,nik->nk", normals, moved)
             for block in self.blocks:
                 if block.kind == "plane":
                     here = np.array([given.planes[i] == block.name for i in chosen])
                     tilt = across(guess.planes[block.name][:3])
-                    rows[here, at, block.where] += np.column_stack(
+                    slopes[here, -2, block.where] += np.column_stack(
                         [point[here] @ tilt, -np.ones(here.sum())]
                     )
-            measured[:, at] = over
-        apart = ~np.isnan(given.distances[chosen])
-        if apart.any():
-            self._distances(
-                guess, given, poses, chosen, (point, moved, by), (residuals, rows, pushed, measured)
-            )
-        for part in (residuals, rows, pushed):
-            part[~measured] = 0.0
-        return Rows(residuals, rows, pushed, measured)
+        if measured[:, -1].any():
+            apart, drifted = self._apart(guess, given, poses, chosen, point, moved)
+            length = np.linalg.norm(apart, axis=-1)
+            along = apart / np.where(length > 0.0, length, 1.0)[:, None]
+            residuals[:, -1] = length - given.distances[chosen]
+            slopes[:, -1] = np.einsum("ni,nik->nk", along, drifted)
+        residuals[~measured], slopes[~measured] = 0.0, 0.0
+        return Rows(residuals, slopes[..., : self.count], slopes[..., self.count :], measured)
 
     def _platform(
         self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers
-    ) -> tuple[Array, Array, Array, Array]:
-        """Return P, its axes' matrix, and slopes (N, 6 + k, p) and (N, 6 + k, n).
+    ) -> tuple[Array, Array, Array]:
+        """Return P, its axes' matrix, and slopes (N, 6 + k, p + n).
 
-        They are those of the platform's twist and of the pose's angles.
+        They are those of the platform's twist and of the pose's angles, against all unknowns and
+        the joint coordinates.
         """
         robot = guess.robot
         geometry = np.array(numbers(robot))
@@ -217,7 +202,7 @@ class MachineSlopes:
                 if block.kind == "scales":
                     found = found * given.readings[chosen][:, None, list(block.legs)]
                 slopes[:, :, block.where] = found
-        return place, turned, slopes, by_joint
+        return place, turned, np.concatenate([slopes, by_joint], axis=-1)
 
     def _marks(
         self,
@@ -227,18 +212,16 @@ class MachineSlopes:
         place: Array,
         turned: Array,
         slopes: Array,
-        by_joint: Array,
-    ) -> tuple[Array, Array, Array]:
+    ) -> tuple[Array, Array]:
         """Return the rows' marks (N, 3) in the base frame and their slopes."""
         own = np.stack([guess.marks[given.marks[i]] for i in chosen])
         arms = np.einsum("nij,nj->ni", turned, own)
-        cross = _skew(arms)
-        moved = slopes[:, :3] - cross @ slopes[:, 3:]
+        moved = slopes[:, :3] - _skew(arms) @ slopes[:, 3:6]
         for block in self.blocks:
             if block.kind == "mark":
                 here = np.array([given.marks[i] == block.name for i in chosen])
                 moved[here, :, block.where] += turned[here]
-        return place + arms, moved, by_joint[:, :3] - cross @ by_joint[:, 3:]
+        return place + arms, moved
 
     def _angles(
         self,
@@ -246,16 +229,14 @@ class MachineSlopes:
         given: Measurements,
         poses: Array,
         chosen: Numbers,
-        out: tuple[Array, Array, Array],
+        residuals: Array,
+        slopes: Array,
     ) -> None:
         """Fill in the residuals of angles, and their slopes against an unknown frame."""
-        residuals, rows, measured = out
         angular, at = self._angular, poses[chosen]
-        seen = ~np.isnan(given.angles[chosen])
-        read = np.where(seen, given.angles[chosen], at[:, angular])
+        read = np.where(np.isnan(given.angles[chosen]), at[:, angular], given.angles[chosen])
         part = slice(3, 3 + len(angular))
-        measured[:, part] = seen
-        if given.setup.frame_known:
+        if self._frame is None:
             missed = at[:, angular] - read
             residuals[:, part] = (missed + np.pi) % (2.0 * np.pi) - np.pi
             return
@@ -265,8 +246,7 @@ class MachineSlopes:
         off = Rotation.from_matrix(now @ np.swapaxes(guess.turn @ told, -1, -2)).as_rotvec()
         rates = self._rates(guess, at)
         residuals[:, part] = np.einsum("nij,nj->ni", rates, off)
-        frame = next(b for b in self.blocks if b.kind == "frame").where
-        rows[:, part, frame.start + 3 : frame.stop] -= rates
+        slopes[:, part, self._frame.start + 3 : self._frame.stop] -= rates
 
     def _rates(self, guess: Guess, poses: Array) -> Array:
         """Return the matrix (N, k, 3) that takes an angular velocity to the angles' rates."""
@@ -276,41 +256,33 @@ class MachineSlopes:
         twists = self._kernel(np.array(numbers(guess.robot)), poses)[3]
         return np.asarray(np.linalg.pinv(twists[:, 3:, self._angular]))
 
-    def _distances(
+    def _apart(
         self,
         guess: Guess,
         given: Measurements,
         poses: Array,
         chosen: Numbers,
-        here: tuple[Array, Array, Array],
-        out: tuple[Array, ...],
-    ) -> None:
-        """Fill in the residuals of distances, to anchors or between rows."""
-        residuals, rows, pushed, measured = out
-        point, moved, by = (part.copy() for part in here)
-        at = residuals.shape[1] - 1
-        apart = ~np.isnan(given.distances[chosen])
-        origins = given.origins[chosen]
-        between = apart & (origins >= 0)
+        point: Array,
+        moved: Array,
+    ) -> tuple[Array, Array]:
+        """Return marks less where their distances are from, anchors or other rows; with slopes."""
+        apart, drifted = point.copy(), moved.copy()
+        measured, origins = ~np.isnan(given.distances[chosen]), given.origins[chosen]
+        between = measured & (origins >= 0)
         if between.any():
             others = origins[between]
-            place, turned, slopes, by_joint = self._platform(guess, given, poses, others)
-            twist = slopes[:, :6], by_joint[:, :6]
-            end = self._marks(guess, given, others, place, turned, *twist)
-            point[between] -= end[0]
-            moved[between] -= end[1]  # of its readings' noise only this row's counts
-        for i in np.flatnonzero(apart & ~between):
+            place, turned, slopes = self._platform(guess, given, poses, others)
+            end, shifted = self._marks(guess, given, others, place, turned, slopes)
+            apart[between] -= end
+            # Of its readings' noise only this row's counts.
+            drifted[between, :, : self.count] -= shifted[..., : self.count]
+        for i in np.flatnonzero(measured & ~between):
             name = given.anchors[chosen[i]]
-            point[i] -= guess.anchors[name]
+            apart[i] -= guess.anchors[name]
             for block in self.blocks:
                 if block.kind == "anchor" and block.name == name:
-                    moved[i, :, block.where] -= np.eye(3)
-        length = np.linalg.norm(point, axis=-1)
-        along = point / np.where(length > 0.0, length, 1.0)[:, None]
-        residuals[:, at] = length - given.distances[chosen]
-        rows[:, at] = np.einsum("ni,nik->nk", along, moved)
-        pushed[:, at] = np.einsum("ni,nik->nk", along, by)
-        measured[:, at] = apart
+                    drifted[i, :, block.where] -= np.eye(3)
+        return apart, drifted
 
 
 def _solved(matrix: Array, right: Array) -> Array:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit
-from pteron.calibration.guess import Block, Guess, Unknown
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.guess import Block, Guess, Unknown, variances
+from pteron.calibration.measurements import TOOL, Measurements
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unseen import tower_radius
@@ -157,19 +157,14 @@ class Calibration:
         asked = np.atleast_2d(np.asarray(poses, dtype=float))
         slopes = MachineSlopes(self.drawn, self.blocks)
         rest = Measurements.of(self.drawn, np.zeros((len(asked), len(self.drawn.legs))))
-        joints = slopes.joints(self.start, asked)
-        readings = (joints - self.start.zeros) / self.start.scales
+        readings = self.start.readings(slopes.joints(self.start, asked))
         rest = replace(rest, readings=readings)
         found = self.fit.guess
         gone = slopes.poses(found, found.joints(readings), asked)
-        before = self._tool(found, gone) - self._tool(self.start, asked)
+        tools = (TOOL,) * len(asked)
+        before = found.points(tools, gone) - self.start.points(tools, asked)
         moved = slopes.pose_slopes(found, rest, np.where(np.isfinite(gone), gone, asked))[1]
-        covariance = np.einsum("nip,pq,niq->n", moved, self.fit.covariance, moved, optimize=True)
-        return before, np.sqrt(np.maximum(covariance, 0.0))
-
-    def _tool(self, guess: Guess, poses: Array) -> Array:
-        place, axes = guess.robot.platform.at(poses)
-        return np.asarray(place + np.einsum("nij,i->nj", axes, guess.marks[""]))
+        return before, np.sqrt(np.maximum(variances(moved, self.fit.covariance), 0.0))
 
     def misfit(self, other: Guess | Sequence[float]) -> float:
         """Return by how much the squared residuals and tolerances grow from here to other values.

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from pteron.bodies.tables import Number, Table, Three
 from pteron.bodies.vectors import unit_vector
-from pteron.calibration.measurements import Place, Plane, Setup
+from pteron.calibration.measurements import KINDS, Place, Plane, Setup
 from pteron.errors import DataError, shown
 from pteron.tables import Dialect
 from pteron.toml import read_toml, validated
@@ -20,9 +20,6 @@ _ABSENT = "no such file; it should describe a log of measurements"
 
 _OF_A_MANIPULATOR = {"platform", "legs"}
 """Keys by which a file is known to describe a machine."""
-
-KINDS = ("position", "angle", "height", "distance")
-"""Kinds of measured values, each with a noise of its own."""
 
 
 def _named(given: Any) -> Any:

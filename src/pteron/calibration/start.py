@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.calibration.guess import Guess
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.measurements import Measurements, length_columns
 from pteron.calibration.residuals import MachineSlopes
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
@@ -47,8 +47,7 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     begin[:, robot.platform.angular] = np.where(
         seen, given.angles, begin[:, robot.platform.angular]
     )
-    lengths = ["xyz".index(name) for name in robot.coordinates if name in "xyz"]
-    places = given.positions[:, lengths]
+    places = given.positions[:, length_columns(robot)]
     if given.setup.frame_known:
         at = np.flatnonzero(~robot.platform.angular)
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
@@ -79,10 +78,7 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
 
 def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
     """Return the guess with frames and planes that are not known where the drawing puts them."""
-    robot = guess.robot
-    place, axes = robot.platform.at(poses)
-    own = np.stack([guess.marks[name] for name in given.marks])
-    points = place + np.einsum("nij,ni->nj", axes, own)
+    points = guess.points(given.marks, poses)
     seen = ~np.isnan(given.positions).any(axis=-1)
     if not given.setup.frame_known and seen.sum() >= _FEW:
         fixed = np.array([_is_known(given, name) for name in given.marks])[seen]
