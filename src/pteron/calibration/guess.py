@@ -138,6 +138,20 @@ class Block:
         turn = Rotation.from_rotvec(step[3:]).as_matrix() @ guess.turn
         return replace(guess, turn=turn, shift=guess.shift + step[:3])
 
+    def values(self, guess: Guess) -> Array:
+        """Return a guess's values of this block; of a direction, which turns, 0."""
+        if self.kind in ("zeros", "scales"):
+            return np.asarray(getattr(guess, self.kind)[list(self.legs)])
+        if self.kind == "mark":
+            return guess.marks[self.name]
+        if self.kind == "anchor":
+            return guess.anchors[self.name]
+        if self.kind == "plane":
+            return np.array([0.0, 0.0, guess.planes[self.name][3]])
+        if self.kind == "frame":
+            return np.concatenate([guess.shift, np.zeros(3)])
+        return np.array([change.value(guess.robot) for change in self.changes])
+
 
 def tolerances_of(blocks: Sequence[Block]) -> Array:
     """Return the tolerances (p,) of all unknowns; inf where there is none."""

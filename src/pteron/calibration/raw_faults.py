@@ -82,44 +82,20 @@ def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
 def _units(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
     """Yield units that were perhaps meant, and the measurements in them."""
     linear = np.array([leg.joint.unit == "m" for leg in guess.robot.legs])
+    lengths = [name for name in ("position", "height", "distance") if name in given.kinds]
     for factor, text in ((1e-3, "in millimetres"), (1e3, "1000 times too small, as of km for m")):
-        if not np.isnan(given.positions).all():
-            yield (
-                f"the positions are {text}: give them in metres",
-                replace(given, positions=factor * given.positions),
-            )
-        if not np.isnan(given.heights).all():
-            yield (
-                f"the heights are {text}: give them in metres",
-                replace(given, heights=factor * given.heights),
-            )
-        if not np.isnan(given.distances).all():
-            yield (
-                f"the distances are {text}: give them in metres",
-                replace(given, distances=factor * given.distances),
-            )
+        scaled = {f"{name}s": factor * getattr(given, f"{name}s") for name in lengths}
         if linear.any():
-            yield (
-                f"the readings are {text}: give them in metres",
-                replace(given, readings=np.where(linear, factor, 1.0) * given.readings),
-            )
-        kinds = given.positions, given.heights, given.distances
-        if sum(not np.isnan(kind).all() for kind in kinds) + linear.any() < 2:
-            continue
-        yield (
-            f"all lengths are {text}: give them in metres",
-            replace(
-                given,
-                readings=np.where(linear, factor, 1.0) * given.readings,
-                positions=factor * given.positions,
-                heights=factor * given.heights,
-                distances=factor * given.distances,
-            ),
-        )
+            scaled["readings"] = np.where(linear, factor, 1.0) * given.readings
+        advice = f"are {text}: give them in metres"
+        for name, values in scaled.items():
+            yield f"the {name} {advice}", replace(given, **{name: values})
+        if len(scaled) > 1:
+            yield f"all lengths {advice}", replace(given, **scaled)
     if not linear.all():
         read = np.where(linear, given.readings, np.radians(given.readings))
         yield "the readings are in degrees: give them in radians", replace(given, readings=read)
-    if not np.isnan(given.angles).all():
+    if "angle" in given.kinds:
         yield (
             "the measured angles are in degrees: give them in radians",
             replace(given, angles=np.radians(given.angles)),
@@ -139,16 +115,13 @@ def _marks(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurement
 
 def _frames(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
     """Yield quarter turns of the instrument, and the measurements turned back."""
-    setup = given.setup
-    if setup.frame_known and not np.isnan(given.positions).all():
+    if given.setup.frame_known and not np.isnan(given.positions).any():
         for turn in _quarter_turns():
             # Rows of `turn` say where the instrument's x, y and z point.
             told = ", ".join(
                 f"{'xyz'[k]} along {'-' if row.sum() < 0 else ''}{'xyz'[int(np.abs(row).argmax())]}"
                 for k, row in enumerate(turn)
             )
-            if np.isnan(given.positions).any():
-                continue
             yield (
                 f"the instrument's frame is turned: its {told} of the base; turn the positions, or "
                 'say [instrument] frame = "unknown"',

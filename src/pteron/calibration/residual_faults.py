@@ -7,7 +7,6 @@ squared residuals would fall if it were sought too (a score test).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,24 +35,16 @@ _LISTED = 8
 """Most outlying rows that are named."""
 
 
-class _Score(NamedTuple):
-    improvement: float
-    finding: str
-    kind: str
-
-
 def residual_faults(
     start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
 ) -> tuple[Finding, ...]:
     """Return the faults that residuals show, first the one that explains most."""
     outliers = _outliers(fit, given)
-    scores = sorted(_scores(start, fit, blocks, given), reverse=True, key=lambda s: s.improvement)
-    scores = scores or list(_bad_leg(start, fit, blocks, given))
-    if not scores:
+    found = list(_shown(start, fit, blocks, given)) or list(_bad_leg(start, fit, blocks, given))
+    if not found:
         return outliers
-    best = scores[0]
-    finding = Finding(best.kind, best.finding, best.improvement)
-    return (finding,) if (~fit.kept).sum() > _LISTED else (finding, *outliers)
+    best = max(found, key=lambda one: one.improvement)
+    return (best,) if (~fit.kept).sum() > _LISTED else (best, *outliers)
 
 
 def _outliers(fit: Fit, given: Measurements) -> tuple[Finding, ...]:
@@ -74,9 +65,9 @@ def _size(fit: Fit, row: int) -> str:
     return f"off by {1e3 * abs(left[k]):.3g} {'mrad' if angle else 'mm'}"
 
 
-def _scores(
+def _shown(
     start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
-) -> Iterator[_Score]:
+) -> Iterator[Finding]:
     """Yield the faults that explain what noise does not."""
     joints, names = len(start.robot.legs), start.robot.joint_names
     count = blocks[-1].where.stop
@@ -108,67 +99,51 @@ def _scores(
 
     tests: list[tuple[str, str, int, float]] = []
     later = np.arange(len(chosen))
-    for i in range(joints):
-        column = more[..., i : i + 1]
-        unit = 1e3
-        told = "mrad" if start.robot.legs[i].joint.unit == "rad" else "mm"
+    for i, leg in enumerate(start.robot.legs):
+        column, told = more[..., i : i + 1], "mrad" if leg.joint.unit == "rad" else "mm"
         for t in range(3, len(chosen) - 3, max(1, len(chosen) // 200)):
             found, amount = score(column * (later >= t)[:, None, None])
             text = (
-                f"The zero of joint {i + 1} ({names[i]}) slipped by {unit * amount[0]:+.3g} {told} "
+                f"The zero of joint {i + 1} ({names[i]}) slipped by {1e3 * amount[0]:+.3g} {told} "
                 f"before {given.places[chosen[t]]}: home it again, and measure anew from there."
             )
             tests.append(("slipped zero", text, 1, found))
         steps = np.sign(np.diff(given.readings[chosen, i], prepend=given.readings[chosen[0], i]))
         found, amount = score(column * steps[:, None, None])
-        tests.append(
-            (
-                "backlash",
-                f"Joint {i + 1} ({names[i]}) stops {2 * unit * abs(amount[0]):.3g} {told} apart by "
-                "its direction of approach: approach poses from one side, or take up its play.",
-                1,
-                found,
-            )
+        text = (
+            f"Joint {i + 1} ({names[i]}) stops {2e3 * abs(amount[0]):.3g} {told} apart by its "
+            "direction of approach: approach poses from one side, or take up its play."
         )
+        tests.append(("backlash", text, 1, found))
     times = given.times[chosen] if given.times is not None else chosen.astype(float)
     span = np.ptp(times)
     if span > 0.0:
         along = (times - times.mean()) / span
         found, amount = score(more[..., :joints] * along[:, None, None])
-        tests.append(
-            (
-                "drift",
-                "The readings drift from the first row to the last, by up to "
-                f"{1e3 * np.abs(amount).max():.3g} mm or mrad, as a machine's do that grows warm: "
-                "let it warm up, and measure quickly.",
-                joints,
-                found,
-            )
+        text = (
+            "The readings drift from the first row to the last, by up to "
+            f"{1e3 * np.abs(amount).max():.3g} mm or mrad, as a machine's do that grows warm: let "
+            "it warm up, and measure quickly."
         )
-    place = joints
-    for name in sorted({given.marks[i] for i in chosen}):
-        columns = more[..., place : place + 3]
-        place += 3
+        tests.append(("drift", text, joints, found))
+    for k, name in enumerate(sorted({given.marks[i] for i in chosen})):
+        columns = more[..., joints + 3 * k : joints + 3 * k + 3]
         for t in range(3, len(chosen) - 3, max(1, len(chosen) // 60)):
             found, amount = score(columns * (later >= t)[:, None, None])
-            tests.append(
-                (
-                    "moved mark",
-                    f"The mark {name or 'tool'} moved by {1e3 * np.linalg.norm(amount):.3g} mm "
-                    f"before {given.places[chosen[t]]}: fix it, and measure anew from there.",
-                    3,
-                    found,
-                )
+            text = (
+                f"The mark {name or 'tool'} moved by {1e3 * np.linalg.norm(amount):.3g} mm before "
+                f"{given.places[chosen[t]]}: fix it, and measure anew from there."
             )
+            tests.append(("moved mark", text, 3, found))
     for kind, text, freedom, found in tests:
         limit = chi2.isf(_CHANCE / len(tests), freedom)
         if found > limit and found * variance > _SHARE * total:
-            yield _Score(found - chi2.isf(0.5, freedom), text, kind)
+            yield Finding(kind, text, float(found - chi2.isf(0.5, freedom)))
 
 
 def _bad_leg(
     start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
-) -> Iterator[_Score]:
+) -> Iterator[Finding]:
     """Yield the leg whose coordinate alone explains residuals that are not noise."""
     if not set(given.setup.noise) - {"readings"}:
         return  # noise that was found explains everything
@@ -189,7 +164,7 @@ def _bad_leg(
             f"{np.sqrt(mean[first]):.2g} times the noise: look for play, bending, or joints whose "
             "axes do not meet."
         )
-        yield _Score(float(squares[:, first].sum()), text, "wrong model")
+        yield Finding("wrong model", text, float(squares[:, first].sum()))
 
 
 def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> tuple[Block, ...]:

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit
-from pteron.calibration.guess import Block, Guess, Unknown, variances
+from pteron.calibration.guess import Block, Guess, Unknown, tolerances_of, variances
 from pteron.calibration.measurements import TOOL, Measurements
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
-from pteron.calibration.unseen import tower_radius
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
@@ -207,26 +206,15 @@ class Calibration:
 
 def values_of(start: Guess, fit: Fit, blocks: Sequence[Block]) -> tuple[Value, ...]:
     """Return all values of a fit."""
-    found: list[Value] = []
+    drawn = np.concatenate([block.values(start) for block in blocks])
     deviations = np.sqrt(np.diag(fit.covariance))
-    for block in blocks:
-        for k, unknown in enumerate(block.unknowns):
-            at = block.where.start + k
-            drawn = _drawn(start, block, k)
-            now = drawn + float(fit.total[at])
-            left = deviations[at] / unknown.tolerance if np.isfinite(unknown.tolerance) else 0.0
-            found.append(
-                Value(
-                    unknown.name,
-                    unknown.group,
-                    unknown.unit,
-                    drawn,
-                    now,
-                    float(deviations[at]),
-                    _origin(left, unknown),
-                )
-            )
-    return tuple(found)
+    left = deviations / tolerances_of(blocks)
+    unknowns = [unknown for block in blocks for unknown in block.unknowns]
+    numbers = np.stack([drawn, drawn + fit.total, deviations, left], axis=-1).tolist()
+    return tuple(
+        Value(u.name, u.group, u.unit, before, found, deviation, _origin(share, u))
+        for u, (before, found, deviation, share) in zip(unknowns, numbers, strict=True)
+    )
 
 
 def _origin(left: float, unknown: Unknown) -> Origin:
@@ -235,42 +223,17 @@ def _origin(left: float, unknown: Unknown) -> Origin:
     return "tolerance" if left >= _BY_TOLERANCE else "both"
 
 
-def _drawn(start: Guess, block: Block, k: int) -> float:
-    if block.kind in ("zeros", "scales"):
-        return float(getattr(start, block.kind)[block.legs[k]])
-    if block.kind == "mark":
-        return float(start.marks[block.name][k])
-    if block.kind == "anchor":
-        return float(start.anchors[block.name][k])
-    if block.kind == "plane":
-        return float(start.planes[block.name][3]) if k == 2 else 0.0
-    if block.kind == "frame":
-        return float(start.shift[k]) if k < 3 else 0.0
-    change = block.changes[k]
-    if change.group == "radius":
-        return tower_radius(start)
-    if change.group not in ("points", "lengths"):
-        return 0.0
-    value = getattr(start.robot.legs[change.leg], change.key)
-    return float(value if change.axis is None else value[change.axis])
-
-
 def calibrated(guess: Guess) -> Manipulator:
     """Return the machine of a guess; its geometry takes the zeros that it can."""
     legs = []
-    for leg, zero, scale in zip(
-        guess.robot.legs, guess.zeros.tolist(), guess.scales.tolist(), strict=True
-    ):
+    each = zip(guess.robot.legs, guess.zeros.tolist(), guess.scales.tolist(), strict=True)
+    for leg, zero, scale in each:
         taken = leg.with_zero(zero)
-        if taken is None:
-            taken, left = leg, zero
-        else:
-            left = 0.0
-        plain = left == 0.0 and scale == 1.0
-        reading = None if plain else Reading(left, scale)
-        legs.append(replace(taken, reading=reading, limits=leg.limits))
+        left = zero if taken is None else 0.0
+        reading = Reading(left, scale) if left or scale != 1.0 else None
+        legs.append(replace(taken or leg, reading=reading, limits=leg.limits))
     robot = replace(guess.robot, legs=tuple(legs))
-    tool = tuple(guess.marks[""].tolist())
+    tool = tuple(guess.marks[TOOL].tolist())
     if any(tool) or robot.platform.tool:
         robot = replace(robot, platform=replace(robot.platform, tool=tool))
     return robot

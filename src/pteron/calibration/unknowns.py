@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import get_args
 
-import numpy as np
-
 from pteron.calibration.guess import Block, Unknown
 from pteron.calibration.measurements import TOOL, Measurements
 from pteron.calibration.variations import AXIAL, Group, Variation, axial_variations, variations
@@ -30,8 +28,8 @@ TOLERANCES: dict[str, float] = {
 """Ordinary tolerances, as standard deviations about the drawing: 1 mm, 0.2 degrees; zeros of 2 mm
 and 0.5 degrees; 0.1 % of scale."""
 
-_WIDE = {"m": 10.0, "rad": 10.0}
-"""Tolerances of frames, marks, planes and anchors that are not known: practically none."""
+_WIDE = 10.0
+"""Tolerance of frames, marks, planes and anchors that are not known, m and rad: practically none."""
 
 
 def blocks_of(
@@ -62,50 +60,41 @@ def blocks_of(
     """
     given = dict(prior or {})
     asked = list(free) if free is not None else _default(measured)
-    own = variations(robot)
-    n = len(robot.legs)
-    joint = [
-        Unknown(f"zeros[{i + 1}]", "zeros", leg.joint.unit, 0.0) for i, leg in enumerate(robot.legs)
-    ]
-    scale = [Unknown(f"scales[{i + 1}]", "scales", "", 0.0) for i in range(n)]
-    axial = axial_variations(robot)
-    names = {v.name for v in (*own, *axial)} | {u.name for u in (*joint, *scale)}
-    known = {*GROUPS, *AXIAL, *names}
-    wrong = [name for name in (*asked, *given) if name not in known | {"zeros, rad"}]
+
+    def unknown(name: str, group: str, unit: str) -> Unknown:
+        where = f"{group}, rad" if group == "zeros" and unit == "rad" else group
+        tolerance = given.get(name, given.get(where, given.get(group, TOLERANCES[where])))
+        return Unknown(name, group, unit, float(tolerance))
+
+    def chosen(unknowns: Sequence[Unknown]) -> tuple[int, ...]:
+        return tuple(i for i, u in enumerate(unknowns) if u.group in asked or u.name in asked)
+
+    varying = (*variations(robot), *axial_variations(robot))
+    geometry = [unknown(v.name, v.group, v.unit) for v in varying]
+    numbered = list(enumerate((leg.joint for leg in robot.legs), start=1))
+    zeros = [unknown(f"zeros[{i}]", "zeros", joint.unit) for i, joint in numbered]
+    scales = [unknown(f"scales[{i}]", "scales", "") for i, _ in numbered]
+    names = {u.name for u in (*geometry, *zeros, *scales)}
+    known = {*GROUPS, *AXIAL, *names, "zeros, rad"}
+    wrong = [name for name in (*asked, *given) if name not in known]
     if wrong:
         raise DataError(
             f"free, prior: {', '.join(map(repr, wrong))}: no group or value of this machine; "
-            f"groups are {', '.join((*GROUPS, *AXIAL))}, values like {own[0].name}"
+            f"groups are {', '.join((*GROUPS, *AXIAL))}, values like {varying[0].name}"
         )
     for name, value in given.items():
         if not value > 0.0:
             raise DataError(f"prior: {name} = {value:g}: a standard deviation above 0 expected")
     found: list[tuple[str, str, list[Unknown], tuple[Variation, ...], tuple[int, ...]]] = []
-    chosen = tuple(v for v in own if v.group in asked or v.name in asked)
-    chosen += tuple(v for v in axial if v.group in asked or v.name in asked)
-    if chosen:
-        unknowns = [
-            Unknown(v.name, v.group, v.unit, _tolerance(v.name, v.group, v.unit, given))
-            for v in chosen
-        ]
-        found.append(("geometry", "", unknowns, chosen, ()))
-    for kind, all_of in (("zeros", joint), ("scales", scale)):
-        legs = tuple(i for i, u in enumerate(all_of) if kind in asked or u.name in asked)
-        if legs:
-            unknowns = [
-                Unknown(
-                    all_of[i].name,
-                    kind,
-                    all_of[i].unit,
-                    _tolerance(all_of[i].name, kind, all_of[i].unit, given),
-                )
-                for i in legs
-            ]
-            found.append((kind, "", unknowns, (), legs))
+    if at := chosen(geometry):
+        changes = tuple(varying[i] for i in at)
+        found.append(("geometry", "", [geometry[i] for i in at], changes, ()))
+    for kind, unknowns in (("zeros", zeros), ("scales", scales)):
+        if at := chosen(unknowns):
+            found.append((kind, "", [unknowns[i] for i in at], (), at))
     if "tool" in asked and TOOL in measured.marks:
-        found.append(
-            ("mark", TOOL, _three("tool", _tolerance("tool", "tool", "m", given), "tool"), (), ())
-        )
+        tolerance = float(given.get("tool", TOLERANCES["tool"]))
+        found.append(("mark", TOOL, _three("tool", tolerance, "tool"), (), ()))
     found += [(*part, (), ()) for part in _surroundings(measured)]
     blocks, start = [], 0
     for kind, name, unknowns, changes, legs in found:
@@ -118,39 +107,28 @@ def blocks_of(
 
 
 def _default(measured: Measurements) -> list[str]:
-    return [
-        group
-        for group in GROUPS
-        if group != "tool"
-        or not np.isnan(measured.positions).all()
-        or not np.isnan(measured.heights).all()
-    ]
+    placed = {"position", "height"} & set(measured.kinds)
+    return [group for group in GROUPS if group != "tool" or placed]
 
 
-def _tolerance(name: str, group: str, unit: str, given: Mapping[str, float]) -> float:
-    where = f"{group}, rad" if group == "zeros" and unit == "rad" else group
-    return float(given.get(name, given.get(where, given.get(group, TOLERANCES[where]))))
-
-
-def _three(name: str, tolerance: float, group: str = "setup") -> list[Unknown]:
+def _three(name: str, tolerance: float = _WIDE, group: str = "setup") -> list[Unknown]:
     return [Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz"]
 
 
 def _surroundings(measured: Measurements) -> Iterator[tuple[str, str, list[Unknown]]]:
     """Yield the blocks of what measurements refer to and nobody knows."""
-    setup, wide = measured.setup, _WIDE
-    used = set(measured.marks), set(measured.planes), set(measured.anchors)
+    setup = measured.setup
     for name, mark in setup.marks.items():
-        if not mark.known and name in used[0]:
-            yield "mark", name, _three(f"marks.{name}", wide["m"])
+        if not mark.known and name in measured.marks:
+            yield "mark", name, _three(f"marks.{name}")
     for name, plane in setup.planes.items():
-        if not plane.known and name in used[1]:
+        if not plane.known and name in measured.planes:
             told = f"planes.{name or 'plane'}"
-            tilts = [Unknown(f"{told}.tilt {k}", "setup", "rad", wide["rad"]) for k in (1, 2)]
-            yield "plane", name, [*tilts, Unknown(f"{told}.offset", "setup", "m", wide["m"])]
+            tilts = [Unknown(f"{told}.tilt {k}", "setup", "rad", _WIDE) for k in (1, 2)]
+            yield "plane", name, [*tilts, Unknown(f"{told}.offset", "setup", "m", _WIDE)]
     for name, anchor in setup.anchors.items():
-        if not anchor.known and name in used[2]:
-            yield "anchor", name, _three(f"anchors.{name}", wide["m"])
+        if not anchor.known and name in measured.anchors:
+            yield "anchor", name, _three(f"anchors.{name}")
     if not setup.frame_known:
-        turns = [Unknown(f"instrument about {a}", "setup", "rad", wide["rad"]) for a in "xyz"]
-        yield "frame", "", [*_three("instrument", wide["m"]), *turns]
+        turns = [Unknown(f"instrument about {a}", "setup", "rad", _WIDE) for a in "xyz"]
+        yield "frame", "", [*_three("instrument"), *turns]

@@ -166,40 +166,13 @@ def _rigid(
 
 def _size(start: Guess, blocks: Sequence[Block]) -> Array:
     """Return all lengths growing alike."""
-    found = []
-    for block in blocks:
-        for k, unknown in enumerate(block.unknowns):
-            value = 0.0
-            if block.kind == "geometry":
-                change = block.changes[k]
-                if change.group in AXIAL:
-                    found.append(tower_radius(start) if change.group == "radius" else 0.0)
-                    continue
-                held = getattr(start.robot.legs[change.leg], change.key)
-                if unknown.unit == "m":
-                    value = held if change.axis is None else held[change.axis]
-            elif unknown.unit == "m":
-                kinds = {"zeros": start.zeros, "mark": None, "plane": None}
-                if block.kind in kinds:
-                    value = _length(start, block, k)
-            elif block.kind == "scales" and start.robot.legs[block.legs[k]].joint.unit == "m":
-                value = start.scales[block.legs[k]]
-            found.append(float(value))
-    return np.array(found)
-
-
-def tower_radius(start: Guess) -> float:
-    """Return the distance of the first guide point from the platform's axis, m."""
-    point, axis = np.array(start.robot.legs[0].guide_point), np.array(start.robot.platform.axis)
-    return float(np.linalg.norm(np.cross(axis, point)))
-
-
-def _length(start: Guess, block: Block, k: int) -> float:
-    if block.kind == "zeros":
-        return float(start.zeros[block.legs[k]])
-    if block.kind == "mark":
-        return float(start.marks[block.name][k])
-    return float(start.planes[block.name][3])
+    legs = start.robot.legs
+    lengths = [
+        unknown.unit == "m" or (block.kind == "scales" and legs[block.legs[k]].joint.unit == "m")
+        for block in blocks
+        for k, unknown in enumerate(block.unknowns)
+    ]
+    return np.where(lengths, np.concatenate([block.values(start) for block in blocks]), 0.0)
 
 
 def _sparse(rows: Array) -> Array:

@@ -75,6 +75,16 @@ class Variation:
         """Its unit, "m" or "rad"."""
         return "rad" if self.group in ("directions", "angles") else "m"
 
+    def value(self, robot: Manipulator) -> float:
+        """Return the length on a machine, m; 0 for what turns."""
+        if self.group == "radius":
+            point, axis = np.array(robot.legs[0].guide_point), np.array(robot.platform.axis)
+            return float(np.linalg.norm(np.cross(axis, point)))
+        if self.unit == "rad":
+            return 0.0
+        held = getattr(robot.legs[self.leg], self.key)
+        return float(held if self.axis is None else held[self.axis])
+
 
 @lru_cache(maxsize=32)
 def variations(robot: Manipulator) -> tuple[Variation, ...]:
