@@ -29,7 +29,7 @@ TOLERANCES: dict[str, float] = {
 and 0.5 degrees; 0.1 % of scale."""
 
 _WIDE = 10.0
-"""Tolerance of frames, marks, planes and anchors that are not known, m and rad: practically none."""
+"""Tolerance of frames, marks, planes and anchors that are not known, m or rad: next to none."""
 
 
 def blocks_of(
