@@ -21,7 +21,7 @@ _ROUNDING = 1e-15
 
 
 def edges_of_reach(lu: Expression, ll: Expression, n2: Expression) -> tuple[Expression, Expression]:
-    """Return what is 0 where the links are stretched, and folded; negative beyond; n2 is u . u."""
+    """Return (lu + ll)^2 - n2 and n2 - (lu - ll)^2, negative beyond reach; n2 is u . u."""
     longest, shortest = lu + ll, lu - ll
     return longest * longest - n2, n2 - shortest * shortest
 

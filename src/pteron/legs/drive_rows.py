@@ -1,4 +1,4 @@
-"""Rows of the table of the legs' drives, in `pteron show` and reports: a text for each leg."""
+"""Rows of the table of the legs' drives, in `pteron check` and reports: a text for each leg."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _TABLES = (".csv", ".parquet")
 
 
 def save_map(given: Map, path: str | Path) -> Path:
-    """Write a map to a file; the ending says what it is.
+    """Write a map to a file whose ending says its format.
 
     ===================  ==========================================================================
     .csv, .parquet       a row a pose: coordinates, indices with units in brackets, and status

@@ -37,7 +37,7 @@ _DAMPING = 1.0
 """Damping ratio of the filters: critical."""
 
 _ROOM = 3.0
-"""Greatest size of the box, over what the vehicle's motion demands."""
+"""Greatest size of the box, as a multiple of what the vehicle's motion demands."""
 
 _SAMPLES, _HALVINGS = 2048, 8
 """Random poses of the box, and bisections, by which its size is found before it is proved."""

@@ -12,7 +12,7 @@ from pteron.motion.joint_points import Guide, JointPoints, Part
 
 
 def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> JointPoints:
-    """Return one machine's points in a pose, moved towards another's by so many times the way.
+    """Return a machine's points in a pose, moved by `times` the way to another machine's points.
 
     With 1 they are the other machine's.
     """
@@ -34,7 +34,7 @@ def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> Jo
 def enlarged_guides(
     guides: Sequence[Guide], others: Sequence[Guide], times: float
 ) -> tuple[Guide, ...]:
-    """Return one machine's guides, moved towards another's by so many times the way."""
+    """Return a machine's guides, moved by `times` the way to another machine's guides."""
     return tuple(
         replace(guide, path=guide.path + times * (other.path - guide.path))
         for guide, other in zip(guides, others, strict=True)

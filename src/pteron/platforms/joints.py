@@ -1,4 +1,4 @@
-"""A platform's motion as a chain of virtual joints, slides then turns, for exported models."""
+"""A platform's motion as a chain of virtual joints, slides then turns, for exports."""
 
 from __future__ import annotations
 

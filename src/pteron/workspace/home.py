@@ -31,7 +31,7 @@ _DRAWN = 200
 """Random poses that the search starts from."""
 
 _MEASURES = 0.3, 0.02, 0.0
-"""Least type-I and type-II measures of these poses, tried in turn: the lesser for little reach."""
+"""Least type-I and type-II measures of these poses, tried in turn; 0 where reach is small."""
 
 _SOURCES = (*EQUATIONS, "kinematics", "workspace")
 """Packages whose source a home pose depends on: their change makes a stored one void."""

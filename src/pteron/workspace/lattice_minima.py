@@ -19,8 +19,7 @@ _STEPS = 6
 
 _BEYOND, _FURTHER = 1.3, 0.1
 """A step goes further than to the zero of the tangent, by this factor and by this share of a cell:
-a condition may be curved about its least value, and failing places may be on the rim of what a
-shape holds."""
+a condition may be curved about its least value, and failing places may be on the rim of a shape."""
 
 _DEPTH = 1e-5
 """A condition that fails by less is left to the proof."""

@@ -20,7 +20,7 @@ from pteron.shapes import Numbers, PerJoint, PoseLike
 
 @dataclass(frozen=True)
 class PoseMargins:
-    """Distances of poses from what ends a machine's work; each is 1 at best, 0 where it ends.
+    """Margins of poses to singularities and joint limits; each is 1 at best, 0 there.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ _FACE = 1e-6
 """Share of the smallest box's side within which a pose counts as on its face."""
 
 _SMALLEST = 1e-18
-"""Volume below which boxes are not halved: there is nothing inside them."""
+"""Volume below which boxes are not halved."""
 
 
 @dataclass(frozen=True)

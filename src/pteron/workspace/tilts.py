@@ -1,4 +1,4 @@
-"""The largest tilt at a place, and the largest ball of places at a tilt: found, then proved."""
+"""The largest tilt at a position, and the largest ball of positions at a tilt: found, proved."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""The nonlinear program behind an exciting trajectory: sequential quadratic programming (SLSQP).
+"""The nonlinear program behind an exciting trajectory: cost and limits, solved by `sequential`.
 
-It has some 30 variables, and a thousand rows that each depend on all of them. Interior points
-factor all rows in every iteration; here an iteration solves a dense problem as small as the
-variables, and needs half as many. Gradients are exact (CasADi).
+It has some 30 variables, and a thousand rows that each depend on all of them. Gradients are exact
+(CasADi).
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ FaultName = Literal[
 ]
 """Faults by name: forces that are late, the scale of one force, that of all forces, the direction
 of gravity, its size or the rate of the clock, lengths, friction that falls with speed, elastic
-drives, friction or offsets that drift, friction that grows with the load, passive friction."""
+drives, drifting friction or offsets, friction that grows with load, friction in passive joints."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters."""

@@ -1,4 +1,4 @@
-"""The loop of a simulation: at each sample the controller's forces, limits, delay, integration."""
+"""The loop of a simulation: at each sample forces are asked for, limited, delayed, integrated."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _AT_REST = 1e-6
 def size(
     robot: RobotLike, motion: Motion, *, dwell: float = 0.0, wrench: ArrayLike | None = None
 ) -> Sizing:
-    """Return what a motion asks of each drive.
+    """Return the load of a motion on each drive: its forces and speeds, and their integrals.
 
     Parameters
     ----------
