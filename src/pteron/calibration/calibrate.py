@@ -60,7 +60,8 @@ def calibrate(
         Readings and what was measured; `read_measurements` reads a log.
     free : sequence of str, optional
         What is sought: groups ("zeros", "scales", "lengths", "points", "directions", "tool",
-        "radius", "angles") or single values; by default every group.
+        "radius", "angles") or single values; by default all groups but the last two, and "tool"
+        only with positions or heights.
     prior : mapping, optional
         Standard deviations by group or value, m and rad, in place of ordinary tolerances
         (`TOLERANCES`); inf for none.

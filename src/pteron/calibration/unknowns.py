@@ -12,7 +12,7 @@ from pteron.errors import DataError
 from pteron.manipulator import Manipulator
 
 GROUPS: tuple[str, ...] = tuple(group for group in get_args(Group) if group not in AXIAL)
-"""The groups of unknowns that a user's `free` may name."""
+"""The groups of unknowns that are free by default: `tool` only with positions or heights."""
 
 TOLERANCES: dict[str, float] = {
     "lengths": 1e-3,
@@ -48,8 +48,8 @@ def blocks_of(
         What was measured; marks, planes, anchors and a frame that are not known are sought too.
     free : sequence of str, optional
         Groups, or names of single values, or `radius` and `angles`, the places of the legs' guide
-        points about the platform's axis; by default all groups but, where no scale is measured,
-        `scales`.
+        points about the platform's axis; by default `GROUPS`, without `tool` where neither a
+        position nor a height is measured.
     prior : mapping, optional
         Standard deviations by group or by name, in place of ordinary tolerances; inf: none.
 

@@ -38,7 +38,7 @@ _COINCIDENT = 1e-9
 """Distance below which points, or guides, count as one, m."""
 
 _TINY = 1e-24
-"""Least value of a square (m^2, or a squared sine) by which is divided."""
+"""Least value of a square (m^2, or a squared sine) in a denominator."""
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ _TINY = 1e-30
 
 
 def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expression]:
-    """Return the way, m, under translation alone, and the angle, rad, under rotation alone.
+    """Return the distance, m, under translation alone, and the angle, rad, of the last angle alone.
 
-    No way is longer than `FAR`, no angle greater than pi; a platform that does not turn has none.
+    They are at most `FAR` and pi; a platform that does not turn has no angle.
     """
     state = machine.state(pose)
     measure = machine.closure.measure(state.platform, state.legs)

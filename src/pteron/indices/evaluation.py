@@ -36,7 +36,7 @@ def evaluate(
     DataError
         If there is no index of that name.
     ModelError
-        If it is about turning and the platform does not turn.
+        If it is about turning or translation, and the platform does not move so.
     UnreachablePose
         Under ``on_failure="raise"``, if a leg does not reach a pose.
     SingularPose

@@ -1,10 +1,10 @@
-"""Target `c`: C99 that the machine's own compiler builds, as a module that Python calls directly.
+"""Target `c`: C99 that this computer's compiler builds, as a module that Python calls directly.
 
 Through Numba or ctypes a call costs more than the arithmetic: boxing one array takes Numba 450 ns.
 So the module takes NumPy's arrays itself. A batch is computed in blocks held as structures of
 arrays, one state a vector lane. Products and sums are not contracted to fused operations: it costs
-nothing measurable here (17.5 against 16.8 ns a state without the sines), and every float64 target
-but JAX then returns the same bits, whatever the size of the batch.
+nothing measurable here (17.5 against 16.8 ns a state without the sines), and the targets `vm`, `c`
+and `numba` then return the same bits, whatever the size of the batch.
 """
 
 from __future__ import annotations

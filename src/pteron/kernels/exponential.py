@@ -16,7 +16,7 @@ from pteron.bodies.motion import Expression
 from pteron.kernels.graph import Node, expression, function_like, graph_of
 
 _DOUBLINGS = 12
-"""2^12 = 4096."""
+"""Doublings of the argument: 2^12 = 4096."""
 
 _DEGREE = 11
 """Degree of the Taylor polynomial: at 709 / 4096, about 0.17, its other terms are below 1e-17 of

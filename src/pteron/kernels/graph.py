@@ -1,8 +1,8 @@
 """A CasADi function as a graph of named operations, for code printers and other arithmetics.
 
-Nodes are single assignments, in order. They are sorted into stages, so that what depends on shared
-inputs alone is done once for a batch, and sines and cosines of the inputs leave the loop that a
-compiler vectorises.
+Nodes are single assignments, in order. Marked are those that depend on shared inputs alone, which
+are computed once for a batch, and sines and cosines of inputs, which leave the loop that a compiler
+vectorises.
 """
 
 from __future__ import annotations

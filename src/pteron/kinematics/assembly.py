@@ -3,8 +3,8 @@
 Platforms with one angle phi are solved here, those that tilt by `tilting_assembly`.
 
 With their joints held, n legs keep points of the platform on spheres, circles or planes, in n - 1
-dimensions. Moved by the points' offsets at phi these meet at P. A sphere, circle or
-plane is a row s = (w, m, h) with w v.v + m.v + h = 0, and <s, s'> = m.m' - 2 (w h' + w' h) is the
+dimensions. Moved by the points' offsets at phi these meet at P. A sphere, circle or plane is a row
+s = (w, m, h) with w v.v + m.v + h = 0, and <s, s'> = m.m' - 2 (w h' + w' h) is, up to scale, the
 cosine of the angle at which two of them meet. The n rows have one null vector (v.v, v, 1) up to
 scale, and it is a point exactly if the Gram matrix G of their products is singular:
 

@@ -1,4 +1,4 @@
-"""The Jacobian at a pose and its condition number."""
+"""The Jacobian at a pose and its condition number, for reports and the viewer."""
 
 from __future__ import annotations
 

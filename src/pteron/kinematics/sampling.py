@@ -32,7 +32,7 @@ _LEADING = 20
 """Steps of Newton's method that lead a pose to joint coordinates."""
 
 _TILT = 0.5
-"""Greatest tilt drawn, rad, of a platform whose file does not limit it."""
+"""Greatest size of the angles drawn, rad, of a tilting platform whose file does not limit them."""
 
 _SEEN = 1000
 """Poses that show how often limits are kept."""
