@@ -10,6 +10,9 @@ QUICK := published delta family conformance manipulator errors toml passes costs
 # One thread of linear algebra a process, and a file's tests in one process: they share what is made.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
+# Each program that a test starts would translate the sources anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo quick test tests clients nightly lint bench docs first wheels clean
 
 demo: $(VENV)/.runtime

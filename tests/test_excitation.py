@@ -16,7 +16,7 @@ import numpy as np
 import polars as pl
 import pytest
 from logs_of_motions import machine
-from mechanisms import CATALOG, NIGHTLY, gated, random_machine, with_elbows
+from mechanisms import CATALOG, CLIENTS, NIGHTLY, gated, random_machine, with_elbows
 from typer.testing import CliRunner
 
 import pteron
@@ -447,6 +447,7 @@ def test_a_search_on_oblique_axes_with_force_limits_keeps_them():
     assert (np.abs(forces).max(axis=0) < limits.force).all()
 
 
+@CLIENTS
 def test_processes_find_the_same_as_this_one_and_so_does_the_seed_again():
     again = optimal_excitation(
         CATALOG["tripteron"], harmonics=2, period=4.0, starts=2, draws=6, workers=2
@@ -466,6 +467,7 @@ def test_starts_whose_processes_fail_are_improved_here(monkeypatch):
     assert found.gain > 1.5
 
 
+@CLIENTS
 def test_an_interrupt_ends_the_processes_too():
     shares = []
 
@@ -513,6 +515,7 @@ def test_an_interrupt_keeps_the_best_until_then(share: float):
     assert seen == sorted(seen)
 
 
+@CLIENTS
 def test_an_interrupt_during_the_program_ends_it_at_once():
     robot = CATALOG["quadrupteron"]
     interrupted = []

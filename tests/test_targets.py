@@ -613,6 +613,7 @@ def test_a_folder_that_others_may_write_to_is_not_trusted(fresh, danger):
     assert len(entries(fresh)) == 1
 
 
+@CLIENTS
 @needs_compiler
 def test_the_sweep_removes_what_a_killed_process_left_and_nothing_else(fresh, tmp_path):
     slow = tmp_path / "slow"
@@ -671,6 +672,7 @@ def test_the_entries_used_least_lately_are_removed(fresh, monkeypatch):
     assert [folder.exists() for folder in older] == [False, False, True]
 
 
+@CLIENTS
 @needs_compiler
 def test_processes_that_compile_at_once_do_not_meet(fresh):
     script = textwrap.dedent("""
@@ -857,6 +859,7 @@ def ended(script, **environment):
     subprocess.run([sys.executable, "-c", script], check=True, env=given)
 
 
+@CLIENTS
 @needs_compiler
 def test_a_short_script_leaves_its_kernel_to_the_next(fresh):
     ended(SHORT)
@@ -866,6 +869,7 @@ def test_a_short_script_leaves_its_kernel_to_the_next(fresh):
     assert cache.find(name, library) is not None
 
 
+@CLIENTS
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no groups of processes")
 @needs_compiler
 def test_a_compiler_that_takes_long_ends_with_the_script(fresh, tmp_path):

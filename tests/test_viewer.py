@@ -451,6 +451,7 @@ def page(tab, viewer):
     return tab
 
 
+@CLIENTS
 def test_a_slider_moves_the_robot_and_the_forces_are_the_librarys(page, viewer):
     before = page.screenshot()
     page.evaluate("() => new Promise(done => setTimeout(done, 500))")
@@ -472,6 +473,7 @@ def test_a_slider_moves_the_robot_and_the_forces_are_the_librarys(page, viewer):
     assert page.screenshot() != before
 
 
+@CLIENTS
 def test_a_drag_out_of_reach_stops_and_names_the_leg(page, viewer):
     slide(page, "y (mm)", ["End"])
     text = said(page, "stops")
@@ -577,6 +579,7 @@ def test_what_is_typed_wrongly_is_told_on_the_page(page, viewer):
     assert np.allclose(viewer.state.pose, [0.01, 0.02, 0.03, 0.0], atol=1e-12)
 
 
+@CLIENTS
 def test_a_malformed_log_is_a_message_and_a_good_one_plays(page, viewer, tmp_path):
     bad, good = tmp_path / "bad.csv", tmp_path / "good.csv"
     bad.write_text("t,x,y,z,phi\n0,0,0,0,0\n0.1,what,0,0,0\n")
@@ -626,6 +629,7 @@ def other_server():
         thread.join()
 
 
+@CLIENTS
 def test_no_other_page_opens_the_viewers_socket(browser, local):
     opens = OPENS.replace("VERSION", repr(metadata.version("viser")))
     with other_server() as port:
@@ -680,6 +684,7 @@ def test_a_lost_connection_and_a_server_that_starts_again(browser):
             assert second.faults == ()
 
 
+@CLIENTS
 def test_the_command_prints_where_the_page_is_and_ends_with_ctrl_c(tmp_path):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
