@@ -31,7 +31,7 @@ def weak(tmp_path):
 
 def test_a_folder_has_table_numbers_and_pictures(weak, tmp_path):
     out = tmp_path / "run"
-    data = json.loads(run(weak, "--duration", 2, "--out", out, "--json").stdout)
+    data = json.loads(run(weak, "--duration", 2, "--step", 5e-4, "--out", out, "--json").stdout)
     assert data["stopped"] is None
     assert data["samples"] == 2001
     assert max(row["largest"] for row in data["tracking"]) < 1e-6
@@ -44,7 +44,7 @@ def test_a_folder_has_table_numbers_and_pictures(weak, tmp_path):
         np.abs(table["x"] - table["xref"]).max(), data["tracking"][0]["largest"], rtol=1e-9
     )
     # What was written is a cycle to be simulated again.
-    again = json.loads(run(weak, "--cycle", out / "simulation.csv", "--json").stdout)
+    again = json.loads(run(weak, "--cycle", out / "simulation.csv", "--step", 5e-4, "--json").stdout)
     assert again["duration"] == pytest.approx(2.0)
 
 
@@ -53,13 +53,13 @@ def test_a_step_is_no_longer_than_a_sample():
 
 
 def test_the_model_has_the_machines_working_mode():
-    given = ["quadrupteron", "--elbows=+-++", "--duration", 0.5, "--json"]
+    given = ["quadrupteron", "--elbows=+-++", "--duration", 0.5, "--step", 5e-4, "--json"]
     own, other = (json.loads(run(*given, *more).stdout) for more in ([], ["--model", given[0]]))
     assert own["tracking"] == other["tracking"]
 
 
 def test_a_pipe_gets_the_table(weak):
-    text = run(weak, "--duration", 2, "--rate", 500, "--controller", "pd").stdout
+    text = run(weak, "--duration", 2, "--rate", 500, "--step", 5e-4, "--controller", "pd").stdout
     assert text.startswith("t,x,y,z,dx,dy,dz,ddx,ddy,ddz,xref,yref,zref,rho1,rho2,rho3,drho1")
     assert len(text.splitlines()) == 1002
 
@@ -93,7 +93,7 @@ def test_units_of_a_cycle_and_a_payload_are_doubted(tmp_path):
 def test_a_table_on_a_narrow_screen_keeps_its_numbers(monkeypatch):
     monkeypatch.setattr("pteron.cli.destination.is_terminal", lambda: True)
     monkeypatch.setenv("COLUMNS", "60")
-    lines = run("delta", "--duration", 2).stdout.splitlines()
+    lines = run("delta", "--duration", 1).stdout.splitlines()
     assert max(map(len, lines)) <= 60
     cells = lines[-2].split()
     assert cells[0] == "3"
