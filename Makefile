@@ -19,7 +19,7 @@ demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
 	$(BIN)/pteron table1
 
-# The gate: lint and tests side by side, some seven minutes on two cores; tests/README.md says what waits
+# The gate: lint and tests side by side, some six minutes on two cores; tests/README.md says what waits
 # for `make nightly`.
 test: $(VENV)/.dev
 	+$(MAKE) --no-print-directory --jobs 2 lint tests

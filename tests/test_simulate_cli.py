@@ -44,7 +44,9 @@ def test_a_folder_has_table_numbers_and_pictures(weak, tmp_path):
         np.abs(table["x"] - table["xref"]).max(), data["tracking"][0]["largest"], rtol=1e-9
     )
     # What was written is a cycle to be simulated again.
-    again = json.loads(run(weak, "--cycle", out / "simulation.csv", "--step", 5e-4, "--json").stdout)
+    again = json.loads(
+        run(weak, "--cycle", out / "simulation.csv", "--step", 5e-4, "--json").stdout
+    )
     assert again["duration"] == pytest.approx(2.0)
 
 
