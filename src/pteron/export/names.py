@@ -31,7 +31,7 @@ def prefix_of(robot: Manipulator) -> str:
 
 
 def identifier(robot: Manipulator) -> str:
-    """Return a machine's name as one of XML and its files."""
+    """Return a machine's name as an identifier in XML and the stem of XML files."""
     return _safe(robot.name, "-") or "robot"
 
 

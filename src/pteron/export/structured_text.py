@@ -1,4 +1,4 @@
-"""Export of IEC 61131-3 Structured Text for a PLC: one function block a file, which never traps.
+"""Export of IEC 61131-3 Structured Text: one function block a file, which cannot stop the PLC.
 
 Inputs beyond a range are refused before anything is computed; `guards` rules out all other causes
 of a stop. Where a guard fails the outputs stay as they were.

@@ -29,8 +29,8 @@ _SPIN = 1e-10
 """A rod's moment about itself, over that across it."""
 
 _LEAST = 1e-10
-"""The least moment about the centre, over mass times the square of what is given as its distance:
-a body whose whole mass is at its centre is none to an engine."""
+"""Least moment about the centre, as a share of mass times the square of the body's size: engines
+take no body whose whole mass is at its centre."""
 
 _TINY = 2e-14
 """Least moment of inertia that engines accept, kg m^2."""

@@ -25,13 +25,13 @@ from pteron.kinematics import inverse_kinematics, jacobian, random_poses
 from pteron.manipulator import Manipulator
 
 _LEAN = 0.1
-"""Greatest slope of a guide against the z axis of what is still taken for a linear Delta."""
+"""Greatest slope against the z axis of the guides of a linear Delta."""
 
 _INSIDE = 0.8
 """Share of the firmware's range that counts as the bed of a machine without limits."""
 
 _WORST = 1e-3
-"""Greatest deviation on the bed, m, of a machine that the firmware's numbers still describe."""
+"""Greatest error of the tool on the bed, m, with which the firmware's numbers are accepted."""
 
 
 @dataclass(frozen=True)
