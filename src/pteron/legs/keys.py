@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from textwrap import fill
 from typing import Any, Literal, NamedTuple
 
 from pteron.bodies.vectors import interval, number, perpendicular, positive, unit_vector, vector
@@ -28,6 +29,24 @@ KeyRole = Literal[
 """The content of a key: a vector, a unit vector, a length, a number, a whole number, +1 or -1, two
 limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
 rod, a drive, how the drive counts. Files and pages give a leg's keys in this order."""
+
+
+_TYPES: dict[KeyRole, str] = {
+    "point": "vector",
+    "direction": "unit vector",
+    "length": "float",
+    "number": "float",
+    "count": "int",
+    "sign": "int",
+    "limits": "(float, float)",
+    "cone": "Cone",
+    "slider": "float",
+    "planar": "PlanarInertia",
+    "rod": "RodInertia",
+    "drive": "Drive",
+    "reading": "Reading",
+}
+"""The type of a field, by its role, as docstrings have it."""
 
 
 class Key(NamedTuple):
@@ -74,6 +93,16 @@ COMMON: dict[str, Key] = {
     ),
 }
 """The keys that every kind of leg has; a kind may say more closely what they are."""
+
+
+def parameters_section(keys: Mapping[str, Key]) -> str:
+    """Return the section of a leg's docstring that says of each field what it holds."""
+    lines = ["", "", "    Parameters", "    ----------"]
+    for name, key in keys.items():
+        optional = "" if key.default is ... else ", optional"
+        lines.append(f"    {name} : {_TYPES[key.role]}{optional}")
+        lines.append(fill(f"{key.help}.", 96, initial_indent=8 * " ", subsequent_indent=8 * " "))
+    return "\n".join([*lines, "    "])
 
 
 class Condition(NamedTuple):

@@ -17,7 +17,7 @@ from pteron.bodies.parameters import LEG_BODIES
 from pteron.bodies.vectors import Vector, complement
 from pteron.errors import ModelError
 from pteron.legs.drive import Drive
-from pteron.legs.keys import COMMON, Condition, Key, KeyRole, sound_fields
+from pteron.legs.keys import COMMON, Condition, Key, KeyRole, parameters_section, sound_fields
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.legs.reading import Reading
 from pteron.toml import told
@@ -137,6 +137,11 @@ class LegKind(ABC):
     """Conditions between its fields."""
     equations_class: ClassVar[_EquationsClass]
     __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __init_subclass__(cls) -> None:
+        # What its fields hold is said once, by its keys.
+        if cls.__doc__ and "keys" in vars(cls) and "Parameters\n" not in cls.__doc__:
+            cls.__doc__ = cls.__doc__.rstrip() + parameters_section(cls.every_key())
 
     def __post_init__(self) -> None:
         sound, faults = self.checked({name: getattr(self, name) for name in self.every_key()})

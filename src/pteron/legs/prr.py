@@ -39,35 +39,6 @@ class PRR(SlideLeg):
     """A planar P-R-R leg that carries one point of the platform.
 
     Places along `direction` do not count: the leg moves in a plane of its own.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, the point of the guide where the slider coordinate is zero, m.
-    slider_direction : unit vector
-        e, in the platform's plane.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    lower_length : float
-        Length of the link, m.
-    slider_mass : float
-        m_p, kg.
-    lower : PlanarInertia
-        Inertia of the link about its platform end, x from the slider to there.
-    elbow : {1, -1}
-        sigma: 1 where the platform point is ahead of the slider along e, -1 where it is behind.
-    limits : (float, float), optional
-        Least and greatest slider coordinate, m.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    direction : unit vector, optional
-        d, of the two revolute axes: the normal of the platform's plane, which is its default.
-    elbow_limits : (float, float), optional
-        Least and greatest angle of the link against the guide, about d: 0 where it is along it.
     """
 
     lower: PlanarInertia

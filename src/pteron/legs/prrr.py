@@ -72,35 +72,6 @@ class PRRR(LegKind):
 
     The slider moves along `slider_direction` through `guide_point`; the revolute axes R1, R2 and R3
     all have `direction`. Vectors are in the base frame, except `platform_point`.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, the point of the guide where the slider coordinate is zero, m.
-    direction : unit vector
-        d, of the revolute axes.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    upper_length, lower_length : float
-        Lengths of the upper link (R1 to R2) and of the lower link (R2 to R3), m.
-    slider_mass : float
-        m_p, kg.
-    upper, lower : PlanarInertia
-        Inertia of the two links; see `PlanarInertia` for their reference points.
-    slider_direction : unit vector, optional
-        e; d where it is not given.
-    elbow : {1, -1}
-        sigma, the side of the elbow.
-    limits : (float, float), optional
-        Least and greatest slider coordinate, m.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    elbow_limits : (float, float), optional
-        Least and greatest angle between the links: 0 where stretched, pi where folded.
     """
 
     guide_point: Vector

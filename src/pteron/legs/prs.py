@@ -20,15 +20,8 @@ from pteron.legs.prr import PRR, PRREquations
 class PRS(PRR):
     """A P-R-S leg: it keeps its platform point in the plane through r, normal to `direction`.
 
-    It is a P-R-R leg (`PRR`, whose parameters it has) that ends in a ball joint; r is the guide
+    It is a P-R-R leg that ends in a ball joint; r is the guide
     point, and the slider's direction e lies in the leg's plane.
-
-    Parameters
-    ----------
-    direction : unit vector
-        d, of the revolute axis on the slider: the normal of the leg's plane.
-    platform_cone : Cone, optional
-        Where the ball joint lets the link point, in the platform frame.
     """
 
     platform_cone: Cone | None = None

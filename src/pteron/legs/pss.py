@@ -37,43 +37,7 @@ from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
 
 @dataclass(frozen=True)
 class PSS(SlideLeg):
-    """A P-S-S leg that carries one point of the platform.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, the point of the guide where the slider coordinate is zero, m.
-    slider_direction : unit vector
-        e.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    lower_length : float
-        Length of the rod, m.
-    slider_mass : float
-        m_p, kg.
-    lower : RodInertia
-        Inertia of the rod, or the sum of parallel rods, about the platform end.
-    elbow : {1, -1}
-        sigma: 1 where the platform point is ahead of the slider along e, -1 where it is behind.
-    limits : (float, float), optional
-        Least and greatest slider coordinate, m.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    rods : int
-        How many parallel rods `lower` is the sum of.
-    bar_direction : unit vector, optional
-        Of the bar between the ends of parallel rods. Where it is given the machine is checked: the
-        bars must keep the platform from tilting.
-    tip_cone, platform_cone : Cone, optional
-        Where the ball joints at the rod's ends let it point: at the slider in the base frame, at
-        the platform in the platform's, which for parallel rods is that at phi = 0.
-    bar_length : float, optional
-        How far parallel rods are apart, m.
-    """
+    """A P-S-S leg that carries one point of the platform."""
 
     lower: RodInertia
     rods: int = 2

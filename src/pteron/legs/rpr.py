@@ -39,29 +39,6 @@ class RPR(RamLeg):
 
     Its joint coordinate is the length of the ram, from `guide_point` to the platform point. Places
     along `direction` do not count: the leg moves in a plane of its own.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, the revolute joint on the base, m.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    upper : PlanarInertia
-        Inertia of the cylinder about the joint on the base, x towards the platform point.
-    lower : PlanarInertia
-        Inertia of the piston about the platform point, x pointing there from the base.
-    limits : (float, float)
-        Least and greatest length, m; above 0.
-    elbow : {1}
-        A ram has but one branch.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    direction : unit vector, optional
-        d, of the two revolute axes: the normal of the platform's plane, which is its default.
     """
 
     guide_point: Vector

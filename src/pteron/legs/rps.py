@@ -17,15 +17,7 @@ from pteron.legs.rpr import RPR, RPREquations
 class RPS(RPR):
     """An R-P-S leg: it keeps its platform point in the plane through r, normal to `direction`.
 
-    It is an R-P-R leg (`RPR`, whose parameters it has) that ends in a ball joint; r is the guide
-    point.
-
-    Parameters
-    ----------
-    direction : unit vector
-        d, of the revolute axis at r: the normal of the leg's plane.
-    platform_cone : Cone, optional
-        Where the ball joint lets the ram point, in the platform frame.
+    It is an R-P-R leg that ends in a ball joint; r is the guide point.
     """
 
     platform_cone: Cone | None = None

@@ -28,35 +28,6 @@ class RRR(CrankLeg):
     The crank turns about `direction` through `guide_point`; its angle is zero where it points along
     `zero_direction`, and positive by the right hand about `direction`. Places along `direction` do
     not count: the leg moves in a plane of its own.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, the centre of the crank's circle, m.
-    direction : unit vector
-        d, of the three revolute axes: the normal of the platform's plane.
-    zero_direction : unit vector
-        a, where the crank points at q = 0; perpendicular to `direction`.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    upper_length, lower_length : float
-        Lengths of the crank and of the lower link, m.
-    upper : PlanarInertia
-        Inertia of the crank, about the origin on its axis, x towards the lower link.
-    lower : PlanarInertia
-        Inertia of the lower link about its platform end, x from the elbow to there.
-    elbow : {1, -1}
-        sigma, the side of the elbow.
-    limits : (float, float), optional
-        Least and greatest crank angle, rad.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    elbow_limits : (float, float), optional
-        Least and greatest angle between the links: 0 where stretched, pi where folded.
     """
 
     lower: PlanarInertia

@@ -20,15 +20,7 @@ from pteron.legs.rrr import RRR, RRREquations
 class RRS(RRR):
     """An R-R-S leg: it keeps its platform point in the plane through r, normal to `direction`.
 
-    It is an R-R-R leg (`RRR`, whose parameters it has) that ends in a ball joint; r is the guide
-    point.
-
-    Parameters
-    ----------
-    direction : unit vector
-        d, of the axes of crank and elbow: the normal of the leg's plane.
-    platform_cone : Cone, optional
-        Where the ball joint lets the link point, in the platform frame.
+    It is an R-R-R leg that ends in a ball joint; r is the guide point.
     """
 
     platform_cone: Cone | None = None

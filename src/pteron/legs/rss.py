@@ -49,43 +49,6 @@ class RSS(CrankLeg):
 
     The crank turns about `direction` through `guide_point`; its angle is zero where it points along
     `zero_direction`, and positive by the right hand about `direction`.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, the centre of the crank's circle, m.
-    direction : unit vector
-        d, of the crank's axis.
-    zero_direction : unit vector
-        a, where the crank points at q = 0; perpendicular to `direction`.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    upper_length, lower_length : float
-        Lengths of the crank and of the rod, m.
-    upper : PlanarInertia
-        Inertia of the crank, about the origin on its axis, x towards the rod.
-    lower : RodInertia
-        Inertia of the rod, or the sum of parallel rods, about the platform end.
-    elbow : {1, -1}
-        sigma, the side of the elbow.
-    limits : (float, float), optional
-        Least and greatest crank angle, rad.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    rods : int
-        How many parallel rods `lower` is the sum of.
-    bar_direction : unit vector, optional
-        Of the bar between the ends of parallel rods; along `direction`, the only one that the crank
-        does not turn.
-    tip_cone, platform_cone : Cone, optional
-        Where the ball joints at the rod's ends let it point: at the crank's end in the crank's
-        frame, at the platform in the platform's, which for parallel rods is that at phi = 0.
-    bar_length : float, optional
-        How far parallel rods are apart, m.
     """
 
     lower: RodInertia

@@ -44,35 +44,7 @@ def _check_travel(travel: tuple[float, float] | None) -> None:
 
 @dataclass(frozen=True)
 class RUPU(LegKind):
-    """A telescopic shaft that turns the platform about its axis.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, where the shaft begins: its lower universal joint on the base, m.
-    platform_point : vector
-        s0, from P to where the shaft ends, in the platform frame, m.
-    upper : RodInertia
-        Inertia of the part at the base, about `guide_point`, x towards the platform point.
-    lower : RodInertia
-        Inertia of the part at the platform, about the platform point, x pointing there.
-    ratio : float
-        The joint's angle over phi; negative where it counts the other way.
-    elbow : {1}
-        A shaft has but one branch.
-    limits : (float, float), optional
-        Least and greatest joint angle, rad.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    direction : unit vector, optional
-        Of the joint's axis: the platform's axis, which is its default.
-    travel : (float, float), optional
-        Least and greatest length of the shaft, m.
-    """
+    """A telescopic shaft that turns the platform about its axis."""
 
     guide_point: Vector
     platform_point: Vector

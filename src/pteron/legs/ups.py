@@ -40,36 +40,6 @@ class UPS(RamLeg):
     """A U-P-S leg that carries one point of the platform.
 
     Its joint coordinate is the length of the ram, from `guide_point` to the platform point.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, the universal joint on the base, m.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    upper : RodInertia
-        Inertia of the cylinder about the joint on the base, x towards the platform point.
-    lower : RodInertia
-        Inertia of the piston about the platform point, x pointing there from the base.
-    limits : (float, float)
-        Least and greatest length, m; above 0.
-    elbow : {1}
-        A ram has but one branch.
-    fixed_offset : vector
-        t0, the part of the platform point that does not turn with phi, in the base frame, m.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts its coordinate.
-    direction : unit vector, optional
-        Of the base joint's first axis: for reactions and drawings, forces do not depend on it. By
-        default that axis of the base plate across which the leg leans more.
-    base_cone, platform_cone : Cone, optional
-        Where the joints at its ends let it point: at the base in the base frame, at the platform in
-        the platform's.
-    screw_lead : float, optional
-        m a turn, of a screw that turns where the piston spins about its axis. The ball joint leaves
-        that spin free, so that lengths are told as if there were none.
     """
 
     guide_point: Vector
@@ -97,7 +67,8 @@ class UPS(RamLeg):
         "guide_point": Key("point", "r, the universal joint on the base, m"),
         "direction": Key(
             "direction",
-            "of the base joint's first axis: forces do not depend on it",
+            "of the base joint's first axis, for reactions and drawings: forces do not depend on "
+            "it; where left out, that of the base plate across which the leg leans more",
             default=None,
             example=[1.0, 0.0, 0.0],
         ),
