@@ -46,7 +46,7 @@ class SpatialMotion(NamedTuple):
     axes: Expression
     """R (3, 3): its x, y and z."""
     acceleration: Expression
-    """Of its reference point, (3, 1)."""
+    """The acceleration of its reference point, (3, 1)."""
     turning: Expression
     """Angular velocity omega, (3, 1)."""
     growth: Expression

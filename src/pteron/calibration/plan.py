@@ -27,7 +27,7 @@ Measure = Literal["poses", "positions", "heights", "distances"]
 """The quantity to measure: the pose, or the tool's position, height or distance to an anchor."""
 
 Criterion = Literal["D", "worst"]
-"""What is minimised: the volume of the values' confidence region, or the tool's greatest error."""
+"""The aim to minimise: the volume of all values' confidence region, or the tool's worst error."""
 
 _CANDIDATES = 1500
 """Random poses from which those of a plan are chosen."""
