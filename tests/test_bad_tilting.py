@@ -64,10 +64,32 @@ def test_figures_of_rams_that_balance_at_every_pose(base, top, reason):
         replace(leg, guide_point=tuple(r), platform_point=tuple(s), **free)
         for leg, r, s in zip(robot.legs, *flat, strict=True)
     ]
-    found = pteron.architecture(replace(robot, legs=tuple(legs)))
+    machine = replace(robot, legs=tuple(legs))
+    found = pteron.architecture(machine)
     assert re.search(reason, found.reason)
     assert found.proof == ("exact arithmetic" if reason else "one pose")
     assert (found.type_ii < 1e-12) == bool(reason)
+    assert found.self_motions == ()
+    if "push" in reason:
+        oblique = pteron.turned(machine, tilting.rotation(np.random.default_rng(0)))
+        assert "rams that push with (" in pteron.architecture(oblique).reason
+
+
+def test_equal_plates_are_told_to_move_with_their_rams_held(tmp_path):
+    robot = TILTED["stewart"]
+    azimuths = np.radians([-10.0, 10.0, 110.0, 130.0, 230.0, 250.0])
+    plate = 1.5 * np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros(6)])
+    free = {"direction": None, "base_cone": None, "platform_cone": None}
+    legs = tuple(
+        replace(leg, guide_point=tuple(r), platform_point=tuple(-s), **free)
+        for leg, r, s in zip(robot.legs, plate, np.roll(plate, 3, axis=0), strict=True)
+    )
+    done = run(f"check {pteron.save(replace(robot, legs=legs), tmp_path / 'plates.toml')}")
+    assert done.exit_code == 0
+    words = (
+        "with its rams held where a half turn takes the platform points of legs 1 and 4, 2 and 5"
+    )
+    assert words in " ".join(done.stdout.split())
 
 
 @NIGHTLY

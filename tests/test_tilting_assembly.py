@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 import tilting
 from mechanisms import gated
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.bodies.inertia import RodInertia, SpatialInertia
+from pteron.errors import SingularPose
 from pteron.kernels import numeric
 from pteron.legs import UPS
 from pteron.platforms import Platform
@@ -190,3 +193,74 @@ def test_two_poses_that_all_but_meet_are_told_apart():
     assert before == found[0]
     assert (found % 2 == 0).all()  # none is lost before it meets another
     assert len(set(found.tolist())) > 1
+
+
+def half_turned(shift, turn, rng):
+    """Return the pose of a platform after a displacement's inverse and a half turn."""
+    axis = tilting.unit(rng.normal(size=3))
+    half = 2.0 * np.outer(axis, axis) - np.eye(3)
+    place = 2.0 * (np.eye(3) - np.outer(axis, axis)) @ rng.normal(size=3)
+    rotation = half @ turn.T
+    return rotation, place - rotation @ shift
+
+
+def moving_hexapod(kind, rng):
+    """Return a hexapod, and a pose from which it moves with its rams held."""
+    base, top = rng.normal(size=(6, 3)), rng.normal(size=(6, 3))
+    turn, shift = tilting.rotation(rng), rng.normal(size=3)
+    rotation = tilting.rotation(rng)
+    if kind == "line-symmetric":
+        top = base[[3, 5, 4, 0, 2, 1]] @ turn.T + shift
+        rotation, shift = half_turned(shift, turn, rng)
+    elif kind == "translation":
+        line = rng.normal(size=3)
+        top = (base + np.outer(rng.normal(size=6), line)) @ rotation
+    else:  # about the line of two guide points and two platform points, on which five legs end
+        top = np.repeat(top[::2], 2, axis=0)
+        rotation = Rotation.align_vectors(base[5:] - base[4], top[2:3] - top[0])[0].as_matrix()
+        shift = base[4] + 0.3 * (base[5] - base[4]) - rotation @ top[0]
+    robot = hexapod(base.tolist(), top.tolist())
+    return robot, pteron.pose_of(robot, shift, rotation)
+
+
+MOVING = ["line-symmetric", "translation", "about a line"]
+
+
+@pytest.mark.parametrize("kind", gated(MOVING, MOVING[:2]))
+def test_a_platform_that_moves_with_its_joints_held_has_no_list_of_poses(kind):
+    rng = np.random.default_rng(8)
+    robot, pose = moving_hexapod(kind, rng)
+    told = pteron.architecture(robot).self_motions
+    assert [kind in text for text in told] == ([True] if kind != "about a line" else [])
+    joints, at, along = pteron.inverse_kinematics(robot, pose), pose, np.zeros(6)
+    for _ in range(40):
+        axes = np.linalg.svd(pteron.jacobian(robot, at))[2]
+        along = axes[-1] * (np.sign(axes[-1] @ along) or 1.0)
+        at = at + 0.01 * along
+        for _ in range(6):
+            inverse = np.linalg.pinv(pteron.jacobian(robot, at), rcond=1e-4)
+            at = at - inverse @ (pteron.inverse_kinematics(robot, at) - joints)
+        assert np.abs(pteron.inverse_kinematics(robot, at) - joints).max() < 1e-12
+    assert np.linalg.norm(at - pose) > 0.2
+    other = pteron.inverse_kinematics(robot, pose + 0.1)
+    with pytest.raises(SingularPose, match="self-motion") as caught:
+        pteron.direct_kinematics(robot, np.stack([other, joints]))
+    assert caught.value.index == (1,)
+    assert counts(pteron.direct_kinematics(robot, other)) >= 2
+    turned = pteron.turned(robot, tilting.rotation(rng))
+    assert pteron.architecture(turned).self_motions == told
+    with pytest.raises(SingularPose, match="self-motion"):
+        pteron.direct_kinematics(turned, joints)
+
+
+def test_a_pose_that_is_singular_but_alone_is_listed():
+    robot, rng = hexapod(BASE, TOP), np.random.default_rng(2)
+    start, way = rng.normal(size=(2, 6))
+
+    def measure(share):
+        return np.linalg.det(pteron.jacobian(robot, start + share * way))
+
+    pose = start + brentq(measure, 0.0, 1.0, xtol=1e-16) * way
+    poses = pteron.direct_kinematics(robot, pteron.inverse_kinematics(robot, pose))
+    assert np.nanmin(np.linalg.norm((poses - pose)[:, :3], axis=-1)) < 1e-6
+    assert pteron.architecture(robot).self_motions == ()

@@ -176,6 +176,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "home_reserve": float(pose_margins(robot, home).least),
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": layout.holds,
+        "self_motions": list(layout.self_motions),
         "doubts": [*unlikely, *loose, *elbow_warnings(robot, home), *load_warnings(robot, home)],
     }
 
@@ -221,6 +222,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
         *_passive(found["limited_joints"]),
         *tool,
+        *(f"The platform can move with its rams held {text}" for text in found["self_motions"]),
         work,
     )
 

@@ -19,6 +19,7 @@ from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, NoSquareRoot, PrimeField, evaluate, general_program, numeric
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
+from pteron.kinematics.ram_motions import self_motions_of_rams
 from pteron.kinematics.sampling import drawn_poses
 from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -70,6 +71,9 @@ class Architecture:
     constraint : float
         The largest constraint measure of these poses; see `constraint_measure`. NaN where `holds`
         is None.
+    self_motions : tuple of str
+        At which poses the platform of a hexapod of rams can move while all are held, though others
+        are not singular: kinds that the figures of the rams' ends show. There may be more.
     """
 
     singular: bool
@@ -78,6 +82,7 @@ class Architecture:
     type_ii: float
     holds: bool | None
     constraint: float
+    self_motions: tuple[str, ...] = ()
 
 
 def architecture(robot: RobotLike) -> Architecture:
@@ -122,7 +127,8 @@ def _architecture(robot: Manipulator) -> Architecture:
                 "singular; bring the guide points nearer or lengthen the links",
                 subject=robot.name,
             )
-        return Architecture(False, "", "one pose", most, holds, constraint)
+        moving = self_motions_of_rams(robot)
+        return Architecture(False, "", "one pose", most, holds, constraint, moving)
     told = closure_of(robot).vanishes() or balance_of_rams(robot)
     proof: Proof = "closed form" if told else "numerical"
     if _vanishes_exactly(robot):

@@ -27,7 +27,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.errors import SingularPose
 from pteron.kernels import Array, numeric
+from pteron.kinematics.evaluate import place
 from pteron.kinematics.tilting_assembly import tilting_poses
 from pteron.manipulator import Manipulator
 
@@ -81,18 +83,36 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
     """Return all poses (..., most, m) of joint coordinates (..., n), NaN last.
 
     They are ordered by phi, z, y and x: the coordinates from the last to the first.
+
+    Raises
+    ------
+    SingularPose
+        If a platform that tilts can move with the joints held, so that poses cannot be listed.
     """
+    shape = joints.shape[:-1]
     flat = joints.reshape(-1, joints.shape[-1])
-    parts = [
-        _poses(robot, flat[start : start + _BATCH], most) for start in range(0, len(flat), _BATCH)
-    ]
-    found = np.concatenate(parts) if parts else np.empty((0, most, robot.freedom))
-    return found.reshape(*joints.shape[:-1], most, robot.freedom)
+    found = np.empty((len(flat), most, robot.freedom))
+    for start in range(0, len(flat), _BATCH):
+        part = slice(start, start + _BATCH)
+        if not robot.platform.tilts:
+            found[part] = _poses(robot, flat[part], most)
+            continue
+        which, poses, moving = tilting_poses(robot, flat[part])
+        if moving.any():
+            row = start + int(moving.argmax())
+            index = tuple(int(i) for i in np.unravel_index(row, shape)) if shape else ()
+            raise SingularPose(
+                f"{place('joints', index)}: {robot.name}'s platform can move while these are held "
+                f"(a self-motion), so that their poses are no list: {flat[row].tolist()}",
+                kind="II",
+                measure=0.0,
+                index=index,
+            )
+        found[part] = in_order(_table(poses, which, most, len(moving)))[:, :most]
+    return found.reshape(*shape, most, robot.freedom)
 
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
-    if robot.platform.tilts:
-        return in_order(_table(*tilting_poses(robot, joints)[::-1], most, len(joints)))[:, :most]
     slides = robot.platform.slides
     zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
     rows = np.stack([zeroth, first, second], axis=-1)

@@ -37,7 +37,8 @@ def direct_kinematics(
     but for platforms with an angle on legs with rods or planar legs: there as the zeros of a
     polynomial whose degree is k, polished by Newton's method to 1e-14 or so. Those of platforms
     that tilt lie at the ends of k paths from a machine whose poses are known: all of them, each
-    proved, or next to a singularity missed by rounding alone.
+    proved, or next to a singularity missed by rounding alone. Where they form a curve it is found,
+    and refused.
 
     Parameters
     ----------
@@ -70,7 +71,8 @@ def direct_kinematics(
     Raises
     ------
     SingularPose
-        If the machine is singular at every pose.
+        If the machine is singular at every pose, or a platform that tilts can move with the joints
+        held (a self-motion), whatever `on_failure`.
     UnreachablePose
         With ``on_failure="raise"``, if joints have no pose.
 
@@ -129,7 +131,7 @@ def assembly_mode(
     UnreachablePose
         If a leg does not reach a pose.
     SingularPose
-        If the machine is singular at every pose.
+        If the machine is singular at every pose, or the pose is part of a self-motion.
 
     Examples
     --------

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pteron.equations.pose_paths import Closed
 from pteron.kernels import Array
 from pteron.kernels.path_programs import path_kernel, rows_kernel
+from pteron.kinematics.pose_curves import ROUNDING, of_length_one, on_curves, second_slopes
 
 Complex = NDArray[np.complex128]
 
@@ -52,11 +53,8 @@ _CONVERGED = 1e-7
 _POLISHING = 8
 """Most of Newton's steps to a real pose."""
 
-_ROUNDING = 2e-14
-"""Greatest miss, as a share of its terms, of a pose that is not proved, where two poses meet."""
-
 _NO_ROTATION = 1e-7
-"""Size of z's rotation part x, |z| = 1, below which P would be at infinity."""
+"""Size of z's rotation part x, |z| = 1, below which P would be at infinity; of an end |x.x|."""
 
 
 class Generic(NamedTuple):
@@ -87,8 +85,19 @@ def key_of(closed: Closed) -> str:
     return "-".join(str(int(part)) for part in closed)
 
 
-def real_poses(closed: Closed, machines: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return which machine (B, k, 7) each pose is of, in order, and the poses z (K, d), |z| = 1.
+class RealPoses(NamedTuple):
+    """The real poses of machines."""
+
+    which: NDArray[np.int64]
+    """(K,): which machine each is of, in order."""
+    poses: Array
+    """(K, d): z, |z| = 1."""
+    move: NDArray[np.bool_]
+    """(B,): whether poses of a machine form a curve, a self-motion; none of it is then listed."""
+
+
+def real_poses(closed: Closed, machines: Array) -> RealPoses:
+    """Return all real poses of machines (B, k, 7).
 
     See `stepped` for the numbers of a machine; they should be about 1.
     """
@@ -99,13 +108,13 @@ def real_poses(closed: Closed, machines: Array) -> tuple[NDArray[np.int64], Arra
         for start in range(0, len(machines), share)
     ]
     if not found:
-        return np.empty(0, dtype=np.int64), np.empty((0, closed.size))
-    return np.concatenate([part[0] for part in found]), np.concatenate([part[1] for part in found])
+        return RealPoses(np.empty(0, int), np.empty((0, closed.size)), np.empty(0, bool))
+    return RealPoses(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
-def _real_poses(known: Generic, machines: Array, first: int) -> tuple[NDArray[np.int64], Array]:
+def _real_poses(known: Generic, machines: Array, first: int) -> RealPoses:
     rng = np.random.default_rng(1)
-    left = np.arange(len(machines))
+    left, move = np.arange(len(machines)), np.zeros(len(machines), dtype=bool)
     which, poses = np.empty(0, dtype=np.int64), np.empty((0, known.closed.size))
     certain = np.empty(0)
     for trial in range(_TRIALS):
@@ -128,10 +137,16 @@ def _real_poses(known: Generic, machines: Array, first: int) -> tuple[NDArray[np
         missing = ~(converged.all(axis=-1) & _all_differ(ends))
         if trial:  # paths that are always lost lead nowhere
             missing &= (np.bincount(which, minlength=len(machines)) > counts)[left]
-        left = left[missing]
+        else:
+            turns = np.abs((ends[..., :4] ** 2).sum(axis=-1)) > _NO_ROTATION
+            own, lost = np.nonzero(~converged & turns)
+            starts = of_length_one(_largest_real(ends[own, lost]).real)
+            move[own[on_curves(known.closed, turned[own], starts)]] = True
+        left = left[missing & ~move[left]]
         if not len(left):
             break
-    return which + first, poses
+    alone = ~move[which]
+    return RealPoses(which[alone] + first, poses[alone], move)
 
 
 _Step = Callable[[Array, Array], tuple[Array, Array]]
@@ -220,13 +235,16 @@ def _all_differ(ends: Complex) -> NDArray[np.bool_]:
 
 def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
     """Return those of z (B, N, d) that may be real: which machine's (K,), and z (K, d)."""
-    largest = np.abs(ends).argmax(axis=-1)[..., None]
-    phase = np.take_along_axis(ends, largest, axis=-1)
-    with np.errstate(all="ignore"):
-        turned = ends * (phase.conj() / np.abs(phase))
+    turned = _largest_real(ends)
     real = arrived & (np.abs(turned.imag).max(axis=-1) <= _REAL)
-    found = turned.real[real]
-    return np.nonzero(real)[0], found / np.linalg.norm(found, axis=-1, keepdims=True)
+    return np.nonzero(real)[0], of_length_one(turned.real[real])
+
+
+def _largest_real(z: Complex) -> Complex:
+    """Return z (..., d) times the phase that makes its largest coordinate real."""
+    phase = np.take_along_axis(z, np.abs(z).argmax(axis=-1)[..., None], axis=-1)
+    with np.errstate(all="ignore"):
+        return np.asarray(z * (phase.conj() / np.abs(phase)))
 
 
 def _refined(step: _Step, target: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -259,18 +277,13 @@ def _polished(closed: Closed, machines: Array, z: Array) -> Array:
 def _proved(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
     """Return which z (K, d) are poses, and within which radius they are the only ones.
 
-    By Kantorovich's theorem: closures are quadrics, whose second derivatives do not change. A pose
-    next to a singularity, where it proves nothing, counts if it misses them by rounding alone; the
-    radius is then 0.
+    By Kantorovich's theorem. A pose next to a singularity, where it proves nothing, counts if it
+    misses the closures by rounding alone; the radius is then 0.
     """
     if not len(z):
         return np.zeros(0, dtype=bool), np.zeros(0)
     rows, missed = rows_kernel(closed)(z, machines.reshape(len(z), 7 * closed.equations))
-    a, b, r = machines[..., :3], machines[..., 3:6], np.abs(machines[..., 6])
-    length_a, length_b = (np.linalg.norm(v, axis=-1) for v in (a, b))
-    bends = (length_a + length_b) ** 2 + 4.0 * closed.moves + r
-    bends[:, closed.spheres :] = (2.0 * length_a * (2.0 + length_b) + 2.0 * r)[:, closed.spheres :]
-    bend = np.sqrt((bends**2).sum(axis=-1) + closed.moves)
+    bend = second_slopes(closed, machines)
     rounding = 16.0 * np.finfo(float).eps * bend
     whole = np.concatenate([rows, z[:, None]], axis=1)
     with np.errstate(all="ignore"):
@@ -278,7 +291,7 @@ def _proved(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_
         newton = inverse * (np.linalg.norm(missed, axis=-1) + rounding)
         proof = 2.0 * inverse * bend * newton
         radius = np.where(proof <= 1.0, 1.0 / (inverse * bend), 0.0)
-    close = np.linalg.norm(missed, axis=-1) <= _ROUNDING * bend
+    close = np.linalg.norm(missed, axis=-1) <= ROUNDING * bend
     nowhere = np.linalg.norm(z[:, :4], axis=-1) <= _NO_ROTATION
     return (close | (radius > 0.0)) & ~nowhere, radius
 

@@ -15,7 +15,7 @@ from pteron.kernels import Array
 from pteron.kernels.path_programs import spheres_kernel
 from pteron.manipulator import Manipulator
 
-_ROUNDING = 1e-10
+ROUNDING = 1e-10
 """Singular values over the largest below this are rounding."""
 
 
@@ -24,16 +24,10 @@ def balance_of_rams(robot: Manipulator) -> str:
 
     It is proved up to rounding of the points.
     """
-    if len(robot.platform.angles) < 3 or not robot.platform.lengths:
+    figures = ram_figures(robot)
+    if figures is None:
         return ""
-    joints = np.array([[1.0], [2.0]]) * np.ones(robot.joint_count)
-    base, other = spheres_kernel(robot)(joints)[0]
-    if not np.array_equal(base, other):
-        return ""  # joints move the near ends too: no rams
-    top = np.array([leg.platform_point for leg in robot.legs])
-    base, top = (figure - figure.mean(axis=0) for figure in (base, top))
-    if not (base.any() and top.any()):
-        return ""
+    base, top = figures
     if _vanishes(base, 1):
         return "all guide points lie on one line, about which no ram then has a moment"
     near, far = (_with_one(figure / np.abs(figure).max()) for figure in (base, top))
@@ -48,9 +42,25 @@ def balance_of_rams(robot: Manipulator) -> str:
     )
 
 
+def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
+    """Return guide points and platform points (6, 3) of a hexapod of rams, less their means.
+
+    None for any other machine, and where all points of a figure coincide.
+    """
+    if len(robot.platform.angles) < 3 or not robot.platform.lengths:
+        return None
+    joints = np.array([[1.0], [2.0]]) * np.ones(robot.joint_count)
+    base, other = spheres_kernel(robot)(joints)[0]
+    if not np.array_equal(base, other):
+        return None  # joints move the near ends too: no rams
+    top = np.array([leg.platform_point for leg in robot.legs])
+    base, top = (figure - figure.mean(axis=0) for figure in (base, top))
+    return (base, top) if base.any() and top.any() else None
+
+
 def _vanishes(rows: Array, rank: int) -> bool:
     values = np.linalg.svd(rows, compute_uv=False)
-    return bool(values[rank] <= _ROUNDING * values[0])
+    return bool(values[rank] <= ROUNDING * values[0])
 
 
 def _with_one(figure: Array) -> Array:
@@ -62,7 +72,7 @@ def _alike(base: Array, top: Array) -> str:
     left, _, right = np.linalg.svd(base.T @ top)
     turned = base @ left @ right
     factor = float((turned * top).sum() / (turned * turned).sum())
-    if np.linalg.norm(top - factor * turned) > _ROUNDING * np.linalg.norm(top):
+    if np.linalg.norm(top - factor * turned) > ROUNDING * np.linalg.norm(top):
         return ""
     where = " on a conic" if _on_conics(base) else ""
     return (

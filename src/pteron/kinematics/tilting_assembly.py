@@ -23,10 +23,14 @@ _ANOTHER = 1e-6
 """Greatest difference of a position, over the size, and a rotation from those of coordinates."""
 
 
-def tilting_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], Array]:
+def tilting_poses(
+    robot: Manipulator, joints: Array
+) -> tuple[NDArray[np.int64], Array, NDArray[np.bool_]]:
     """Return which row of joint coordinates (B, n) each pose is of, in order, and the poses (K, m).
 
-    Poses of a tripod with the yaw on the other side of those that it has are left out.
+    With them comes whether the platform can move while a row's joints are held (B,); none of its
+    poses is then listed. Those of a tripod with the yaw on the other side of the one that it has
+    are left out.
     """
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(
@@ -62,7 +66,7 @@ def tilting_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64],
     machines[:, closed.spheres :, 3:6] /= size[:, None, None]
     machines[:, spheres, 6] /= size[:, None] ** 2
     machines[:, closed.spheres :, 6] /= size[:, None]
-    which, z = real_poses(closed, machines)
+    which, z, move = real_poses(closed, machines)
     place, turned = placed(z)
     place = size[which, None] * place + base[which] - turned @ top
     rotation = turned @ frame.T
@@ -71,7 +75,9 @@ def tilting_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64],
     away = np.abs(found - place).max(axis=-1) / size[which]
     away += np.abs(np.swapaxes(axes, -1, -2) - rotation).max(axis=(-2, -1))
     own_side = away < _ANOTHER
-    return good[which[own_side]], poses[own_side]
+    moving = np.zeros(len(joints), dtype=bool)
+    moving[good] = move
+    return good[which[own_side]], poses[own_side], moving
 
 
 def _equations(robot: Manipulator, centers: Array, squares: Array) -> tuple[Array, Array, Array]:

@@ -1,0 +1,85 @@
+"""Curves of poses: self-motions, in which a platform moves while all joints are held.
+
+Paths to such a machine end at points of the curve, in general complex ones, where Newton's steps
+fail. From their real parts a damped descent leads to real points, if the curve has any.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.equations.pose_paths import Closed
+from pteron.kernels import Array
+from pteron.kernels.path_programs import rows_kernel
+
+ROUNDING = 2e-14
+"""Greatest miss, as a share of its terms, of a pose that is not proved, where two poses meet."""
+
+_STEPS = 30
+"""Steps of a descent."""
+
+_FLAT = 1e-6
+"""Singular value of the closures' derivatives, over the largest, that counts as none."""
+
+_ALONG = 0.02
+"""Distance, |z| = 1, from a pose to another on a curve. At an isolated pose of multiplicity m the
+closures miss there by its m-th power or so, far above rounding."""
+
+
+def on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
+    """Return which z (K, d) lead to a pose that lies on a curve of poses of its machine (K, k, 7).
+
+    Where the closures' derivatives lose a rank other poses are sought, at a distance either way in
+    the direction that is free.
+    """
+    if not len(z):
+        return np.zeros(0, dtype=bool)
+    miss = ROUNDING * second_slopes(closed, machines)
+    one = np.eye(closed.size)
+    z, missed = _descended(closed, machines, z, one)
+    z = of_length_one(z)
+    rows, _ = rows_kernel(closed)(z, machines.reshape(len(z), 7 * closed.equations))
+    _, sizes, axes = np.linalg.svd(np.concatenate([rows, z[:, None]], axis=1))
+    found = (missed <= miss) & (sizes[:, -1] <= _FLAT * sizes[:, 0])
+    held = np.stack([z, axes[:, -1]], axis=1)
+    across = one - np.swapaxes(held, -1, -2) @ held
+    for side in (_ALONG, -_ALONG):
+        _, missed = _descended(closed, machines, z + side * axes[:, -1], across)
+        found &= missed <= miss
+    return np.asarray(found)
+
+
+def _descended(closed: Closed, machines: Array, z: Array, across: Array) -> tuple[Array, Array]:
+    """Return the best z (K, d) of Levenberg and Marquardt's steps, and what it misses.
+
+    Damped by the square of the miss they come to a curve of poses as fast as Newton's to a regular
+    pose (Yamashita and Fukushima, On the rate of convergence of the Levenberg-Marquardt method,
+    2001). `across` (d, d) or (K, d, d) projects onto the steps that are allowed.
+    """
+    numbers = machines.reshape(len(z), 7 * closed.equations)
+    best, least = z, np.full(len(z), np.inf)
+    for _ in range(_STEPS):
+        rows, missed = rows_kernel(closed)(z, numbers)
+        size = np.linalg.norm(missed, axis=-1)
+        better = size < least
+        best, least = np.where(better[:, None], z, best), np.where(better, size, least)
+        u, s, v = np.linalg.svd(rows @ across, full_matrices=False)
+        damping = np.maximum(size, ROUNDING)[:, None] ** 2
+        step = (missed[:, None] @ u) * (s / (s * s + damping))[:, None] @ v
+        z = z - step[:, 0]
+    return best, least
+
+
+def second_slopes(closed: Closed, machines: Array) -> Array:
+    """Return a bound (K,) of the closures' second derivatives, which are constant: quadrics."""
+    a, b, r = machines[..., :3], machines[..., 3:6], np.abs(machines[..., 6])
+    length_a, length_b = (np.linalg.norm(v, axis=-1) for v in (a, b))
+    bends = (length_a + length_b) ** 2 + 4.0 * closed.moves + r
+    bends[:, closed.spheres :] = (2.0 * length_a * (2.0 + length_b) + 2.0 * r)[:, closed.spheres :]
+    return np.sqrt((bends**2).sum(axis=-1) + closed.moves)
+
+
+def of_length_one(z: Array) -> Array:
+    """Return z (..., d) over their lengths."""
+    return np.asarray(z / np.linalg.norm(z, axis=-1, keepdims=True))
