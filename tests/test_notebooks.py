@@ -10,6 +10,7 @@ import nbformat
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from mechanisms import CLIENTS
 
 from pteron.plots import forces_figure
 
@@ -25,7 +26,7 @@ def notebook(request):
 def test_each_is_in_the_list_in_this_order():
     listed = re.findall(r"^(\d-[\w-]+)$", (FOLDER / "index.md").read_text("utf-8"), re.MULTILINE)
     assert listed == [path.stem for path in NOTEBOOKS]
-    assert [name[0] for name in listed] == list("1234567")
+    assert [name[0] for name in listed] == list("12345678")
 
 
 def test_it_is_valid_and_names_no_kernel_but_the_usual_one(notebook):
@@ -60,6 +61,14 @@ def test_its_links_lead_somewhere(notebook):
     for target in targets:
         if not target.startswith("https://"):
             assert (FOLDER / unquote(target.partition("#")[0])).is_file(), target
+
+
+@CLIENTS
+def test_another_machine_too_is_identified_with_its_calibrated_geometry_only():
+    page = nbformat.read(FOLDER / "8-calibrate-then-identify.ipynb", as_version=nbformat.NO_CONVERT)
+    code = "\n".join(cell.source for cell in page.cells if cell.cell_type == "code")
+    assert code.count("default_rng(3)") == 1
+    exec(code.replace("default_rng(3)", "default_rng(6)"), {"display": str})  # it checks itself
 
 
 def test_a_notebook_shows_a_picture_on_white_without_pyplot(monkeypatch):
