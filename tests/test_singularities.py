@@ -323,6 +323,19 @@ def test_a_search_that_is_given_up_tells_its_bound():
         nearest_singularities(robot, pose, most=0)
 
 
+def test_the_estimate_of_a_turn_is_about_the_axis_that_leads_there_soonest():
+    robot = pteron.load("wrist")
+    pose = np.array([0.1, -0.2, 0.3])
+    measure, step = numeric(robot, "type_ii"), 1e-6
+    turns = Rotation.from_rotvec(step * np.vstack([np.eye(3), -np.eye(3)])).as_matrix()
+    at, axes = pteron.position_of(robot, pose), pteron.rotation_of(robot, pose)
+    ahead, behind = np.split(measure(pteron.pose_of(robot, at, turns @ axes))[0], 2)
+    slope = np.linalg.norm(ahead - behind) / (2.0 * step)
+    size = abs(measure(pose)[0])
+    expected = size / np.hypot(slope, size / np.pi)
+    assert numeric(robot, "type_ii_distances")(pose)[1] == pytest.approx(expected, rel=1e-8)
+
+
 def test_distances_in_closed_form_are_met():
     robot, pose = CATALOG["quadrupteron"], np.array([0.01, 0.0, 0.02, 0.3])
     found = nearest_singularities(robot, pose)

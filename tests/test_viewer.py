@@ -243,6 +243,8 @@ def test_motions_joints_and_logs_are_read(homes):
     poses = pl.DataFrame({"t": t} | dict(zip(robot.coordinates, pose.T, strict=True)))
     motion = motion_of_file(robot, "a.csv", _csv(poses), home)
     assert np.allclose(motion.at(0.4)[0], home + 0.02 * np.sin(0.8 * np.pi) ** 3, atol=1e-6)
+    written = poses.write_csv(separator=";", decimal_comma=True).encode()
+    np.testing.assert_array_equal(motion_of_file(robot, "d.csv", written, home).pose, motion.pose)
     joints = pteron.inverse_kinematics(robot, pose)
     columns = dict(zip(robot.joint_names, joints.T, strict=True))
     followed = motion_of_file(robot, "b.csv", _csv(pl.DataFrame({"t": t} | columns)), home)

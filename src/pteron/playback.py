@@ -133,7 +133,10 @@ def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
         plain = CsvFile(data, source)
         if is_table(robot, plain.columns):
             return whole_table(plain)
-        return LogFile(CsvFile(data, source, Dialect()), robot, Description()).read()
+        found = CsvFile(data, source, Dialect())
+        if is_table(robot, found.columns):
+            return whole_table(found)
+        return LogFile(found, robot, Description()).read()
     with TemporaryDirectory() as folder:
         path = Path(folder) / "motion.parquet"
         path.write_bytes(data)

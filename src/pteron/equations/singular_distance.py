@@ -19,25 +19,32 @@ _TINY = 1e-30
 
 
 def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expression]:
-    """Return the distance, m, under translation alone, and the angle, rad, of the last angle alone.
+    """Return the distance, m, under translation alone, and the angle, rad, of a turn alone.
 
-    They are at most `FAR` and pi; a platform that does not turn has no angle.
+    They are at most `FAR` and pi; a platform that does not turn has no angle. One that tilts turns
+    about whichever axis brings it there soonest, of those about which its angles turn it.
     """
     state = machine.state(pose)
     measure = machine.closure.measure(state.platform, state.legs)
     slope = ca.gradient(measure, pose)
     lengths = machine.platform.directions.shape[1]
-    found = {"metres": _first_order(measure, slope[:lengths], FAR)}
+    along, about = slope[:lengths], slope[lengths:]
+    found = {"metres": _first_order(measure, ca.dot(along, along), FAR)}
     if machine.closure.orientation is not None:
         a, b = machine.closure.orientation
         c, s = ca.cos(pose[-1]), ca.sin(pose[-1])
         found["radians"] = ca.atan2(ca.fabs(a * c + b * s), ca.fabs(b * c - a * s))
-    elif lengths < machine.freedom:
-        found["radians"] = _first_order(measure, slope[-1], math.pi)
+    elif about.numel():
+        square = ca.dot(about, about)
+        if about.numel() > 1:  # |omega|^2 is a form of the angles' rates
+            turning = state.platform.twist_rows[3:, lengths:]
+            form = ca.mtimes(turning.T, turning)
+            square = ca.dot(about, ca.mtimes(ca.inv_minor(form), about))
+        found["radians"] = _first_order(measure, square, math.pi)
     return found
 
 
-def _first_order(measure: Expression, slope: Expression, most: float) -> Expression:
-    """Return |mu| over its slope, with a least slope that makes the distance `most` at most."""
+def _first_order(measure: Expression, square: Expression, most: float) -> Expression:
+    """Return |mu| over its slope, given squared; a least slope keeps the distance to `most`."""
     least = measure / most
-    return ca.fabs(measure) / ca.sqrt(ca.dot(slope, slope) + least * least + _TINY)
+    return ca.fabs(measure) / ca.sqrt(square + least * least + _TINY)
