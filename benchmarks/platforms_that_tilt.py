@@ -4,8 +4,8 @@ Machines are oblique, under any gravity. 200 states of each are given to MuJoCo,
 closed, and to Lagrange's equations of energies that CasADi differentiates (tests/lagrange.py): they
 share nothing with pteron's equations. Forward dynamics must give the accelerations back. MuJoCo
 sees every other working mode at ten states as well. `base` are the base parameters of one machine,
-upright, by three methods, as it is and turned as a whole. `--quick` takes one machine of two
-combinations.
+upright, by three methods, as it is and turned as a whole. Names such as `1T2R-RPS` choose rows;
+`--quick` takes one machine of two combinations.
 """
 
 from __future__ import annotations
@@ -69,9 +69,10 @@ def main() -> None:
     """Print a row for each combination; exit with 1 if a bound is broken or counts differ."""
     motions = reversed(tilting.LEGS)  # those with few legs first
     cases = [(motion, kind) for motion in motions for kind in tilting.LEGS[motion]]
+    named = [case for case in cases if "-".join(case) in sys.argv]
     faults = []
     print(f"{'':10}machines states modes", *(f"{name:>8}" for name in _BOUNDS), " base", flush=True)
-    for motion, kind in [cases[0], cases[3]] if quick() else cases:
+    for motion, kind in named or ([cases[0], cases[3]] if quick() else cases):
         name, worst = f"{motion} {kind}", Worst()
         for seed in range(3 * _MACHINES):
             if worst.machines < _MACHINES:

@@ -16,6 +16,7 @@ from mechanisms import (
     MACHINES,
     MECHANISMS,
     NIGHTLY,
+    TILTED,
     gated,
     in_turn,
     random_machine,
@@ -665,6 +666,17 @@ def test_the_cheapest_base_parameters_give_the_same_forces(case):
     assert base.rank == plain.rank
     cheapest, other = (kernel.operations for kernel in kernels)
     assert cheapest <= other
+
+
+def test_the_cheapest_base_parameters_of_a_nearly_symmetric_machine():
+    first, last = TILTED["ankle"].legs
+    point = (last.platform_point[0] + 1e-8, *last.platform_point[1:])
+    robot = replace(TILTED["ankle"], legs=(first, replace(last, platform_point=point)))
+    base = pteron.cheapest_parameters(robot)
+    assert base.rank == pteron.base_parameters(robot).rank == 17
+    motion = tilting.states(robot, pteron.workspace.home_pose(robot), 20)
+    found = pteron.compile(robot, "inverse_dynamics", base=base)(*motion)
+    assert relative_error(found, pteron.inverse_dynamics(robot, *motion)) < 1e-9
 
 
 def test_tiny_gravity_counts():

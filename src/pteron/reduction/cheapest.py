@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from functools import lru_cache
 
 import casadi as ca
@@ -13,7 +12,6 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import JOINED, OWN
 from pteron.equations.machine import Machine, State
 from pteron.equations.virtual_work import inverse_dynamics
-from pteron.errors import ModelError
 from pteron.kernels import Array, Port, count_operations, program
 from pteron.kernels.graph import graph_of
 from pteron.kernels.hoisting import hoisted
@@ -77,11 +75,8 @@ def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
         # The columns of a platform that tilts are too many to exchange one by one.
         tilts = robot.platform.tilts
         found.add(start if tilts else _improved(model, grouping, start, [*own, *others]))
-    for kept in sorted(found, key=lambda kept: (_final_cost(robot, kept), kept)):
-        # Of a machine that is nearly symmetric floats may keep columns that exactness finds zero.
-        with suppress(ModelError):
-            return base_parameters(robot, keep=[columns[k].name for k in kept])
-    return base
+    best = min(found, key=lambda kept: (_final_cost(robot, kept), kept))
+    return base_parameters(robot, keep=[columns[k].name for k in best])
 
 
 def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
@@ -93,14 +88,16 @@ def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
 
 def _independent(grouping: Array, order: Sequence[int]) -> tuple[int, ...]:
     """Return the first columns, in this order, that do not depend on those before them."""
-    rest = grouping.copy()
+    basis = np.empty((len(grouping), 0))
     kept = []
     for column in order:
-        vector = rest[:, column]
+        vector = grouping[:, column]
+        for _ in range(2):  # what once leaves of a small vector is not yet across the basis
+            vector = vector - basis @ (basis.T @ vector)
         size = np.linalg.norm(vector)
         if size > _NONZERO:
             kept.append(column)
-            rest = rest - np.outer(vector, vector @ rest) / size**2
+            basis = np.column_stack([basis, vector / size])
     return tuple(sorted(kept))
 
 
