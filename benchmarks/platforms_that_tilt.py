@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from measuring import States, quick
+from measuring import Array, States, quick
 
 import pteron
+from pteron.kernels import numeric
 
 os.environ.setdefault("PTERON_KERNELS", "vm")  # each machine is asked a few times
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -32,6 +33,9 @@ from mechanisms import relative_error
 _MACHINES, _STATES = (1, 20) if quick() else (10, 200)
 _FEWEST = _STATES // 2
 """States of a machine: one that reaches less of its surroundings is drawn anew."""
+
+_FAR = 1e-3
+"""Type-II measure of a state, at least."""
 
 _BOUNDS = {"loops": 1e-13, "J": 1e-10, "MuJoCo": 1e-8, "Lagrange": 1e-8, "forward": 1e-10}
 _METHODS: tuple[Literal["exact", "svd", "qr"], ...] = ("exact", "svd", "qr")
@@ -98,7 +102,7 @@ def look(motion: str, kind: str, seed: int, worst: Worst) -> None:
     """Compare one machine in all of its working modes."""
     angles = "xyz" if seed % 2 and "3R" in motion else "rpy"
     robot, home = tilting.machine(motion, (kind,), seed, angles)
-    states = tilting.states(robot, home, _STATES, seed)
+    states = drawn(robot, home, _STATES, seed)
     if len(states[0]) < _FEWEST:
         return
     worst.machines += 1
@@ -113,7 +117,14 @@ def look(motion: str, kind: str, seed: int, worst: Worst) -> None:
     )
     for mode in pteron.working_modes(robot):
         if mode != robot:
-            compare(mode, tilting.states(mode, home, 10, seed), worst)
+            compare(mode, drawn(mode, home, 10, seed), worst)
+
+
+def drawn(robot: pteron.Manipulator, home: Array, count: int, seed: int) -> States:
+    """Draw states that are not next to a singularity, where all ways lose digits."""
+    states = tilting.states(robot, home, count, seed)
+    far = np.abs(numeric(robot, "type_ii")(states[0])[0]) > _FAR
+    return states[0][far], states[1][far], states[2][far]
 
 
 def compare(robot: pteron.Manipulator, states: States, worst: Worst) -> None:

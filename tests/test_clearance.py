@@ -1,13 +1,14 @@
 """Interference: the distance of segments, and of a machine's bodies."""
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import casadi as ca
 import numpy as np
 import pytest
-from mechanisms import CATALOG, random_machine
-from scipy.optimize import minimize
+import tilting
+from mechanisms import CATALOG, TILTED, gated, random_machine
+from scipy.optimize import lsq_linear, minimize
 
 import pteron
 from pteron.equations.clearance import squared_distance
@@ -92,6 +93,53 @@ def test_bodies_are_where_they_are_drawn(name, distance):
         for (one, other), value in zip(found.pairs, found.distances[k], strict=True):
             pairs = np.array([[*a, *b] for a in bodies[one] for b in bodies[other]])
             assert value == pytest.approx(distance(pairs).min(), abs=1e-12), (one, other)
+
+
+def lines_of(robot, pose):
+    """Return the lines of a tilting machine's bodies, by formulas of textbooks."""
+    p, axes = robot.platform.at(pose)
+    points = [p + leg.platform_point @ axes for leg in robot.legs]
+    found = {"platform": [(p, point) for point in points]}
+    joints = pteron.inverse_kinematics(robot, pose)
+    for i, (leg, q, point) in enumerate(zip(robot.legs, joints, points, strict=True), start=1):
+        start = np.array(leg.guide_point)
+        if leg.names.get("u") == "cylinder":
+            found[f"leg {i}"] = [(start, point)]
+            continue
+        if "p" in leg.names:
+            ends = [start + value * np.array(leg.joint_axis) for value in (*leg.limits, q)]
+            found[f"leg {i} guide"], end = [ends[:2]], ends[2]
+        else:
+            d, a = np.array(leg.direction), np.array(leg.zero_direction)
+            end = start + leg.upper_length * (np.cos(q) * a + np.sin(q) * np.cross(d, a))
+            found[f"leg {i} crank"] = [(start, end)]
+        found[f"leg {i} {leg.names['l']}"] = [(end, point)]
+    return found
+
+
+@pytest.mark.parametrize("name", gated(TILTED, ["stewart", "ball-table", "ankle", "sprint-z3"]))
+def test_bodies_of_tilting_machines_are_as_far_apart_as_least_squares_find(name):
+    turn = tilting.rotation(np.random.default_rng(1))
+    thick = {"guide": 0.001, "upper": 0.004, "lower": 0.003, "platform": 0.002}
+    radii = {"guide": 0.001, "crank": 0.004, "platform": 0.002}
+    for robot in (TILTED[name], pteron.turned(TILTED[name], turn)):
+        poses = pteron.random_poses(robot, 3, seed=1, type_ii=0.0)
+        found = clearance(robot, poses, thick)
+        assert {"leg 1", "leg 2"} <= {word[:5] for pair in found.pairs for word in pair}
+        for pose, told in zip(poses, found.distances, strict=True):
+            lines = lines_of(robot, pose)
+            for (one, other), value in zip(found.pairs, told, strict=True):
+                apart = []
+                for (a, a_end), (b, b_end) in product(lines[one], lines[other]):
+                    across = np.transpose([a_end - a, b - b_end])
+                    near = lsq_linear(across, b - a, (0.0, 1.0), tol=1e-15)
+                    apart.append(np.sqrt(2.0 * near.cost))
+                # A ram has the thicker of its two parts.
+                taken = sum(
+                    radii.get(word.split()[-1], 0.003 if word.split()[2:] else 0.004)
+                    for word in (one, other)
+                )
+                assert value == pytest.approx(min(apart) - taken, abs=1e-9), (one, other)
 
 
 def test_bodies_with_a_common_joint_are_left_out():

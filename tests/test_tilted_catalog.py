@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import tilting
 from mechanisms import TILTED, gated
 from test_cli import run
 
@@ -38,6 +39,16 @@ def test_it_is_clean_and_level_at_home(name):
     assert pose_margins(robot, home).least > 0.4
     turned = pteron.rotation_of(robot, home, form="tilt-torsion")
     np.testing.assert_allclose(turned, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", gated(TILTED, ["ankle", "wrist", "hexaglide"]))
+def test_a_machine_turned_as_a_whole_keeps_its_margins(name):
+    robot, turn = TILTED[name], tilting.rotation(np.random.default_rng(1))
+    other, pose = pteron.turned(robot, turn), home_pose(robot) + 0.01
+    moved, place = pose.copy(), robot.platform.at(pose)[0]
+    moved[~robot.platform.angular] = other.platform.directions @ turn @ place
+    found, expected = pose_margins(other, moved), pose_margins(robot, pose)
+    np.testing.assert_allclose(found.joints, expected.joints, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", gated(["ankle", "wrist", "ball-table"], ["ankle"]))

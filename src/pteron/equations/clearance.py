@@ -31,8 +31,9 @@ from pteron.manipulator import Manipulator
 Segment = tuple[Expression, Expression]
 """Both ends, (3, 1)."""
 
-Kind = Literal["guide", "upper", "lower", "platform"]
-"""Kinds of bodies: a slider's guide, an upper link or crank, a last link or rods, the platform."""
+Kind = Literal["guide", "upper", "lower", "leg", "platform"]
+"""Kinds of bodies: a slider's guide, an upper link or crank, a last link or rods, a leg whose two
+parts slide on one line (a ram or a shaft), the platform."""
 
 _COINCIDENT = 1e-9
 """Distance below which points, or guides, count as one, m."""
@@ -51,7 +52,7 @@ class Body:
 
 
 def bodies(robot: Manipulator) -> list[Body]:
-    """Return the bodies of a machine: of each leg guide, upper link and last link, then platform.
+    """Return the bodies of a machine: of each leg guide, upper and last link, then the platform.
 
     A guide without limits has no ends, and is left out.
     """
@@ -148,8 +149,12 @@ def _of_leg(
     if lower is not None:
         half = _half_bar(leg)
         sides = [half, -half] if half is not None else [ca.SX(3, 1)]
-        name = leg.names["l"] + ("s" if half is not None else "")
-        yield Body("lower", i, f"leg {i} {name}"), [(c - lower + h, c + h) for h in sides]
+        lines = [(c - lower + h, c + h) for h in sides]
+        if upper is None and _has_upper(leg):
+            yield Body("leg", i, f"leg {i}"), lines
+        else:
+            name = leg.names["l"] + ("s" if half is not None else "")
+            yield Body("lower", i, f"leg {i} {name}"), lines
 
 
 def _half_bar(leg: LegKind) -> Expression | None:
@@ -181,11 +186,12 @@ def _share_a_joint(robot: Manipulator, a: Body, b: Body) -> bool:
     """Say whether two bodies share a joint, are of one guide, or are both fixed."""
     if a.kind == b.kind == "guide":
         return True
+    last = [body.kind in ("lower", "leg") for body in (a, b)]
     if "platform" in (a.kind, b.kind):
-        return "lower" in (a.kind, b.kind)
+        return any(last)
     if a.leg == b.leg:
         return {a.kind, b.kind} != {"guide", "lower"} or not _has_upper(robot.legs[a.leg - 1])
-    if a.kind == b.kind == "lower":
+    if all(last):
         return _at_one_point(robot, a.leg, b.leg)
     guide, other = (a, b) if a.kind == "guide" else (b, a)
     return guide.kind == "guide" and _first(robot, other) and _one_line(robot, guide.leg, other.leg)

@@ -133,6 +133,8 @@ class LegKind(ABC):
     """Its stance where that is zero, as a clause for messages."""
     keys: ClassVar[Mapping[str, Key]]
     """The fields of its own, which are its TOML keys, and what they hold; see `every_key`."""
+    base_cones: ClassVar[tuple[str, ...]] = ()
+    """The keys of cones whose axis is in the base frame."""
     conditions: ClassVar[tuple[Condition, ...]] = ()
     """Conditions between its fields."""
     equations_class: ClassVar[_EquationsClass]
@@ -374,8 +376,15 @@ class LegKind(ABC):
         """
         return None
 
-    def turned(self, turn: Any) -> Self:
-        """Return the leg with every base-frame vector v replaced by `turn(v)`."""
+    def turned(self, turn: Any, *, platform: bool = False) -> Self:
+        """Return the leg with every base-frame vector v replaced by `turn(v)`.
+
+        With `platform` those of the platform's frame are too.
+        """
         vectors = [q.name for q in self.quantities if q.role in ("point", "direction", "normal")]
-        given = {name: getattr(self, name, None) for name in (*vectors, "fixed_offset")}
-        return replace(self, **{name: turn(v) for name, v in given.items() if v is not None})
+        vectors += ["fixed_offset", *(["platform_point"] if platform else [])]
+        cones = [*self.base_cones, *(["platform_cone"] if platform else [])]
+        given = {name: getattr(self, name, None) for name in (*vectors, *cones)}
+        found = {name: turn(given[name]) for name in vectors if given[name] is not None}
+        found |= {n: replace(given[n], axis=turn(given[n].axis)) for n in cones if given[n]}
+        return replace(self, **found)

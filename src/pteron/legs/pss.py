@@ -7,10 +7,10 @@ joints of a rod are counted as universal ones: a rod's spin about itself moves n
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from random import Random
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import casadi as ca
 
@@ -48,6 +48,7 @@ class PSS(SlideLeg):
 
     type = "PSS"
     names: ClassVar = {"p": "slider", "l": "rod"}
+    base_cones: ClassVar = ("tip_cone",)
     measure_text = "the cosine of the angle between rod and guide"
     account = (
         "A slider moves along e through the guide point r; its coordinate rho is zero there. A rod "
@@ -101,12 +102,6 @@ class PSS(SlideLeg):
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)
-
-    def turned(self, turn: Any) -> Self:
-        moved = super().turned(turn)
-        if self.tip_cone is None:
-            return moved
-        return replace(moved, tip_cone=replace(self.tip_cone, axis=turn(self.tip_cone.axis)))
 
     @classmethod
     def random_link(cls, values: Mapping[str, Sequence[Fraction]], rng: Random) -> list[Fraction]:

@@ -57,6 +57,7 @@ class UPS(RamLeg):
     screw_lead: float | None = None
 
     type = "UPS"
+    base_cones: ClassVar = ("base_cone",)
     account = (
         "A ram leads from a universal joint at the guide point r to a ball joint at the platform "
         "point s0. Its coordinate rho is its length."

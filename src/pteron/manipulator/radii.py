@@ -18,9 +18,9 @@ class Radii:
     guide : float
         Radius of a slider's guide, m.
     upper : float
-        Radius of an upper link or a crank, m.
+        Radius of an upper link or a crank, or of a ram's cylinder, m.
     lower : float
-        Radius of a last link or of each rod, m.
+        Radius of a last link, of each rod, or of a ram's piston, m.
     platform : float
         Radius of the platform's arms, m.
 
@@ -48,3 +48,8 @@ class Radii:
                 object.__setattr__(self, field.name, value)
         if faults:
             raise ModelError(told(faults), faults=faults)
+
+    @property
+    def leg(self) -> float:
+        """The radius of a leg whose upper and lower part slide on one line, m: the greater one."""
+        return max(self.upper, self.lower)

@@ -82,9 +82,9 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
     def turn(v: Vector) -> Vector:
         return vector((matrix @ v).tolist(), "rotation")
 
-    legs = tuple(leg.turned(turn) for leg in robot.legs)
-    if robot.platform.second_axis is not None:  # its points are in the base frame, at angles zero
-        legs = tuple(replace(leg, platform_point=turn(leg.platform_point)) for leg in legs)
+    # A 2R platform's frame is the base frame at angles zero.
+    on_platform = robot.platform.second_axis is not None
+    legs = tuple(leg.turned(turn, platform=on_platform) for leg in robot.legs)
     return replace(
         robot,
         platform=robot.platform.turned(turn),

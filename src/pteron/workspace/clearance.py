@@ -19,6 +19,7 @@ _PLURALS = {
     "guide": "guides",
     "upper": "upper links or cranks",
     "lower": "last links",
+    "leg": "legs",
     "platform": "platform",
 }
 """Names of bodies in the plural, for warnings."""
