@@ -38,7 +38,7 @@ def standard_motion(
     check_path(machine, path)
     if duration is None and not limits.any:
         tilts = machine.platform.tilts
-        beside = f", and of a point {1e3 * farthest_point(machine):.3g} mm from P as it turns,"
+        beside = f", and of a point {1e3 * farthest_point(machine):.0f} mm from P as it turns,"
         note(
             "Note: no limits given, and the machine's drives have none: the tool's acceleration"
             f"{beside if tilts else ''} is {PEAK_ACCELERATION:g} m/s^2 at most"

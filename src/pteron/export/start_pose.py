@@ -10,6 +10,7 @@ from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
+from pteron.workspace import home_pose
 
 _TYPE_I, _TYPE_II = 0.01, 0.001
 """Least type-I and type-II measures of random poses that are tried."""
@@ -21,11 +22,15 @@ _SHARE = 0.5
 def start_pose(robot: Manipulator) -> Array:
     """Return a pose (m,) to start from: zero if it is a good one, else amid the good ones.
 
+    Of a platform that tilts it is the home pose, which is level where that can be.
+
     Raises
     ------
     ModelError
         If the machine has no such pose.
     """
+    if robot.platform.tilts:
+        return home_pose(robot)
     poses = good_poses(robot)
     if len(poses) == 0:
         raise ModelError(f"{robot.name}: no pose was found within the joints' limits to start from")

@@ -16,6 +16,7 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
 from pteron.manipulator import Manipulator
+from pteron.motion.trajectories.pick_and_place import farthest_point
 from pteron.platforms.coordinates import COORDINATES
 from pteron.plots import (
     forces_figure,
@@ -69,6 +70,7 @@ def page(report: Report) -> str:
         cycle=report.cycle,
         standard=standard,
         way=way,
+        farthest=farthest_point(robot),
         kinds=kinds(robot),
         followers=_followers(robot),
         geometry=geometry(robot),

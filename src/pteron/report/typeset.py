@@ -15,6 +15,9 @@ from markupsafe import Markup, escape
 from pteron.platforms.coordinates import coordinate
 from pteron.templates import template as any_template
 
+_TINY = 1e-9
+"""Size below which leading zeros are no longer counted."""
+
 _MINUS = "\u2212"
 """The minus sign."""
 
@@ -29,19 +32,22 @@ _CODE = r"<code>\g<0></code>"
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Return a number with so many significant digits, without exponent.
+    """Return a number with so many significant digits; an exponent has what is below 1e-9.
 
     Examples
     --------
-    >>> significant(0.0123456), significant(1234.6), significant(-2.0, 2)
-    ('0.0123', '1235', '−2.0')
+    >>> significant(0.0123456), significant(1234.6), significant(-2.0, 2), significant(-6e-14, 2)
+    ('0.0123', '1235', '−2.0', '−6.0e−14')
     """
     if not isfinite(value):
         return "∞" if value > 0 else "\u2013"
     if value == 0.0:
         return "0"
     # 999.6 is 1000 in three digits: the size counts after rounding.
-    rounded = float(f"{value:.{digits - 1}e}")
+    text = f"{value:.{digits - 1}e}"
+    rounded = float(text)
+    if abs(rounded) < _TINY:
+        return text.replace("-", _MINUS)
     return fixed(value, max(digits - 1 - floor(log10(abs(rounded))), 0))
 
 
