@@ -32,7 +32,7 @@ from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
 from pteron.viewer.server import free_port
 from pteron.viewer.session import Session
-from pteron.viewer.slices import slice_meshes
+from pteron.viewer.slices import choices, slice_map, slice_meshes
 from pteron.viewer.solids import from_z, moving_solids
 from pteron.viewer.state import (
     assembled,
@@ -225,6 +225,20 @@ def test_a_slice_holds_the_poses_in_reach(homes):
     assert (margins >= 0.0).all()
     assert np.ptp(serves[0][:, 1]) == 0.0
     assert not len(limited[1])
+    assert list(choices(state.robot)) == ["none", "xy", "xz", "yz"]
+
+
+def test_a_slice_along_an_angle_is_a_map():
+    robot = pteron.load("ball-table")
+    planes = choices(robot)
+    assert list(planes) == ["none", "z, roll", "z, pitch", "roll, pitch"]
+    span = np.array([[0.0, -0.5, -0.5], [0.3, 0.5, 0.5]])
+    home = pteron.workspace.home_pose(robot)
+    drawn = slice_map(robot, home, planes["z, roll"], span)
+    assert "Reach over z and roll" in drawn
+    assert "(mm)" in drawn
+    assert "(°)" in drawn
+    assert drawn != slice_map(robot, home + np.eye(3)[1] / 10, planes["z, roll"], span)
 
 
 def _csv(frame):
@@ -555,6 +569,25 @@ def test_a_reload_and_a_second_tab_show_the_same(page, viewer, browser):
 
 def field(tab, label):
     return tab.locator(f"text={label}").locator("xpath=ancestor::*[.//input][1]//input").first
+
+
+@CLIENTS
+def test_a_slice_along_angles_is_shown_in_the_panel(browser):
+    with view(pteron.load("ankle"), port=0) as viewer, opened(browser, viewer.url) as tab:
+        tab.get_by_role("tab", name="Show").click()
+        field(tab, "workspace slice").click()
+        tab.get_by_role("option", name="alpha, beta").click()
+        drawn = tab.locator("svg[aria-label='Reach over alpha and beta']")
+        drawn.wait_for()
+        box = drawn.bounding_box()
+        assert min(box["width"], box["height"]) > 150.0
+        before = drawn.inner_html()
+        viewer.move_to(viewer.state.pose + 0.1)
+        wait_for(tab, "before => document.querySelector('svg.plot').innerHTML !== before", before)
+        field(tab, "workspace slice").click()
+        tab.get_by_role("option", name="none").click()
+        drawn.wait_for(state="detached")
+        assert viewer.faults == ()
 
 
 @CLIENTS

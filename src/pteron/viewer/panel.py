@@ -143,13 +143,13 @@ class Panel:
             hint="At the actuators. A crank's torque is along its axis, as a screw turns",
         )
         self.handle = gui.add_checkbox("handle on the platform", initial_value=True)
-        planes = choices(self._session.state.robot)
+        planes = tuple(choices(self._session.state.robot))
         self.plane = gui.add_dropdown(
             "workspace slice",
             planes,
-            disabled=len(planes) == 1,
-            hint="Blue: in reach. Amber: a joint's limit forbids it",
+            hint="Blue: in reach. Amber: a joint's limit forbids it. Along an angle: a map, here",
         )
+        self.map = gui.add_html("")
         for one in (self.screws, self.forces, self.handle, self.plane):
             self._on(one, "look", lambda _: None)
 

@@ -1,15 +1,22 @@
-"""A plane slice through the reach, as coloured surfaces of the viewer's picture."""
+"""A slice through the reach: coloured surfaces in the viewer's picture, or a map in its panel.
+
+Two lengths have a plane in space. A slice along an angle has none, and is a map.
+"""
 
 from __future__ import annotations
+
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.plots.canvas import svg
+from pteron.plots.reach import reach_figure
 from pteron.viewer.meshes import Mesh, cells
-from pteron.workspace import BEYOND_LIMITS, REACHABLE, reach_slice
-from pteron.workspace.reach_slices import slice_planes
+from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
+from pteron.workspace.reach_slices import Plane, slice_planes
 
 POINTS = 111
 """Points along each side of a slice."""
@@ -21,11 +28,15 @@ NONE = "none"
 """The choice of no slice."""
 
 
-def choices(robot: Manipulator) -> tuple[str, ...]:
-    """Return the choices of a slice: none, or a plane of the pose's lengths."""
-    if len(robot.platform.lengths) < 2:
-        return (NONE,)
-    return (NONE, *(plane for plane in slice_planes(robot) if isinstance(plane, str)))
+def choices(robot: Manipulator) -> dict[str, Plane | None]:
+    """Return the choices of a slice: none, "xy" of two lengths, or a pair of names."""
+    planes, lengths = slice_planes(robot), set(robot.platform.lengths)
+    if robot.platform.tilts:
+        pairs = combinations(robot.coordinates, 2)
+        planes = tuple("".join(pair) if set(pair) <= lengths else pair for pair in pairs)
+    return {NONE: None} | {
+        plane if isinstance(plane, str) else ", ".join(plane): plane for plane in planes
+    }
 
 
 def slice_meshes(
@@ -49,16 +60,23 @@ def slice_meshes(
     list of (mesh, color)
         Where poses serve, and where only a joint's limit forbids them.
     """
-    chosen = next(one for one in slice_planes(robot) if one == plane)
-    i, j = (robot.coordinates.index(letter) for letter in plane)
-    (left, right), (low, high) = (map(float, span[:, k]) for k in (i, j))
-    extent = left, right, low, high
-    cut = reach_slice(robot, pose, chosen, extent=extent, points=POINTS)
-    found = []
+    cut, found = _slice(robot, pose, plane, span), []
     for status, color in ((REACHABLE, SERVES), (BEYOND_LIMITS, BEYOND)):
         flat, faces = cells(cut.first, cut.second, np.asarray(cut.status == status))
-        found.append(((_in_space(robot, pose, i, j, flat), faces), color))
+        found.append(((_in_space(robot, pose, *cut.places, flat), faces), color))
     return found
+
+
+def slice_map(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> str:
+    """Return the map of a slice along an angle, in HTML; see `slice_meshes`, `reach_figure`."""
+    cut = _slice(robot, pose, plane, span)
+    return str(svg(reach_figure(cut), name="slice", title=f"Reach over {' and '.join(plane)}"))
+
+
+def _slice(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> ReachSlice:
+    i, j = (robot.coordinates.index(name) for name in plane)
+    (left, right), (low, high) = (map(float, span[:, k]) for k in (i, j))
+    return reach_slice(robot, pose, plane, extent=(left, right, low, high), points=POINTS)
 
 
 def _in_space(robot: Manipulator, pose: Array, i: int, j: int, flat: Array) -> NDArray[np.float64]:

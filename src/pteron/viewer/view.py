@@ -25,7 +25,7 @@ from pteron.viewer.readings import Readings, readings
 from pteron.viewer.scene import Scene
 from pteron.viewer.server import serve, stop
 from pteron.viewer.session import Session
-from pteron.viewer.slices import NONE, slice_meshes
+from pteron.viewer.slices import choices, slice_map, slice_meshes
 from pteron.viewer.solids import machine_size
 from pteron.viewer.state import ViewerState, stopped
 
@@ -264,19 +264,21 @@ class Viewer:
             self._handle.set_visible(looks[2])
 
     def _show_slice(self) -> None:
-        state, plane = self._session.state, self._panel.plane.value
+        state, span = self._session.state, self._session.pose_range
+        plane = choices(state.robot)[self._panel.plane.value]
+        # A map shows where the machine is, too.
         rest = [
             value
             for name, value in zip(state.robot.coordinates, state.pose, strict=True)
-            if name not in plane
+            if not isinstance(plane, str) or name not in plane
         ]
-        key = (plane, state.robot, *np.round(rest, 9)) if plane != NONE else ()
+        key = (plane, state.robot, *np.round(rest, 9)) if plane else ()
         if key == self._sliced:
             return
         self._sliced = key
-        span = self._session.pose_range
-        meshes = slice_meshes(state.robot, state.pose, plane, span) if plane != NONE else []
-        self._scene.show_slice(meshes)
+        given = state.robot, state.pose
+        self._scene.show_slice(slice_meshes(*given, plane, span) if isinstance(plane, str) else [])
+        self._panel.map.content = slice_map(*given, plane, span) if isinstance(plane, tuple) else ""
 
 
 def _sentence(text: str) -> str:
