@@ -25,6 +25,7 @@ from pteron.export import FUNCTIONS
 from pteron.identification import Terms, identify
 from pteron.identification.signals import States
 from pteron.kinematics import assembly_modes
+from pteron.motion import with_payload
 from pteron.report.identification import numbers
 
 ROBOT, DELTA = CATALOG["quadrupteron"], CATALOG["delta"]
@@ -152,6 +153,7 @@ def library(name, real="double"):
 def test_random_states_give_the_bits_that_casadi_gives(name):
     robot, call = ROBOTS[name], library(name)
     given = {"parameters": pteron.parameters(robot), "drives": drive_numbers(robot)}
+    given |= {"mass": [0.4], "center": [0.01, -0.02, 0.03], "inertia": [1e-3]}
     for pose, velocity, acceleration in zip(*states(robot, 20), strict=True):
         given |= {"pose": pose, "velocity": velocity, "acceleration": acceleration}
         given["joints"] = pteron.inverse_kinematics(robot, pose)
@@ -177,14 +179,40 @@ def compiled(robot, functions, folder, **options):
     assert run(folder)[0] == 0
     loaded, prefix = ctypes.CDLL(str(folder / code)), files[1].stem
 
+    dtype = np.float32 if options.get("real") == "float" else np.float64
+
     def call(function, *inputs, sizes):
-        outputs = [np.full(size, 77.0) for size in sizes]
-        arrays = [np.ascontiguousarray(value, float) for value in inputs]
+        outputs = [np.full(size, 77.0, dtype) for size in sizes]
+        arrays = [np.ascontiguousarray(value, dtype) for value in inputs]
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*arrays, *outputs)]
         status = getattr(loaded, f"{prefix}_{function}")(*pointers)
         return status, *outputs
 
     return call, files[0].read_text()
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("name", ["quadrupteron", "par4", "ankle"])
+def test_a_payload_is_set_while_the_code_runs(tmp_path, name, real):
+    robot = ROBOTS.get(name) or pteron.load(name)
+    mass, center = 0.7, (0.03, -0.02, 0.05)
+    inertia = (2e-3, 1e-4, -2e-4, 3e-3, 1e-4, 4e-3) if robot.platform.tilts else (2e-3,)
+    carrying = with_payload(robot, mass, center, inertia)
+    functions = ["set_payload", "inverse_dynamics"]
+    functions += [f"{function}_base" for function in functions]
+    call, _ = compiled(robot, functions, tmp_path, real=real)
+    state = [part[0] for part in states(robot, 1)]
+    expected = pteron.inverse_dynamics(carrying, *state)
+    assert np.abs(expected - pteron.inverse_dynamics(robot, *state)).max() > 0.1
+    bare = {"": pteron.parameters(robot), "_base": pteron.base_parameters(robot).values()}
+    for kind, given in bare.items():
+        load = [mass], center, inertia, given
+        _, loaded = call(f"set_payload{kind}", *load, sizes=[given.shape])
+        _, forces = call(f"inverse_dynamics{kind}", *state, loaded, sizes=[expected.shape])
+        exact = 1e-5 if real == "float" else 1e-12
+        np.testing.assert_allclose(forces, expected, rtol=0, atol=exact * np.abs(expected).max())
+    with pytest.raises(ModelError, match="folds into the code"):
+        pteron.export_c(robot, "set_payload", tmp_path, specialised=True)
 
 
 def stiff(robot, **more):
@@ -647,7 +675,7 @@ def test_the_command(tmp_path):
     functions = re.findall(r"(?m)^int delta_(\w+)\(", header)
     assert functions == [
         *("inverse_kinematics", "direct_kinematics", "jacobian", "inverse_dynamics_base"),
-        *("regressor", "feed_forward_base", "joint_feed_forward_base"),
+        *("regressor", "feed_forward_base", "joint_feed_forward_base", "set_payload_base"),
     ]
     for wrong, words in (
         ([*told, "--base", str(robot)], "robot.toml: no JSON"),

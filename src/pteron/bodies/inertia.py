@@ -294,3 +294,25 @@ class SpatialInertia:
         x, y, z = (rotation @ self.first_moment).tolist()
         xx, xy, xz, yy, yz, zz = tensor[np.triu_indices(3)].tolist()
         return SpatialInertia(self.mass, (x, y, z), (xx, xy, xz, yy, yz, zz))
+
+
+def inertia_count(kind: type[Inertia] | Inertia) -> int:
+    """Return how many numbers the inertia of a body has, beside its mass and first moment."""
+    return sum(name.startswith("I") for name in kind.kinds)
+
+
+def carried_values(
+    kind: type[PlanarInertia | SpatialInertia],
+    mass: Any,
+    center: Sequence[Any],
+    inertia: Sequence[Any],
+) -> list[Any]:
+    """Return the parameters, in the order of a platform's kinds, of a body that it carries.
+
+    `center` is the body's centre of mass in the platform's frame, m; `inertia` is about that
+    centre: of a planar kind I about the platform's axis, of a spatial one Ixx, Ixy, Ixz, Iyy, Iyz
+    and Izz. All may be expressions.
+    """
+    shares = kind.shares_of_point(*center).values()
+    own = [0] * (len(shares) - len(inertia)) + list(inertia)
+    return [mass * share + extra for share, extra in zip(shares, own, strict=True)]

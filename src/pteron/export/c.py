@@ -66,10 +66,11 @@ def export_c(
         Names of what `compile` accepts, and `"inverse_dynamics_base"`, `"feed_forward_base"` or
         `"joint_feed_forward_base"`, from base parameters as `base_parameters` and `pteron
         identify` list them. By default inverse and direct kinematics, Jacobian, inverse dynamics
-        from the inertial parameters and from base parameters, forward dynamics and the regressor;
-        of a machine with drives `"feed_forward"` and `"joint_feed_forward"` too. Where direct
-        kinematics have no closed form, `"direct_step"` comes in their place. A controller stands
-        for its law, with a table of its gains; a law's name has those that it has by default.
+        from the inertial parameters and from base parameters, forward dynamics, the regressor and
+        `"set_payload"`, whose parameters the others take while something is carried; of a machine
+        with drives `"feed_forward"` and `"joint_feed_forward"` too. Where direct kinematics have no
+        closed form, `"direct_step"` comes in their place. A controller stands for its law, with a
+        table of its gains; a law's name has those that it has by default.
     folder : path
         Where; made if it is missing.
     real : {"double", "float"}

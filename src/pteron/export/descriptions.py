@@ -74,6 +74,13 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     moment = ", N m about k" if platform.angles else ""
     wrench = "force, N, and moment about it, N m, in base axes" if platform.tilts else f"N{moment}"
     told = "what the drives read of the joints" if has_readings(robot) else "joint coordinates"
+    center = "its centre of mass in the platform's frame: x, y, z in m"
+    if platform.slides:
+        center = "not looked at: what a platform that slides carries is on its axis"
+    about = "about its own centre of mass, kg m^2"
+    inertia = f"Ixx, Ixy, Ixz, Iyy, Iyz, Izz {about}" if platform.tilts else f"I {about}, along k"
+    if not platform.angles:
+        center, inertia = (f"{text}; forces do not depend on it" for text in (center, inertia))
     texts = {
         "pose": f"platform pose: {pose}",
         "poses": f"poses by rows: {pose}",
@@ -86,7 +93,12 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
         "forces": f"actuator forces, {forces}, positive the way the joint coordinates grow",
         "wrench": f"wrench on the platform at P: {wrench}",
         "parameters": "inertial parameters, in kg, kg m and kg m^2",
+        "loaded_parameters": "what is to be the inertial parameters with the payload",
+        "mass": "of the payload, kg; 0 for none",
+        "center": center,
+        "inertia": inertia,
         "base_parameters": "base parameters; see the table of the same name",
+        "loaded_base_parameters": "what is to be the base parameters with the payload",
         "drives": "numbers of the drives; see the table of the same name",
         "jacobian": "joint rates per unit of the platform's rates",
         "regressor": "actuator forces per unit of each parameter",

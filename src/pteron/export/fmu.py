@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.atomic import make_folder, write_files
+from pteron.bodies.inertia import inertia_count
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, ModelError
 from pteron.export.c import CPrinter, c_texts
@@ -38,7 +39,13 @@ from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import refuse_readings
 
-_FUNCTIONS = ("drive_accelerations", "joint_coordinates", "jacobian", "squared_type_i")
+_FUNCTIONS = (
+    "drive_accelerations",
+    "joint_coordinates",
+    "jacobian",
+    "squared_type_i",
+    "set_payload",
+)
 """Functions of the exported C that `fmu.c` calls."""
 
 LEAST = 0.01
@@ -122,7 +129,7 @@ def export_fmu(
         "freedom": robot.freedom,
         "joint_count": robot.joint_count,
         "wrench_count": len(robot.platform.wrench_columns),
-        "tilts": robot.platform.tilts,
+        "inertia_count": inertia_count(robot.platform.inertia),
         "inertial": tables["parameters"],
         "drives": tables["drives"],
         "least_square": LEAST**2,

@@ -226,31 +226,26 @@ def _wrench(platform: Platform) -> Iterator[tuple[str, str, str]]:
 def _payload(robot: Manipulator) -> Iterator[_Part]:
     """Yield the payload's parameters: its mass, and what matters where the platform turns."""
     told = [FmuVariable("payload.mass", "kg", "A body that the platform carries", 0.0, 0.0)]
-    yield "payload.mass", "START", "offsetof(Values, payload)", told
-    tilts = robot.platform.tilts
-    if robot.platform.rotation_axes:
+    yield "payload.mass", "START", "offsetof(Values, mass)", told
+    platform = robot.platform
+    if platform.rotation_axes:
         told = [
             FmuVariable(f"payload.{x}", "m", f"Its centre of mass in the platform frame, {x}", 0.0)
-            for x in ("xyz" if tilts else "xy")
+            for x in ("xyz" if platform.tilts else "xy")
         ]
-        yield "payload.centre", "START", "offsetof(Values, payload) + sizeof(double)", told
-    for name, place, pairs, least in (
-        ("inertia", 4, ("xx", "yy", "zz"), 0.0),
-        ("products", 7, ("xy", "xz", "yz"), None),
-    ):
-        if tilts:
-            told = [
-                FmuVariable(
-                    *(f"payload.i{pair}", "kg.m2", f"I{pair} about its own centre", 0.0, least)
-                )
-                for pair in pairs
-            ]
-            at = f"offsetof(Values, payload) + {place} * sizeof(double)"
-            yield f"payload.{name}", "START", at, told
-    if robot.platform.angles and not tilts:
+        yield "payload.centre", "START", "offsetof(Values, center)", told
+    if platform.angles:
         axis = "Its inertia about the axis through its own centre"
         told = [FmuVariable("payload.inertia", "kg.m2", axis, 0.0, 0.0)]
-        yield "payload.inertia", "START", "offsetof(Values, payload) + 3 * sizeof(double)", told
+        if platform.tilts:
+            told = [
+                FmuVariable(
+                    *(f"payload.i{pair}", "kg.m2", f"I{pair} about its own centre", 0.0),
+                    0.0 if pair[0] == pair[1] else None,
+                )
+                for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
+            ]
+        yield "payload.inertia", "START", "offsetof(Values, inertia)", told
 
 
 def _drives(robot: Manipulator) -> Iterator[FmuVariable]:

@@ -58,6 +58,7 @@ FUNCTIONS = (
     "inverse_dynamics_base",
     "forward_dynamics",
     "regressor",
+    "set_payload",
 )
 """Functions exported by default, and those of `FEED` for a machine with drives. Where direct
 kinematics has no closed form, `direct_step` takes its place."""
@@ -67,6 +68,9 @@ FEED = ("feed_forward", "joint_feed_forward")
 
 Asked = str | Controller | Sequence[str | Controller]
 """A choice of functions, by name, and of controllers, whose laws they are."""
+
+_PAYLOAD = "set_payload"
+"""The function that makes the parameters of a payload."""
 
 _BASE = "_base"
 """Suffix of the name of a function of base parameters."""
@@ -166,14 +170,23 @@ def chosen(
             needs = {name: TABLE[name].inputs for name in names if name in TABLE}
             names = [name for name in names if "parameters" not in needs.get(name, ())]
             names += [name + _BASE for name in FEED]
+            names.append(_PAYLOAD + _BASE)
         elif has_drives(robot):
             names += FEED
+        if specialised:
+            names = [name for name in names if name.removesuffix(_BASE) != _PAYLOAD]
     names = list(dict.fromkeys(names))
-    allowed = sorted({*COMPILED, *(name + _BASE for name in REDUCIBLE)} - {"base_regressor"})
+    based = {name + _BASE for name in (*REDUCIBLE, _PAYLOAD)}
+    allowed = sorted({*COMPILED, *based} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
     for name in names:
         if name not in allowed:
             raise ModelError(f"functions: {name!r} cannot be exported; {valid}")
+        if specialised and name.removesuffix(_BASE) == _PAYLOAD:
+            raise ModelError(
+                f"functions: {name!r} returns parameters, which `specialised` folds into the code; "
+                "leave one of them out"
+            )
     if not names:
         raise ModelError(f"functions: none given; {valid}")
     factors(robot, output)
@@ -210,7 +223,7 @@ def _exported(
         given = program(robot, what, columns, wrench=loaded)
     bodies = "parameters" in {port.name for port in given.inputs} or name in SELECTED
     if identified and bodies:
-        other = f"ask for {what + _BASE}" if what in REDUCIBLE else "leave it out"
+        other = f"ask for {what + _BASE}" if what in (*REDUCIBLE, _PAYLOAD) else "leave it out"
         raise ModelError(
             f"functions: {name!r} takes every body's parameters, which identified base parameters "
             f"do not tell; {other}, or export the model file that pteron identify wrote"

@@ -153,6 +153,8 @@ def base_program(what: str, given: Identified, *, wrench: bool, folded: bool) ->
     fewer operations in all.
     """
     robot, base = given.robot, given.base
+    if what == "set_payload":
+        return _payload_program(robot, base)
     cheapest = cheapest_parameters(robot)
     own, other = (program(robot, what, columns_of(one), wrench=wrench) for one in (base, cheapest))
     # Forces of base parameters b are those of the inertial parameters selection b.
@@ -164,6 +166,25 @@ def base_program(what: str, given: Identified, *, wrench: bool, folded: bool) ->
             with_values(other, {_NAME: matrix @ given.values}),
         ]
     return min(forms, key=lambda form: count_operations(form.function))
+
+
+def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
+    """Return `set_payload` of base parameters, which a payload's own parameters are added to."""
+    load = program(robot, "set_payload")
+    mass, center, inertia, parameters = load.function.sx_in()
+    more = load.function(mass, center, inertia, ca.SX.zeros(parameters.shape))
+    given = ca.SX.sym(_NAME, base.rank)
+    grouping = ca.sparsify(ca.SX(ca.DM(base.grouping)))
+    loaded = f"loaded_{_NAME}"
+    function = ca.Function(
+        load.name,
+        [mass, center, inertia, given],
+        [given + ca.mtimes(grouping, more.T)],
+        [*(port.name for port in load.inputs[:3]), _NAME],
+        [loaded],
+    )
+    ports = (*load.inputs[:3], Port(_NAME, (base.rank,), shared=True))
+    return Program(load.name, optimised(function), ports, (Port(loaded, (base.rank,)),))
 
 
 def _recombined(given: Program, matrix: Array) -> Program:

@@ -39,7 +39,7 @@ def export_st(
     functions: Asked | None = None,
     folder: str | Path = ".",
     *,
-    specialised: bool = True,
+    specialised: bool | None = None,
     wrench: bool = False,
     output: Output = "force",
     base: str | Path | None = None,
@@ -63,8 +63,9 @@ def export_st(
         form. Angles are computed by ATAN2, which some controllers have in a library only.
     folder : path
         Where; made if it is missing.
-    specialised : bool
-        Whether the machine's inertial parameters are folded in, instead of being an input.
+    specialised : bool, optional
+        Whether the machine's inertial parameters are folded in, instead of being an input; by
+        default they are, unless `"set_payload"` is asked for.
     wrench : bool
         Whether inverse and forward dynamics take a wrench on the platform too.
     output : {"force", "torque", "percent"}
@@ -100,6 +101,8 @@ def export_st(
     names = None if functions is None else listed(functions)
     if names is not None:
         names = [direct if name == "direct_kinematics" else name for name in names]
+    if specialised is None:
+        specialised = not {"set_payload", "set_payload_base"}.intersection(map(str, names or ()))
     exported = chosen(
         robot,
         names,

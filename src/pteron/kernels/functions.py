@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import casadi as ca
 
+from pteron.bodies.inertia import carried_values
 from pteron.bodies.motion import Expression
 from pteron.equations import (
     closing,
@@ -223,6 +224,16 @@ def _passive_friction(m: Machine, v: Symbols) -> Outputs:
     return {"forces": (forces, forces.shape)}
 
 
+def _set_payload(m: Machine, v: Symbols) -> Outputs:
+    platform, given = m.robot.platform, v["parameters"]
+    # What a platform that slides carries is on its axis.
+    center = ca.SX(3, 1) if platform.slides else v["center"]
+    inertia = ca.vertsplit(v["inertia"])
+    load = carried_values(type(platform.inertia), v["mass"], ca.vertsplit(center), inertia)
+    start = given.shape[0] - len(load)  # the platform's are the last
+    return {"loaded_parameters": ca.vertcat(given[:start], given[start:] + ca.vertcat(*load))}
+
+
 def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
     carried = v.get("carried", True)
     forces = inverse_dynamics(m, _state(m, v), v["parameters"], v.get("wrench"), carried=carried)
@@ -398,6 +409,7 @@ TABLE: dict[str, Entry] = {
         ("pose", "joint_rates", "joint_accelerations"), _platform_motion, (*_MOVED, "type II")
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
+    "set_payload": Entry(("mass", "center", "inertia", "parameters"), _set_payload),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _MOVED),
     "drive_forces": Entry(

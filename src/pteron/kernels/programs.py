@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.bodies.inertia import inertia_count
 from pteron.bodies.motion import Expression
 from pteron.equations import control, kinematics
 from pteron.equations.drives import Drives
@@ -220,6 +221,9 @@ def _program(
         "parameters": len(machine.parameters),
         "wrench": machine.wrench_size,
         "twist": 6,
+        "mass": 1,
+        "center": 3,
+        "inertia": inertia_count(machine.robot.platform.inertia),
         "drives": len(Drives._fields) * machine.freedom,
         **control.input_sizes(what, machine.freedom, selected),
     }

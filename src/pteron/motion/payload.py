@@ -1,10 +1,15 @@
-"""A machine with a payload, a point mass at its tool, and a warning of an unlikely mass."""
+"""A machine with a payload, a point mass at its tool or a body; a warning of an unlikely mass."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from pteron.bodies.inertia import carried_values, inertia_count
+from pteron.bodies.vectors import numbers, vector
 from pteron.errors import DataError, ModelError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
@@ -24,12 +29,17 @@ def payload_warning(robot: Manipulator, mass: float) -> str:
     )
 
 
-def with_payload(robot: RobotLike, mass: float) -> Manipulator:
-    """Return the machine with a point mass at the tool's centre point.
+def with_payload(
+    robot: RobotLike,
+    mass: float,
+    center: Sequence[float] | None = None,
+    inertia: float | Sequence[float] = 0.0,
+) -> Manipulator:
+    """Return the machine with a body that its platform carries: a point mass at the tool, usually.
 
-    It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + m_L |s|^2,
-    s being `platform.tool` across the platform's axis; as a whole, where the platform tilts, and
-    with its part of the inertia tensor.
+    It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + I_L + m_L
+    |s|^2, s being `center` across the platform's axis; as a whole, where the platform tilts, and
+    with its part of the inertia tensor. Exported code does the same while it runs: `set_payload`.
 
     Parameters
     ----------
@@ -37,6 +47,11 @@ def with_payload(robot: RobotLike, mass: float) -> Manipulator:
         The machine.
     mass : float
         The payload m_L, kg; 0 or more.
+    center : vector, optional
+        Its centre of mass in the platform's frame, m; by default the tool's centre point.
+    inertia : float or sequence of float
+        I_L about its own centre of mass, along the platform's axis, kg m^2; of a platform that
+        tilts Ixx, Ixy, Ixz, Iyy, Iyz and Izz in the platform's frame. 0 is a point mass.
 
     Returns
     -------
@@ -47,8 +62,8 @@ def with_payload(robot: RobotLike, mass: float) -> Manipulator:
     DataError
         If the mass is not a finite number of 0 or more.
     ModelError
-        If the platform slides, as that of an I4, and its tool is off the axis: what turns with such
-        a tool has a first moment that the model of the platform has not.
+        If no body has this inertia; if the platform slides, as that of an I4, and the payload is
+        off the axis: what turns there has a first moment that the model of the platform has not.
 
     Examples
     --------
@@ -65,16 +80,22 @@ def with_payload(robot: RobotLike, mass: float) -> Manipulator:
         carried = math.nan
     if not (math.isfinite(carried) and carried >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
-    if carried == 0.0:
-        return robot
-    platform = robot.platform
-    x, y, z = platform.tool
-    if platform.slides and (x, y) != (0.0, 0.0):
+    platform, own = robot.platform, robot.platform.inertia
+    at = platform.tool if center is None else vector(center, "center")
+    if platform.slides and any(at[:2]) and carried:
+        place = "platform.tool" if center is None else "center"
         raise ModelError(
-            f"platform.tool is {math.hypot(x, y):g} m off the axis of a platform that slides, "
-            "where a payload cannot be modelled; give the tool [0, 0, z]",
+            f"{place} is {math.hypot(*at[:2]):g} m off the axis of a platform that slides, "
+            f"where a payload cannot be modelled; give {place} [0, 0, z]",
             subject=robot.name,
         )
-    own, shares = platform.inertia, platform.inertia.shares_of_point(x, y, z).values()
-    values = [value + carried * share for value, share in zip(own.values, shares, strict=True)]
-    return replace(robot, platform=replace(platform, inertia=type(own).of_values(values)))
+    kind, count = type(own), inertia_count(own)
+    given = np.ravel(inertia).tolist()
+    tensor = numbers([0.0] * count if given == [0.0] else given, "inertia", count)
+    if carried == 0.0 and not any(tensor):
+        return robot
+    load = carried_values(kind, carried, at, tensor)
+    if any(tensor):
+        kind.of_values(load)  # a body that is none says so
+    values = [a + b for a, b in zip(own.values, load, strict=True)]
+    return replace(robot, platform=replace(platform, inertia=kind.of_values(values)))
