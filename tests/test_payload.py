@@ -127,6 +127,12 @@ def test_it_is_exact_without_noise(name, processing):
     )
     size = np.sqrt((make_log(name).forces ** 2).mean(axis=0))
     assert (found.residual < 1e-8 * size).all()
+    # The machine that carries it has what was found on its platform.
+    carried = found.carried_by(machine(name)).platform.inertia
+    own = machine(name).platform.inertia
+    more = dict(zip(own.kinds, np.subtract(carried.values, own.values), strict=True))
+    felt = [more[kind.removesuffix("_L")] for kind in found.names]
+    np.testing.assert_allclose(felt, found.values, rtol=1e-9, atol=1e-12)
 
 
 def test_a_turning_platform_feels_all_four_values():

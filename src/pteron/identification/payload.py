@@ -31,7 +31,8 @@ from pteron.identification.recordings import Recording, recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.json_values import picked
 from pteron.kernels import Array
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.payload import with_payload
 from pteron.reduction import BaseParameters
 from pteron.renamed import former_attribute
 
@@ -98,6 +99,33 @@ class Payload:
         return tuple(moment / self.mass for moment in self.first_moment)
 
     @property
+    def central_inertia(self) -> tuple[float, ...] | None:
+        """Its inertia about its own centre of mass, in the order of `inertia`, kg m^2."""
+        if not self.mass or self.first_moment is None or self.inertia is None:
+            return None
+        about = np.ravel(self.inertia)
+        kind = PlanarInertia if len(about) == 1 else SpatialInertia
+        x, y, z = (*(moment / self.mass for moment in self.first_moment), 0.0)[:3]
+        shares = list(kind.shares_of_point(x, y, z).values())[-len(about) :]
+        return tuple((about - self.mass * np.array(shares)).tolist())
+
+    def carried_by(self, robot: RobotLike) -> Manipulator:
+        """Return a machine that carries it; `set_payload` of exported code takes the same values.
+
+        These are `mass`, `center_of_mass` and `central_inertia`; what the forces do not show is 0.
+
+        Raises
+        ------
+        DataError
+            If the forces do not show its mass, or it is negative.
+        ModelError
+            If no real body has its inertia.
+        """
+        center = (*(self.center_of_mass or ()), 0.0, 0.0, 0.0)[:3]
+        given = np.nan if self.mass is None else self.mass
+        return with_payload(robot, given, center, self.central_inertia or 0.0)
+
+    @property
     def real(self) -> bool:
         """Whether a real body has these values: in a plane m > 0 and I m >= (m gamma)^2."""
         if self.mass is None or not self.mass > 0.0:
@@ -161,7 +189,7 @@ class Payload:
         """Return the payload as plain data, without the other values of the fit."""
         return picked(
             self,
-            "mass first_moment inertia center_of_mass names standard_deviations=deviations",
+            "mass first_moment inertia center_of_mass central_inertia names standard_deviations=deviations",
             "covariance felt real residual trial=fault_isolation findings",
         )
 
