@@ -189,8 +189,9 @@ class Payload:
         """Return the payload as plain data, without the other values of the fit."""
         return picked(
             self,
-            "mass first_moment inertia center_of_mass central_inertia names standard_deviations=deviations",
-            "covariance felt real residual trial=fault_isolation findings",
+            "mass first_moment inertia center_of_mass central_inertia names",
+            "standard_deviations=deviations covariance felt real residual trial=fault_isolation",
+            "findings",
         )
 
 
