@@ -1,4 +1,4 @@
-"""The destination of a result, `--out`: a folder, the file of a table, or standard output."""
+"""The destination of a command's result: `--out` (a folder or one file), and what is printed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TABLES = (".csv", ".parquet")
 
 @dataclass(frozen=True)
 class Destination:
-    """The value of `--out`: a folder for everything, the file of a table, or nothing.
+    """The value of `--out`: a folder for all files, one .csv or .parquet file, or nothing.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Destination:
         """Write files if they are asked for; then print for a program, a person, or a pipe.
 
         `data` are the figures, `more` makes the other files of a folder, by name, and `person`
-        prints what a person reads; a pipe gets the table.
+        prints what a person reads; without `--out` a pipe gets the table.
         """
         files: list[Path] = []
         if self.is_table:

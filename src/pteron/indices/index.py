@@ -28,11 +28,11 @@ class Index:
     unit : str
         Empty for a plain number.
     better : {"more", "less"}
-        The values that are good.
+        Whether more or less of it is better.
     turning : bool
-        Whether it is about the platform's turning, so that a machine must have an angle.
+        Whether it measures rotation: only platforms with an angle have it.
     moving : bool
-        Whether it is about its translation, so that the pose must have lengths.
+        Whether it measures translation: only platforms with a length have it.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Screws, rates and accelerations of all joints, passive ones included, from the platform's."""
+"""Screws of all joints, passive ones too, at a pose; joint and link rates of a platform's motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The text of a machine's TOML file, on request with comments that explain every key."""
+"""The TOML text of a machine, as a string, on request with comments that explain every key."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _UNITS = "SI units: m, kg, kg m, kg m^2, m/s^2, rad."
 
 _CONVENTIONS = (
     f"{_UNITS} Vectors are in the base frame where nothing else is said; directions have length 1.",
-    "A #key may be left out: what stands behind it is its default, or an example.",
+    "A line #key = value may be left out: it shows the key's default, or an example.",
 )
 
 

@@ -1,4 +1,7 @@
-"""`Platform`, the data of the moving platform: motion, axes, parts, inertia, limits and tool."""
+"""`Platform`, the moving platform of a machine: its freedom, axes, parts, inertia, limits and tool.
+
+It is checked when it is made, and says where platform and tool are at poses.
+"""
 
 from __future__ import annotations
 

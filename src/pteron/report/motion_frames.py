@@ -1,4 +1,4 @@
-"""The frames of a machine's motion as plain data, which `view.js` draws on a page."""
+"""A machine, and its motion as animation frames, as plain data that `view.js` draws on a page."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _A_SECOND = 60.0
 """Frames for a second of real time: as many as screens show."""
 
 _FEWEST, _MOST = 240, 2400
-"""Least number of frames, as a short motion may be slowed down, and greatest, as the page of a long
-one may be sent by mail."""
+"""Bounds on the number of frames: enough to play a short motion slowly, few enough that the page of a
+long one can be sent by mail."""
 
 _DRAWN = 1000
 """Samples, about, of a line in a picture."""
@@ -33,7 +33,7 @@ _SAME = 1e-6
 """Greatest gap between the ends of a closed motion, as a share of its size, or of its speed."""
 
 _LITTLE = 1e-3
-"""Least size (m, rad), and speed, of which that share is taken."""
+"""Least size (m, rad), or speed, that `_SAME` is a share of."""
 
 
 @dataclass(frozen=True)

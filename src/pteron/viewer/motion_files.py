@@ -27,7 +27,7 @@ def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> 
     data : bytes
         Its contents; see `pteron.playback.playback`.
     start : array, shape (m,)
-        A pose in the assembly mode of the joints, m and rad.
+        A pose of the assembly mode that is meant where the file gives joints alone, m and rad.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> 
     Raises
     ------
     DataError
-        If it is no such file; the message says where and why.
+        If it is no CSV or Parquet file, too large, or holds no motion.
     UnreachablePose, SingularPose
         If the machine cannot do the motion.
     """

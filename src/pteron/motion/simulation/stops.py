@@ -1,4 +1,4 @@
-"""Reasons why a simulation ends early (limits, singularities, divergence), in a sentence each."""
+"""Early ends of a simulation (limits, singularities, divergence): the state, and a sentence why."""
 
 from __future__ import annotations
 

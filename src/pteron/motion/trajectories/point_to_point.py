@@ -1,4 +1,4 @@
-"""`point_to_point`: a straight motion from rest in one pose to rest in another."""
+"""`point_to_point`: the tool along a straight line, from rest in one pose to rest in another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`write_calibration`: the report's page, `calibration.json` and the machine's file, written."""
+"""`write_calibration`: writes the report's page, `calibration.json` and the machine as found."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def write_calibration(
     folder : str or path
         Where to write; made if it is missing.
     sources : iterable of str or path
-        Files that were read, which `robot.toml` must not replace.
+        Files that were read, which none of these must replace.
 
     Returns
     -------
@@ -59,7 +59,8 @@ def write_calibration(
     from pteron.report.calibration.page import page
 
     target = checked_folder(folder)
-    checked_apart(target / "robot.toml", sources)
+    for file in ("calibration.html", "calibration.json", "robot.toml"):
+        checked_apart(target / file, sources)
     texts = {
         "calibration.html": page(result),
         "calibration.json": json.dumps(numbers(result), indent=1, allow_nan=False) + "\n",
