@@ -1,4 +1,4 @@
-"""Screws of all joints, passive ones too, at a pose; joint and link rates of a platform's motion."""
+"""Screws of all joints, passive ones too, at a pose; joint and link rates of the motion."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ _A_SECOND = 60.0
 """Frames for a second of real time: as many as screens show."""
 
 _FEWEST, _MOST = 240, 2400
-"""Bounds on the number of frames: enough to play a short motion slowly, few enough that the page of a
-long one can be sent by mail."""
+"""Bounds on the number of frames: enough to play a short motion slowly, few enough that the page of
+a long one can be sent by mail."""
 
 _DRAWN = 1000
 """Samples, about, of a line in a picture."""
