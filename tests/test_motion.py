@@ -138,7 +138,7 @@ def test_a_cycle_is_the_largest_that_fits(name):
             robot, home(name), scale=found.scale + 0.005, direction=found.across, samples=2001
         )
         kept = pose_margins(robot, larger.pose)
-        # The joints' clearance is kept to a hair's breadth, the others to the least reserve.
+        # The joints' clearance is kept to a hair's breadth, the others to the least margin.
         tightest = min(kept.type_i.min(), kept.type_ii.min()) - LEAST
         assert min(tightest, kept.joints.min()) < 1e-3
 

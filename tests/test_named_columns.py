@@ -102,7 +102,7 @@ def test_a_table_of_one_row_is_one_pose():
     box = pteron.workspace.bounding_box
     assert (box(robot, table) == box(robot, home)).all()
     several = {"x": [0.0, 0.1], "y": 0.0, "z": -0.9}
-    for call in (pteron.motion.pick_and_place, pteron.motion.least_reserve, box, limited):
+    for call in (pteron.motion.pick_and_place, pteron.motion.least_margin, box, limited):
         with pytest.raises(DataError, match="2 poses given, 1 expected"):
             call(robot, several)
 

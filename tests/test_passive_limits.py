@@ -166,7 +166,7 @@ def test_random_poses_and_the_cycle_keep_them():
         pick_and_place(limited("delta", platform_cone=Cone((0.0, 0.0, 1.0), 0.6)), low)
 
 
-def test_home_its_reserve_and_the_reach_keep_them():
+def test_home_its_margin_and_the_reach_keep_them():
     free, robot = CATALOG["delta"], NARROW
     home = home_pose(robot)
     at = pose_margins(robot, home)

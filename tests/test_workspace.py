@@ -140,7 +140,7 @@ def test_clearance_is_the_share_of_the_half_range_to_the_nearer_limit():
 
 
 @pytest.mark.parametrize("name", ["tripteron", "delta"])
-def test_out_of_reach_the_reserve_is_negative_and_says_by_how_much(name):
+def test_out_of_reach_the_margin_is_negative_and_says_by_how_much(name):
     robot, far = MECHANISMS[name], [0.0, 0.0, 2.0]
     with pytest.raises(pteron.UnreachablePose) as caught:
         pteron.inverse_kinematics(robot, far)
@@ -158,7 +158,7 @@ def left(robot, poses):
 
 
 @FAMILIES
-def test_home_has_the_best_reserve(name):
+def test_home_has_the_best_margin(name):
     robot = MACHINES[name]
     best = left(robot, home(name))
     others = pteron.random_poses(robot, 5000, seed=99, type_i=0.0, type_ii=0.0)

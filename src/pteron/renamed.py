@@ -26,6 +26,7 @@ RENAMED = {
     "pteron.identification.signals": {
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
+    "pteron.motion": {"least_reserve": "pteron.motion.least_margin"},
     "pteron.motion.simulation": {"Law": "pteron.motion.simulation.ControlLaw"},
     "pteron.workspace": {
         "Reserve": "pteron.workspace.PoseMargins",

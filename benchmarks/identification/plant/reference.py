@@ -114,11 +114,11 @@ def fourier_reference(
 
 def _serves(motion: Fourier, time: Array, speed: float, acceleration: float) -> bool:
     pose, _, _ = motion.platform(time)
-    reserve = pteron.workspace.pose_margins(motion.robot, pose)
+    margins = pteron.workspace.pose_margins(motion.robot, pose)
     if (
-        reserve.type_i.min() < _TYPE_I
-        or reserve.type_ii.min() < _TYPE_II
-        or reserve.joints.min() < 0.0
+        margins.type_i.min() < _TYPE_I
+        or margins.type_ii.min() < _TYPE_II
+        or margins.joints.min() < 0.0
     ):
         return False
     _, rates, accelerations = motion(time)

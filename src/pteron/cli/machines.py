@@ -219,7 +219,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         table(*headings, rows=rows, numbers=("leg",)),
         *_drives(robot),
         *singular,
-        f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
+        f"Home pose: {_vector(found['home_pose'])}, margin {found['home_reserve']:.2f} of 1",
         *_passive(found["limited_joints"]),
         *tool,
         *(f"The platform can move with its rams held {text}" for text in found["self_motions"]),
@@ -244,7 +244,7 @@ def _passive(joints: list[dict[str, Any]]) -> list[Table]:
     rows = []
     for joint in (joint for joint in joints if not joint["actuated"]):
         limits = LimitedJoint(**joint).limits_text(lambda value, unit: f"{value:.4g}")
-        at, unit = f"{joint['value']:.4g}", joint["unit"]
+        at, unit = f"{round(joint['value'], 4) + 0.0:g}", joint["unit"]
         rows.append((str(joint["leg"] or ""), joint["noun"], at, f"{limits} {unit}"))
     headings = ("leg", "passive joint", "at home", "limits")
     return [table(*headings, rows=rows, numbers=("leg", "at home"))] if rows else []

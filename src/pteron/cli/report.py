@@ -66,7 +66,7 @@ def _machine(found: dict[str, Any]) -> Table:
     angles = [name for name in found["coordinates"] if coordinate(name).unit == "rad"]
     told = {
         "home pose": " ".join(f"{value:.4g}" for value in home["pose"]),
-        "reserve there": f"{home['reserve']:.3f} of 1",
+        "margin there": f"{home['reserve']:.3f} of 1",
         "condition number there": f"{home['condition_number']:.4g}",
     }
     if len(angles) == 1:

@@ -65,7 +65,7 @@ def world_of(
                 "of a table"
             )
         motion.repeated(2)
-        low = world.reserve_of(motion.pose) <= ENDS
+        low = world.margin_of(motion.pose) <= ENDS
         if low.any():
             at = float(motion.time[int(low.argmax())])
             raise DataError(

@@ -147,7 +147,7 @@ class World:
         left = np.arange(len(drawn))
         for share in _SHARES:
             poses = self.home + share * drawn[left]
-            good: Any = self.reserve_of(poses) >= self.least
+            good: Any = self.margin_of(poses) >= self.least
             has = good.any(axis=-1)
             found[left[has]] = poses[has, good[has].argmax(axis=-1)]
             left = left[~has]
@@ -155,7 +155,7 @@ class World:
                 break
         return found
 
-    def reserve_of(self, poses: Array) -> Array:
+    def margin_of(self, poses: Array) -> Array:
         """Return the margin of poses, negative beyond a singularity of type II."""
         across = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
         smallest = pose_margins(self.robot, poses).least
@@ -175,7 +175,7 @@ class World:
         if pose.shape != (self.robot.freedom,) or not np.isfinite(pose).all():
             names = " ".join(self.robot.coordinates)
             raise DataError(f"options: {key} is {value!r}, {names} expected, m and rad")
-        if self.reserve_of(pose[None])[0] <= ENDS:
+        if self.margin_of(pose[None])[0] <= ENDS:
             raise DataError(
                 f"options: {key} {pose.tolist()} is out of reach, singular, or beyond the joints' "
                 f"limits; choose one near home, {self.home.round(4).tolist()}"
@@ -202,7 +202,7 @@ class World:
         reward = 1.0 - np.tanh(2.0 * distance / self.spread)
         reward = reward - EFFORT * (action**2).mean(axis=-1)
         rates = self.bounds[self.robot.freedom : 2 * self.robot.freedom]
-        ended = ~np.asarray(going, dtype=bool) | (self.reserve_of(pose) < ENDS)
+        ended = ~np.asarray(going, dtype=bool) | (self.margin_of(pose) < ENDS)
         ended = ended | (np.abs(velocity) > rates).any(axis=-1)
         return new, distance, np.where(ended, -1.0, reward), ended
 
@@ -222,7 +222,7 @@ class World:
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
         found = pose_margins(self.robot, pose)
         leg = int(found.type_i.argmin()) + 1
-        if self.reserve_of(pose[None])[0] < 0.0 <= found.least or found.type_ii < ENDS:
+        if self.margin_of(pose[None])[0] < 0.0 <= found.least or found.type_ii < ENDS:
             return "next to a singularity of type II: the actuators hardly hold the platform"
         if found.joints.min() < ENDS <= found.type_i.min():
             return f"leg {int(found.joints.argmin()) + 1} is at its joint's limit"

@@ -49,7 +49,7 @@ from pteron.motion.trajectories.pick_and_place import (
 from pteron.motion.trajectories.point_to_point import point_to_point as point_to_point
 from pteron.motion.trajectories.replay import replay as replay
 from pteron.motion.trajectories.scaling import (
-    least_reserve as least_reserve,
+    least_margin as least_margin,
     scaled_to_reach as scaled_to_reach,
 )
 from pteron.motion.trajectories.time_law import along as along, shortest as shortest

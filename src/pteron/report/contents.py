@@ -23,7 +23,7 @@ from pteron.motion import (
     Sizing,
     joint_guides,
     joint_points,
-    least_reserve,
+    least_margin,
     pick_and_place,
     size,
 )
@@ -101,7 +101,7 @@ class Measures:
 class Report:
     """The contents of a machine's page; the cycle has T samples.
 
-    The cycle is the standard one, which keeps the reserve `least`, or a motion that was given, from
+    The cycle is the standard one, which keeps the margin `least`, or a motion that was given, from
     `source`; `shown` are the moments of it that the moving picture has. `sizing` is what it asks of
     the drives: forces, in N or N m, include friction and the motors' inertia where the file tells
     of them (`driven`).
@@ -116,7 +116,7 @@ class Report:
     robot: Manipulator
     doubts: tuple[str, ...]
     home: Array
-    reserve: PoseMargins
+    margins: PoseMargins
     least: float
     cycle: Motion
     source: str
@@ -185,8 +185,8 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         robot=robot,
         doubts=(*machine_warnings(robot), *load_warnings(robot, home)),
         home=home,
-        reserve=at_home,
-        least=least_reserve(robot, home),
+        margins=at_home,
+        least=least_margin(robot, home),
         cycle=cycle,
         source="" if motion is None else motion.source,
         shown=shown,

@@ -197,7 +197,7 @@ def numbers(report: Report) -> dict[str, Any]:
         **picked(report, "doubts"),
         "home": {
             "pose": report.home.tolist(),
-            **picked(report.reserve, "type_i type_ii clearances=joints reserve=least"),
+            **picked(report.margins, "type_i type_ii clearances=joints reserve=least"),
             "passive_joints": [vars(joint) for joint in report.passive],
             **picked(report.jacobian, "jacobian=matrix condition_number=condition"),
             "condition_radius": report.jacobian.radius,

@@ -44,7 +44,7 @@ _WORTH = 1.01
 """Factor by which a later direction must allow a larger cycle to be preferred to an earlier one."""
 
 
-def least_reserve(robot: RobotLike, around: PoseLike) -> float:
+def least_margin(robot: RobotLike, around: PoseLike) -> float:
     """Return the margin that a cycle about a pose keeps, if nothing else is said.
 
     It is 0.2; a machine with little margin moves where it has half of what the pose has.
@@ -92,7 +92,7 @@ def scaled_to_reach(
     turn : float
         Turn of the platform on its way across, at scale 1, rad; without effect where it does not.
     least : float, optional
-        What the margins must keep; by default `least_reserve`.
+        What the margins must keep; by default `least_margin`.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def scaled_to_reach(
     robot = as_manipulator(robot)
     middle = checked_one(robot, around, "around")
     if least is None:
-        least = least_reserve(robot, middle)
+        least = least_margin(robot, middle)
     scale, best = 0, None
     for across, up in moves(robot, direction, _DIRECTIONS):
         cycle = Cycle(robot.platform, middle, across, up, turn, 1.0)
