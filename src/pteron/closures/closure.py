@@ -105,6 +105,16 @@ class Closure(ABC):
             greatest = greatest * self._lever
         return determinant(against(platform, rows)) / (greatest * reduce(mul, sizes))
 
+    def measure_squares(
+        self, platform: PlatformMotion, legs: Sequence[LegMotion]
+    ) -> list[Expression]:
+        """Return the square of the type-II measure, in each form that may be the cheapest.
+
+        That depends on what else a program computes.
+        """
+        measure = self.measure(platform, legs)
+        return [measure * measure]
+
     @property
     def _lever(self) -> Expression:
         """Return the root of the sum of squares of the platform points' distances from their mean.

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from itertools import combinations
+from operator import mul
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -131,25 +134,47 @@ def _adjugate_of_six(m: Expression) -> Expression:
     return ca.vertcat(*rows)
 
 
+class Orthogonal(NamedTuple):
+    """Rows made orthogonal one after the other, by Gram and Schmidt, and not made unit."""
+
+    rows: list[Expression]
+    squares: list[Expression]
+    products: list[list[Expression]]
+    """Of each row, when it met them, with those before it."""
+
+    @classmethod
+    def of(cls, given: Sequence[Expression]) -> Orthogonal:
+        """Return rows (n, 1) made orthogonal."""
+        made = cls([], [], [])
+        for row in given:
+            met = []
+            for q, square in zip(made.rows, made.squares, strict=True):
+                met.append(ca.dot(row, q))
+                row = row - met[-1] * (1 / square) * q
+            made.rows.append(row)
+            made.squares.append(ca.dot(row, row))
+            made.products.append(met)
+        return made
+
+
+def determinant_square(m: Expression) -> Expression:
+    """Return the square of a determinant, from the rows that `solved_across` makes orthogonal."""
+    return reduce(mul, Orthogonal.of(ca.horzsplit(m)).squares)
+
+
 def _six_solved_across(rows: Expression, right: Expression) -> Expression:
-    """Return x with A^T x = w: six rows made orthogonal one after the other, by Gram and Schmidt.
+    """Return x with A^T x = w, by the rows of A^T made orthogonal.
 
     In Bjoerck's order x is as exact as by rotations, without their roots: backwards, each row is
     met once more by what those after it have left.
     """
-    found: list[Expression] = []
-    inverses: list[Expression] = []
+    found, squares, products = Orthogonal.of(ca.horzsplit(rows))
     shares: list[Expression] = []
-    for k in range(6):
-        row, rest = rows[:, k], right[k]
-        for q, inverse, share in zip(found, inverses, shares, strict=True):
-            product = ca.dot(row, q)
+    for square, met, rest in zip(squares, products, ca.vertsplit(right), strict=True):
+        for product, share in zip(met, shares, strict=True):
             rest = rest - share * product
-            row = row - product * inverse * q
-        found.append(row)
-        inverses.append(1 / ca.dot(row, row))
-        shares.append(rest * inverses[-1])
+        shares.append(rest * (1 / square))
     x = shares[-1] * found[-1]
     for k in reversed(range(5)):
-        x = x + (shares[k] - ca.dot(found[k], x) * inverses[k]) * found[k]
+        x = x + (shares[k] - ca.dot(found[k], x) * (1 / squares[k])) * found[k]
     return x

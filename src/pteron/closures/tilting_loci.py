@@ -13,10 +13,10 @@ from operator import mul
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import Closure, against
-from pteron.closures.determinants import determinant
+from pteron.closures.closure import Closure, against, plain_rows
+from pteron.closures.determinants import determinant, determinant_square
 from pteron.errors import ModelError
-from pteron.legs.leg import LegEquations
+from pteron.legs.leg import LegEquations, LegMotion
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
@@ -61,6 +61,16 @@ class TiltingLoci(Closure):
         pairs = zip(rows, platform.point_twists, strict=True)
         whole = ca.vertcat(*(ca.mtimes(row, twist) for row, twist in pairs), held)
         return determinant(whole) / (self._greatest(2) * size)
+
+    def measure_squares(
+        self, platform: PlatformMotion, legs: Sequence[LegMotion]
+    ) -> list[Expression]:
+        """Return it by the determinant, or by the rows that `forces` makes orthogonal."""
+        found = super().measure_squares(platform, legs)
+        if len(legs) == 6:
+            most = reduce(mul, (leg.wrench_size for leg in legs), self._greatest(1))
+            found.append(determinant_square(plain_rows(platform, legs)) / (most * most))
+        return found
 
     def _greatest(self, forces: int) -> Expression:
         """Return the greatest determinant of so many unit forces at each point.

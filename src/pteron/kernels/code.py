@@ -6,7 +6,7 @@ Tables say how each operation is written in a language; `statements` writes a li
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import count
@@ -192,8 +192,20 @@ def module_values(
         "angles": angles,
         "body": body,
         "rows": [(row, inputs[i], j) for (i, j), row in rows.items()],
+        "runs": [(row, inputs[i], j, width) for row, i, j, width in _runs(used)],
         "results": [(row, port, j) for row, (port, j, _) in enumerate(results)],
     }
+
+
+def _runs(used: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int, int]]:
+    """Yield row, port, element and number of neighbours that stand in rows one after another."""
+    row = 0
+    while row < len(used):
+        i, j = used[row]
+        ahead = ([(i, j + k) for k in range(width)] for width in (4, 2, 1))
+        width = next(len(run) for run in ahead if used[row : row + len(run)] == run)
+        yield row, i, j, width
+        row += width
 
 
 def rendered(package: str, template: str, **values: Any) -> str:

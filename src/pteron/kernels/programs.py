@@ -231,17 +231,18 @@ def _program(
     given |= extra or {}
     symbols = {name: given[name] for name in sorted(given, key=_shared_last)}
     built = entry.build(machine, symbols | (constants or {}))
-    outputs = {name: _shaped(output) for name, output in built.items()}
+    forms = [{name: _shaped(output) for name, output in built.items()}]
     if guarded:
-        results = [expression for expression, _ in outputs.values()]
-        outputs["status"] = _status(machine, entry, symbols, results), ()
-    # A matrix goes out transposed: CasADi stores columns, NumPy rows.
-    dense = [ca.densify(expression).T for expression, _ in outputs.values()]
+        results = [expression for expression, _ in forms[0].values()]
+        statuses = _statuses(machine, entry, symbols, results)
+        forms = [{**forms[0], "status": (status, ())} for status in statuses]
     if vector is not None:
         symbols = {"geometry": vector, **symbols}
-    function = ca.Function(
-        what, list(symbols.values()), ca.cse(dense), list(symbols), list(outputs)
-    )
+    # A matrix goes out transposed: CasADi stores columns, NumPy rows.
+    dense = ([ca.densify(expression).T for expression, _ in form.values()] for form in forms)
+    names = list(symbols), list(forms[0])
+    functions = (ca.Function(what, list(symbols.values()), ca.cse(form), *names) for form in dense)
+    function = min(functions, key=count_operations)
     if not plain:
         function = optimised(function)
     columns = machine.robot.column_names
@@ -249,7 +250,7 @@ def _program(
         Port(name, symbol.shape[:1], name in _SHARED, columns.get(name, ()))
         for name, symbol in symbols.items()
     )
-    ports = tuple(Port(name, tuple(shape)) for name, (_, shape) in outputs.items())
+    ports = tuple(Port(name, tuple(shape)) for name, (_, shape) in forms[0].items())
     return Program(what, function, inputs, ports)
 
 
@@ -267,10 +268,13 @@ def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
     return output, (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
 
 
-def _status(
+def _statuses(
     machine: Machine, entry: Entry, symbols: dict[str, Expression], results: list[Expression]
-) -> Expression:
-    """Return 1 where everything holds that the result needs, else 0; also for NaN."""
+) -> list[Expression]:
+    """Return 1 where everything holds that the result needs, else 0; also for NaN.
+
+    In several forms, where one of them may cost less than another beside the results.
+    """
     states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
     sums = [
         sum(
@@ -295,12 +299,13 @@ def _status(
         measure = machine.platform.motion(symbols["pose"], rest, rest).angle_measure
         if not measure.is_constant():
             status = ca.if_else(measure * measure > ANGLES**2, status, 0)
-    if "type II" in entry.needs:
-        state = machine.state(symbols["pose"])
-        measure = machine.closure.measure(state.platform, state.legs)
-        for held in (measure * measure > TYPE_II**2, measure * measure < _HUGE):
-            status = ca.if_else(held, status, 0)
-    return status
+    if "type II" not in entry.needs:
+        return [status]
+    state = machine.state(symbols["pose"])
+    return [
+        ca.if_else(square < _HUGE, ca.if_else(square > TYPE_II**2, status, 0), 0)
+        for square in machine.closure.measure_squares(state.platform, state.legs)
+    ]
 
 
 def _is_nan(value: Expression) -> bool:
