@@ -134,47 +134,53 @@ def _adjugate_of_six(m: Expression) -> Expression:
     return ca.vertcat(*rows)
 
 
-class Orthogonal(NamedTuple):
-    """Rows made orthogonal one after the other, by Gram and Schmidt, and not made unit."""
+class _Reflected(NamedTuple):
+    """A^T = L Q of six rows, Q being reflections, x less v (v.x) times an inverse, after Householder.
 
-    rows: list[Expression]
+    A reflection turns the rest of a row into one number, away from that which is there.
+    """
+
+    lower: list[list[Expression]]
+    """L's rows."""
     squares: list[Expression]
-    products: list[list[Expression]]
-    """Of each row, when it met them, with those before it."""
+    """Those of L's diagonal."""
+    mirrors: list[tuple[Expression, Expression]]
+    """v and the inverse, of each row but the last."""
 
     @classmethod
-    def of(cls, given: Sequence[Expression]) -> Orthogonal:
-        """Return rows (n, 1) made orthogonal."""
-        made = cls([], [], [])
-        for row in given:
-            met = []
-            for q, square in zip(made.rows, made.squares, strict=True):
-                met.append(ca.dot(row, q))
-                row = row - met[-1] * (1 / square) * q
-            made.rows.append(row)
-            made.squares.append(ca.dot(row, row))
-            made.products.append(met)
+    def of(cls, rows: Expression) -> _Reflected:
+        """Return them for the rows of A."""
+        lower, squares, mirrors = made = cls([], [], [])
+        for k, row in enumerate(ca.horzsplit(rows)):
+            for mirror in mirrors:
+                row = _mirrored(row, mirror)
+            first, square = row[k], ca.dot(row[k:], row[k:])
+            if k < 5:
+                size = ca.sqrt(square) * (1 - 2 * (first < 0))
+                v = ca.vertcat(ca.SX(k, 1), first + size, row[k + 1 :])
+                mirrors.append((v, 1 / (square + size * first)))
+                first = -size
+            lower.append([*ca.vertsplit(row[:k]), first])
+            squares.append(square)
         return made
 
 
-def determinant_square(m: Expression) -> Expression:
-    """Return the square of a determinant, from the rows that `solved_across` makes orthogonal."""
-    return reduce(mul, Orthogonal.of(ca.horzsplit(m)).squares)
+def _mirrored(x: Expression, mirror: tuple[Expression, Expression]) -> Expression:
+    v, inverse = mirror
+    return x - v * (ca.dot(v, x) * inverse)
+
+
+def determinant_square(rows: Expression) -> Expression:
+    """Return the square of the determinant of six rows, at no cost beside `solved_across`."""
+    return reduce(mul, _Reflected.of(rows).squares)
 
 
 def _six_solved_across(rows: Expression, right: Expression) -> Expression:
-    """Return x with A^T x = w, by the rows of A^T made orthogonal.
-
-    In Bjoerck's order x is as exact as by rotations, without their roots: backwards, each row is
-    met once more by what those after it have left.
-    """
-    found, squares, products = Orthogonal.of(ca.horzsplit(rows))
-    shares: list[Expression] = []
-    for square, met, rest in zip(squares, products, ca.vertsplit(right), strict=True):
-        for product, share in zip(met, shares, strict=True):
-            rest = rest - share * product
-        shares.append(rest * (1 / square))
-    x = shares[-1] * found[-1]
-    for k in reversed(range(5)):
-        x = x + (shares[k] - ca.dot(found[k], x) * (1 / squares[k])) * found[k]
-    return x
+    """Return x with A^T x = w: L Q x = w."""
+    lower, _, mirrors = _Reflected.of(rows)
+    found: list[Expression] = []
+    for row, rest in zip(lower, ca.vertsplit(right), strict=True):
+        for value, entry in zip(found, row, strict=False):
+            rest = rest - value * entry
+        found.append(rest / row[-1])
+    return reduce(_mirrored, reversed(mirrors), ca.vertcat(*found))
