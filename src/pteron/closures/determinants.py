@@ -135,9 +135,10 @@ def _adjugate_of_six(m: Expression) -> Expression:
 
 
 class _Reflected(NamedTuple):
-    """A^T = L Q of six rows, Q being reflections, x less v (v.x) times an inverse, after Householder.
+    """The factors of A^T = L Q for six rows, Q being a product of Householder's reflections.
 
-    A reflection turns the rest of a row into one number, away from that which is there.
+    L is lower triangular. A reflection takes x to x - v (v.x) 2/(v.v); row by row it makes zeros
+    right of L's diagonal, whose sign is that which cancels nothing in v.
     """
 
     lower: list[list[Expression]]
@@ -145,11 +146,11 @@ class _Reflected(NamedTuple):
     squares: list[Expression]
     """Those of L's diagonal."""
     mirrors: list[tuple[Expression, Expression]]
-    """v and the inverse, of each row but the last."""
+    """v and 2/(v.v), of each row but the last."""
 
     @classmethod
     def of(cls, rows: Expression) -> _Reflected:
-        """Return them for the rows of A."""
+        """Return the factors for the rows of A."""
         lower, squares, mirrors = made = cls([], [], [])
         for k, row in enumerate(ca.horzsplit(rows)):
             for mirror in mirrors:
@@ -166,8 +167,8 @@ class _Reflected(NamedTuple):
 
 
 def _mirrored(x: Expression, mirror: tuple[Expression, Expression]) -> Expression:
-    v, inverse = mirror
-    return x - v * (ca.dot(v, x) * inverse)
+    v, factor = mirror
+    return x - v * (ca.dot(v, x) * factor)
 
 
 def determinant_square(rows: Expression) -> Expression:
