@@ -15,6 +15,7 @@ from pteron.bodies.parameters import unit_of
 from pteron.equations.friction import PassiveJoint, passive_joints
 from pteron.errors import ModelError
 from pteron.identification.signals import States
+from pteron.identification.signals.states import FullMotion
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
 from pteron.kinematics.evaluate import unchecked
@@ -332,11 +333,9 @@ def _probes(robot: Manipulator) -> States:
     rng = np.random.default_rng(0)
     pose = random_poses(robot, _PROBES, seed=rng)
     velocity, acceleration = rng.normal(size=pose.shape), 10.0 * rng.normal(size=pose.shape)
-    rates = unchecked(robot, "joint_rates", pose, velocity)[0]
-    seconds = unchecked(robot, "joint_accelerations", pose, velocity, acceleration)[0]
     # Every other one carries a payload, else its columns would be those of the platform.
-    payload = np.arange(_PROBES) % 2
-    return States(np.zeros(_PROBES), rates, rates, seconds, pose, velocity, acceleration, payload)
+    motion = FullMotion.of_platform(robot, pose, velocity, acceleration)
+    return States.of(np.zeros(_PROBES), motion, np.arange(_PROBES) % 2)
 
 
 def _diagonal(values: Array) -> Array:

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
-from pteron.identification.excitation.movement import FullMotion, motion_of_platform
-from pteron.identification.signals.states import home_mode
+from pteron.identification.signals.states import FullMotion, home_mode
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
@@ -158,7 +157,7 @@ class FourierMotion:
         rate, gain = np.reshape(rate, (-1, 1)), np.reshape(gain, (-1, 1))
         dq, ddq = first * rate, second * rate**2 + first * gain
         if self.space == "platform":
-            return motion_of_platform(robot, q, dq, ddq)
+            return FullMotion.of_platform(robot, q, dq, ddq)
         poses: Array = unchecked(robot, "closure_poses", np.vstack([self.center, q]))
         center, pose = poses[0, self.mode], poses[1:, self.mode]
         # Within a mode angles stay on one side of the singular orientations, half a turn at most.

@@ -11,9 +11,8 @@ import numpy as np
 from pteron.errors import ModelError
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins, margins
-from pteron.identification.excitation.movement import FullMotion, motion_of_platform
 from pteron.identification.excitation.random_motions import is_clear, sizes
-from pteron.identification.signals.states import home
+from pteron.identification.signals.states import FullMotion, home
 from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -77,7 +76,8 @@ class RepeatedCycle:
     def states(self, times: Array) -> FullMotion:
         """Return the motion of platform and joints at times (T,), s."""
         pose, first, second = self.cycle.at(np.remainder(times / self.length, 1.0))
-        return motion_of_platform(self.robot, pose, first / self.length, second / self.length**2)
+        rates = first / self.length, second / self.length**2
+        return FullMotion.of_platform(self.robot, pose, *rates)
 
     def margins(self, limits: Limits, rate: float = 1000.0) -> Margins:
         """Return the margins of a cycle, at ten times as many samples a second."""

@@ -20,8 +20,8 @@ from pteron.errors import ModelError
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins, margins, relative_margins
-from pteron.identification.excitation.movement import FullMotion
 from pteron.identification.excitation.random_motions import is_clear
+from pteron.identification.signals.states import FullMotion
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion

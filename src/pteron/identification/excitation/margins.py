@@ -18,8 +18,8 @@ from pteron.identification.excitation.limits import (
     per_joint,
     unit_of,
 )
-from pteron.identification.excitation.movement import FullMotion, Movement
-from pteron.identification.signals.states import home
+from pteron.identification.excitation.movement import Movement
+from pteron.identification.signals.states import FullMotion, home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.kinematics.limits import limited_joints
@@ -142,10 +142,9 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
 
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
     """Refuse limits that the machine at rest in its home pose does not keep, naming the limit."""
-    zero = np.zeros_like(home)
-    rest = FullMotion(home, zero, zero, unchecked(robot, "joint_coordinates", home), zero, zero)
-    rows = FullMotion(*(value[None] for value in rest))
-    for name, values in _margins_of(robot, limits, rows).items():
+    zero = np.zeros((1, len(home)))
+    rest = FullMotion.of_platform(robot, home[None], zero, zero)
+    for name, values in _margins_of(robot, limits, rest).items():
         leg = int(values[0].argmin())
         left = values[0, leg]
         if left > 0.0:

@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
+from pteron.identification.signals.states import FullMotion
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
-
-
-class FullMotion(NamedTuple):
-    """Motion of platform and joints, (T, n) each; NaN where the joints have no pose."""
-
-    pose: Array
-    velocity: Array
-    acceleration: Array
-    joints: Array
-    rates: Array
-    accelerations: Array
 
 
 class Movement(Protocol):
@@ -33,14 +22,3 @@ class Movement(Protocol):
 
     def states(self, times: Array, /) -> FullMotion:
         """Return the motion of platform and joints at times (T,), s."""
-
-
-def motion_of_platform(
-    robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
-) -> FullMotion:
-    """Return the motion of platform and joints for a motion of the platform, (T, m) each."""
-    # A slider's motion is finite out of the legs' reach too; that of the links is not.
-    joints = unchecked(robot, "joint_coordinates", pose)
-    rates = unchecked(robot, "joint_rates", pose, velocity)[0]
-    path = pose, velocity, acceleration
-    return FullMotion(*path, joints, rates, unchecked(robot, "joint_accelerations", *path)[0])

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from pteron.errors import PteronError
 from pteron.identification.signals import States
-from pteron.identification.signals.states import home
+from pteron.identification.signals.states import FullMotion, home
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion, pick_and_place
 
@@ -64,10 +63,12 @@ class ReferenceCycle:
                 slow = pick_and_place(robot, around, duration=1.0, samples=_SAMPLES)
             except PteronError:
                 continue
-            _, rates, accelerations = _joints(robot, slow)
+            gone = _whole(robot, slow)
             duration = max(
-                float((np.abs(rates).max(axis=0) / extent.rates).max()),
-                float(np.sqrt((np.abs(accelerations).max(axis=0) / extent.accelerations).max())),
+                float((np.abs(gone.rates).max(axis=0) / extent.rates).max()),
+                float(
+                    np.sqrt((np.abs(gone.accelerations).max(axis=0) / extent.accelerations).max())
+                ),
             )
             motion = pick_and_place(
                 robot,
@@ -77,18 +78,9 @@ class ReferenceCycle:
                 duration=duration,
                 samples=_SAMPLES,
             )
-            joints, rates, accelerations = _joints(robot, motion)
-            states = States(
-                motion.time,
-                joints,
-                rates,
-                accelerations,
-                motion.pose,
-                motion.velocity,
-                motion.acceleration,
-                np.zeros(_SAMPLES, dtype=np.int64),
-            )
-            return cls(states, np.abs(rates) > _MOVES * np.abs(rates).max(axis=0))
+            gone = _whole(robot, motion)
+            rates = np.abs(gone.rates)
+            return cls(States.of(motion.time, gone), rates > _MOVES * rates.max(axis=0))
         return None
 
     def share(self, error: Array, forces: Array) -> Array:
@@ -99,11 +91,5 @@ class ReferenceCycle:
         return np.asarray(100.0 * size / np.maximum(spread, max(_LEAST * spread.max(), 1e-300)))
 
 
-def _joints(robot: Manipulator, motion: Motion) -> tuple[Array, Array, Array]:
-    return (
-        unchecked(robot, "joint_coordinates", motion.pose),
-        unchecked(robot, "joint_rates", motion.pose, motion.velocity)[0],
-        unchecked(robot, "joint_accelerations", motion.pose, motion.velocity, motion.acceleration)[
-            0
-        ],
-    )
+def _whole(robot: Manipulator, motion: Motion) -> FullMotion:
+    return FullMotion.of_platform(robot, motion.pose, motion.velocity, motion.acceleration)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,28 @@ grows without bound, and with it every error."""
 
 _LOOK = 1000
 """Samples of the measured pose that decide on the assembly mode."""
+
+
+class FullMotion(NamedTuple):
+    """Motion of platform and joints, (T, n) each; NaN where the joints have no pose."""
+
+    pose: Array
+    velocity: Array
+    acceleration: Array
+    joints: Array
+    rates: Array
+    accelerations: Array
+
+    @classmethod
+    def of_platform(
+        cls, robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
+    ) -> FullMotion:
+        """Return the motion of platform and joints for a motion of the platform, (T, m) each."""
+        # A slider's motion is finite out of the legs' reach too; that of the links is not.
+        joints = unchecked(robot, "joint_coordinates", pose)
+        rates = unchecked(robot, "joint_rates", pose, velocity)[0]
+        path = pose, velocity, acceleration
+        return cls(*path, joints, rates, unchecked(robot, "joint_accelerations", *path)[0])
 
 
 @dataclass(frozen=True)
@@ -55,6 +78,14 @@ class States:
     velocity: Array
     acceleration: Array
     payload: NDArray[np.int64]
+
+    @classmethod
+    def of(
+        cls, time: Array, motion: FullMotion, payload: NDArray[np.int64] | None = None
+    ) -> States:
+        """Return the states of a motion at times (R,), with payload in some phases (R,) or none."""
+        phases = np.zeros(len(time), dtype=np.int64) if payload is None else payload
+        return cls(time, *motion[3:], *motion[:3], phases)
 
     @classmethod
     def of_joints(
@@ -86,8 +117,7 @@ class States:
             raise _no_pose(robot, joints, lost, source, first_row)
         _check_regular(robot, pose, source, first_row)
         velocity, acceleration = unchecked(robot, "platform_motion", pose, rates, accelerations)
-        phases = np.zeros(len(time), dtype=np.int64) if payload is None else payload
-        return cls(time, joints, rates, accelerations, pose, velocity, acceleration, phases)
+        return cls.of(time, FullMotion(pose, velocity, acceleration, *motion), payload)
 
     def __len__(self) -> int:
         return len(self.time)
