@@ -11,6 +11,7 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.identification.estimators import weighted
 from pteron.identification.logs import Log
+from pteron.identification.long_matrices import scaled
 from pteron.identification.model import Model
 from pteron.identification.observation import LinearModel, Observations, observations_of
 from pteron.identification.plausibility import unphysical
@@ -229,9 +230,7 @@ def _errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[f
     step = max(len(observations.forces) // _ROWS, 1)
     matrix, forces = observations.matrix[::step], observations.forces[::step]
     rows, n, p = matrix.shape
-    flat = matrix.reshape(-1, p)
-    lengths = np.linalg.norm(flat, axis=0)
-    basis = np.linalg.qr(flat / np.where(lengths > 0.0, lengths, 1.0))[0].reshape(rows, n, -1)
+    basis = np.linalg.qr(scaled(matrix.reshape(-1, p))[0])[0].reshape(rows, n, -1)
     # What each column, given to each actuator, is made of: orders and signs only add these up.
     parts = np.einsum("rnk,rj->njk", basis, forces)
     power = float((forces**2).sum())

@@ -14,6 +14,7 @@ import numpy as np
 from pteron.bodies.parameters import unit_of
 from pteron.equations.friction import PassiveJoint, passive_joints
 from pteron.errors import ModelError
+from pteron.identification.long_matrices import scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion
 from pteron.kernels import Array
@@ -309,9 +310,8 @@ def _independent(model: Model) -> Model:
     """Return a model without the terms whose columns depend on others at every state."""
     names = model.names
     flat = model._everything(_probes(model.robot)).reshape(-1, len(names))
-    lengths = np.linalg.norm(flat, axis=0)
-    lengths = np.where(lengths > 0.0, lengths, 1.0)
-    factor: Array = np.linalg.qr(flat / lengths)[1]
+    columns, lengths = scaled(flat)
+    factor: Array = np.linalg.qr(columns)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
     rest = np.abs(np.diag(factor))
     dependent = [k for k in range(model.base.rank, len(names)) if rest[k] < _DEPENDENT]
@@ -319,10 +319,10 @@ def _independent(model: Model) -> Model:
     joins = {}
     for k in dependent:
         shares = np.linalg.lstsq(factor[:, kept], factor[:, k], rcond=None)[0]
-        scaled = shares * lengths[k] / lengths[kept]
+        found = shares * lengths[k] / lengths[kept]
         joins[names[k]] = {
             names[j]: float(share)
-            for j, share, size in zip(kept, scaled, shares, strict=True)
+            for j, share, size in zip(kept, found, shares, strict=True)
             if abs(size) > _DEPENDENT
         }
     return replace(model, joins=joins)

@@ -113,6 +113,11 @@ class Observations:
             matrix=np.ascontiguousarray(self.matrix[..., list(keep)]),
         )
 
+    def with_matrix(self, matrix: Array) -> Observations:
+        """Return the observations of other columns (R, n, k), which are numbered."""
+        names = tuple(map(str, range(matrix.shape[-1])))
+        return replace(self, matrix=matrix, names=names, units=names, kinds=())
+
     def with_forces(self, forces: Array) -> Observations:
         """Return the observations of other forces (R, n)."""
         return replace(self, forces=forces)

@@ -20,6 +20,7 @@ from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
 
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
+from pteron.identification.long_matrices import scaled
 from pteron.identification.model import Model
 from pteron.identification.observation import LinearModel, Observations
 from pteron.identification.signals import States
@@ -208,8 +209,8 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
     speeds = np.full(n, np.inf)
     for _ in range(2):
         # Of all columns, and the forces, what the others leave; the noise is that of the last fit.
-        scaled = plain.matrix / noise[:, None]
-        basis = np.linalg.qr(_unit(scaled.reshape(-1, p)))[0]
+        weighed = plain.matrix / noise[:, None]
+        basis = np.linalg.qr(scaled(weighed.reshape(-1, p))[0])[0]
         forces = (plain.forces / noise).ravel()
         own = np.zeros((*plain.forces.shape, n, _COLUMNS))
         for i in range(n):
@@ -224,7 +225,7 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         extra = np.zeros((*plain.forces.shape, len(seen)))
         for k, i in enumerate(seen.tolist()):
             extra[:, i, k] = rows.matrix[:, i, p:] @ spline[chosen[i]]
-        whole = _appended(plain, extra)
+        whole = plain.with_matrix(np.concatenate([plain.matrix, extra], axis=-1))
         noise = actuator_noise(whole, weighted(whole).values)
     return speeds
 
@@ -280,15 +281,3 @@ def _slopes(
         smooth = model.matrix(states) @ np.where(dry, 0.0, values)
         found[..., -1] = -np.gradient(smooth, states.time, axis=0, edge_order=2)
     return found
-
-
-def _unit(columns: Array) -> Array:
-    lengths = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns / np.where(lengths > 0.0, lengths, 1.0))
-
-
-def _appended(observations: Observations, columns: Array) -> Observations:
-    """Return observations with more columns (R, n, k)."""
-    matrix = np.concatenate([observations.matrix, columns], axis=-1)
-    names = tuple(map(str, range(matrix.shape[-1])))
-    return replace(observations, matrix=matrix, names=names, units=names, kinds=())

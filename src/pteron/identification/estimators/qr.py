@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import solve_triangular  # type: ignore[import-untyped]
 
 from pteron.identification.errors import LogError
+from pteron.identification.long_matrices import triangle
 from pteron.identification.observation import Observations
 from pteron.kernels import Array
 
@@ -98,15 +99,12 @@ def actuator_factors(observations: Observations, *, block: int = BLOCK) -> Obser
     Whatever weights (n,) actuators have, they have the same `qr_factor`, from p + 1 rows each.
     """
     p = len(observations.names)
-    triangles = np.zeros((p + 1, observations.actuators, p + 1))
+    triangles = np.empty((p + 1, observations.actuators, p + 1))
     for i in range(observations.actuators):
-        factor = np.zeros((0, p + 1))
-        for start in range(0, len(observations.forces), block):
-            rows = slice(start, start + block)
-            new = observations.matrix[rows, i], observations.forces[rows, i]
-            rows_of = np.vstack([factor, np.column_stack(new)])
-            factor = np.asarray(np.linalg.qr(rows_of, mode="r"))
-        triangles[: len(factor), i] = factor
+        own = observations.matrix[:, i], observations.forces[:, i]
+        starts = range(0, len(own[1]), block)
+        pieces = (np.column_stack([part[k : k + block] for part in own]) for k in starts)
+        triangles[:, i] = triangle(pieces, p + 1)
     return replace(observations, matrix=triangles[..., :p], forces=triangles[..., p])
 
 
@@ -119,17 +117,13 @@ def qr_factor(
     """
     p = len(observations.names)
     squares = np.zeros(p)
-    factor = np.zeros((0, p + 1))
     # Two passes: lengths first, so that the factor is one of columns of like size.
     for matrix, _ in _blocks(observations, weights, block):
         squares += (matrix**2).sum(axis=0)
     scale = np.sqrt(squares)
     divisor = np.where(scale > 0.0, scale, 1.0)
-    for matrix, forces in _blocks(observations, weights, block):
-        rows = np.column_stack([matrix / divisor, forces])
-        factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
-    full = np.zeros((p + 1, p + 1))
-    full[: len(factor)] = factor
+    blocks = _blocks(observations, weights, block)
+    full = triangle((np.column_stack([rows / divisor, f]) for rows, f in blocks), p + 1)
     return QrFactor(
         full[:p, :p],
         full[:p, p],

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.identification.excitation.fourier import FourierMotion
+from pteron.identification.long_matrices import triangle
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.reduction import BaseParameters
@@ -109,7 +110,8 @@ def information_root(
     matrix = stacked_regressor(motion, base, motion.uniform_times(count))
     if not np.isfinite(matrix).all():
         return np.full((base.rank, base.rank), np.nan)
-    return np.asarray(_qr_factor(matrix) / np.sqrt(count))
+    pieces = (matrix[start : start + _ROWS] for start in range(0, len(matrix), _ROWS))
+    return triangle(pieces, base.rank) / np.sqrt(count)
 
 
 def conditioning_of(root: Array, values: Array) -> Conditioning:
@@ -143,16 +145,6 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
     path = state.pose, state.velocity, state.acceleration
     found: Array = unchecked(motion.robot, "base_regressor", *path, base=base)
     return found.reshape(-1, base.rank)
-
-
-def _qr_factor(matrix: Array) -> Array:
-    """Return R of the QR decomposition, some rows at a time."""
-    p = matrix.shape[1]
-    factor: Array = np.zeros((p, p))
-    for start in range(0, len(matrix), _ROWS):
-        rows = np.vstack([factor, matrix[start : start + _ROWS]])
-        factor = np.asarray(np.linalg.qr(rows, mode="r"))
-    return factor
 
 
 def _condition(matrix: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +13,7 @@ from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.estimators.qr import actuator_factors
 from pteron.identification.faults.columns import Family, FaultColumns
 from pteron.identification.faults.fault import FaultName
+from pteron.identification.long_matrices import scaled
 from pteron.identification.observation import Observations
 from pteron.identification.plausibility import CLEAR, WANTED
 from pteron.kernels import Array
@@ -135,7 +136,7 @@ def cannot_be_told(
     weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
     flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
     known = flat[:, : len(model.model.names)]
-    basis = np.linalg.qr(_scaled(known)[0])[0]
+    basis = np.linalg.qr(scaled(known)[0])[0]
     found: dict[FaultName, None] = {}
     for family, places in zip(model.families, model.places, strict=True):
         if family.name not in ("clock", "scale"):
@@ -166,8 +167,8 @@ def _taken_in(
     mixes = [one.mix for one in before]
     flat = triangles.matrix.reshape(-1, triangles.matrix.shape[-1])
     made = [flat[:, place] @ mix for place, mix in zip(places, mixes, strict=True)]
-    known = np.linalg.qr(np.hstack([_scaled(part)[0] for part in (flat[:, :p], *made)]))[0]
-    columns, lengths = _scaled(flat[:, model.places[k]])
+    known = np.linalg.qr(np.hstack([scaled(part)[0] for part in (flat[:, :p], *made)]))[0]
+    columns, lengths = scaled(flat[:, model.places[k]])
     _, seen, right = np.linalg.svd(columns - known @ (known.T @ columns), full_matrices=False)
     mix = right[seen > _SEEN].T / lengths[:, None]
     q = mix.shape[1]
@@ -180,9 +181,7 @@ def _taken_in(
 
         def mixed(rows: Observations) -> Observations:
             parts = [rows.matrix[..., place] @ one for place, one in chosen]
-            matrix = np.concatenate([rows.matrix[..., :p], *parts], axis=-1)
-            names = tuple(map(str, range(matrix.shape[-1])))
-            return replace(rows, matrix=matrix, names=names, units=names, kinds=())
+            return rows.with_matrix(np.concatenate([rows.matrix[..., :p], *parts], axis=-1))
 
         fit = weighted(mixed(observations), triangles=mixed(triangles))
         last = slice(len(fit.values) - mix.shape[1], None)
@@ -236,10 +235,3 @@ def _is_possible(one: FoundFault, model: FaultColumns) -> bool:
     if family.positive and not (one.sizes / np.maximum(one.deviations, 1e-300)).sum() > 0.0:
         return False
     return one.likely > _MOSTLY and bool(np.abs(one.sizes).max() < largest)
-
-
-def _scaled(columns: Array) -> tuple[Array, Array]:
-    """Return columns (R, k) of unit length, and their lengths."""
-    lengths = np.linalg.norm(columns, axis=0)
-    lengths = np.where(lengths > 0.0, lengths, 1.0)
-    return columns / lengths, lengths
