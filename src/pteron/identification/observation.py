@@ -51,6 +51,10 @@ _LEAST_SHARE = 0.3
 """Least noise of an equation that is used, over the usual: below, hardly any samples are in it."""
 
 
+_ROWS = ("matrix", "forces", "time", "gain", "payload")
+"""Fields of observations with an entry for each row."""
+
+
 @dataclass(frozen=True)
 class Observations:
     """Rows of F = W beta, after the parallel filter.
@@ -122,6 +126,11 @@ class Observations:
         """Return the observations of other forces (R, n)."""
         return replace(self, forces=forces)
 
+    def part(self, rows: slice) -> Observations:
+        """Return some of the rows."""
+        parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in _ROWS}
+        return replace(self, **parts)
+
 
 def observations_of(
     model: LinearModel,
@@ -170,9 +179,8 @@ def stacked(parts: Sequence[Observations]) -> Observations:
     first = parts[0]
     if len(parts) == 1:
         return first
-    names = ("matrix", "forces", "time", "gain", "payload")
     joined: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in _ROWS
     }
     return replace(first, **joined)
 

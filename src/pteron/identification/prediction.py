@@ -141,8 +141,7 @@ def predict(
     `progress` is called with the number of rows just read.
     """
     n = len(model.robot.legs)
-    plain = values.copy()
-    plain[[k for k, kind in enumerate(model.kinds) if kind in FRICTION]] = 0.0
+    plain = np.where(np.isin(model.kinds, FRICTION), 0.0, values)
     counts, total = np.zeros(n), 0
     sums = np.zeros((7, n))
     shown: list[Array] = []

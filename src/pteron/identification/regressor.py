@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -135,17 +134,11 @@ def estimate(
     whole = checked_observations(
         regressor, forces, names=names, units=units, kinds=kinds, time=time, used=used
     )
-    z: Observations | Callable[[Array], Observations] | None = None
-    if callable(instruments):
-        asked = instruments
-        z = lambda values: _like(whole, asked(values))  # noqa: E731 (narrows the type)
-    elif instruments is not None:
-        z = _like(whole, instruments)
     if held_out is None:
         rows = round(FITTED * len(whole.time))
         if rows in (0, len(whole.time)):
             raise DataError(f"forces: {len(whole.time)} samples given, more are needed")
-        fit, check = _part(whole, slice(rows)), _part(whole, slice(rows, None))
+        fit, check = whole.part(slice(rows)), whole.part(slice(rows, None))
     else:
         fit = whole
         other, measured, *counting = held_out
@@ -165,13 +158,25 @@ def estimate(
     found = reduced(fit) if reduce else None
     if found is not None:
         fit, check = fit.columns(found.kept), check.columns(found.kept)
+
+    def alike(numbers: ArrayLike) -> Observations:
+        """Return instruments as observations of the samples that are fitted."""
+        part = _like(whole, numbers).part(slice(len(fit.time)))
+        return part if found is None else part.columns(found.kept)
+
+    again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     try:
-        answer = _estimated(estimator, fit, z, found)
+        if instruments is None:
+            answer = again(fit)
+        elif callable(instruments):
+            asked = instruments
+            answer = instrumental(fit, lambda values: alike(asked(values)))
+        else:
+            answer = instrumental(fit, alike(instruments))
     except LogError as error:
         if error.reason == "too little motion" and not reduce:
             error.args = (f"{error}; or give reduce=True, which leaves out dependent columns",)
         raise
-    again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     prediction = _prediction(check, answer, repeats=held_out is None)
     return Fit(
         answer,
@@ -180,14 +185,6 @@ def estimate(
         verdict_of([prediction], repeats=held_out is None),
         found,
     )
-
-
-def _part(observations: Observations, rows: slice) -> Observations:
-    parts: dict[str, Any] = {
-        name: getattr(observations, name)[rows]
-        for name in ("matrix", "forces", "time", "gain", "payload")
-    }
-    return replace(observations, **parts)
 
 
 def _like(whole: Observations, instruments: ArrayLike) -> Observations:
@@ -201,32 +198,12 @@ def _like(whole: Observations, instruments: ArrayLike) -> Observations:
     return replace(whole, matrix=numbers.reshape(whole.matrix.shape))
 
 
-def _estimated(
-    estimator: str | Callable[[Observations], Estimate],
-    fit: Observations,
-    instruments: Observations | Callable[[Array], Observations] | None,
-    found: Reduced | None,
-) -> Estimate:
-    if instruments is None:
-        return (ESTIMATORS[estimator] if isinstance(estimator, str) else estimator)(fit)
-
-    def alike(one: Observations) -> Observations:
-        part = _part(one, slice(len(fit.time)))
-        return part if found is None else part.columns(found.kept)
-
-    if callable(instruments):
-        simulated = instruments
-        return instrumental(fit, lambda values: alike(simulated(values)))
-    return instrumental(fit, alike(instruments))
-
-
 def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
     """Return how well the values predict forces that were not fitted."""
     predicted = check.matrix @ estimate.values
-    friction = [k for k, kind in enumerate(check.kinds) if kind in FRICTION]
-    plain = estimate.values.copy()
-    plain[friction] = 0.0
-    without = check.matrix @ plain if check.kinds else np.full(predicted.shape, np.nan)
+    without = np.full(predicted.shape, np.nan)
+    if check.kinds:
+        without = check.matrix @ np.where(np.isin(check.kinds, FRICTION), 0.0, estimate.values)
     # Equations that do not count are zero on both sides.
     used, counts = check.gain > 0.0, np.maximum(check.used, 1)
     error, bare = (

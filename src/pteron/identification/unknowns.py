@@ -277,7 +277,7 @@ def _slopes(
         slope = 2.0 * np.sign(rates[:, seen]) * square * np.exp(-square)
         found[:, seen, np.arange(len(seen))] = slope
     if late:
-        dry = np.array([kind in ("coulomb", "stribeck") for kind in model.kinds])
+        dry = np.isin(model.kinds, ("coulomb", "stribeck"))
         smooth = model.matrix(states) @ np.where(dry, 0.0, values)
         found[..., -1] = -np.gradient(smooth, states.time, axis=0, edge_order=2)
     return found

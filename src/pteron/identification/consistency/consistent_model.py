@@ -12,14 +12,13 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 from pteron.errors import DataError, ModelError
 from pteron.identification.consistency.bodies import (
     Bodies,
-    Target,
     bodies_of,
     cad_target,
     parameters_of,
     plain_target,
     real_bodies,
 )
-from pteron.identification.consistency.bounds import Bounds, LinearLimits
+from pteron.identification.consistency.bounds import Bounds
 from pteron.identification.consistency.cones import RealBodies, closest, nearest, widest
 from pteron.identification.consistency.consistency import Consistency
 from pteron.kernels import Array
@@ -134,10 +133,8 @@ def consistent_model(
     target = plain_target(bodies, base, vector) if prior is None else cad_target(bodies, prior)
     cad_violations: tuple[str, ...] = ()
     if prior is not None:
-        units = bodies.sharing @ target.scale
-        cad_violations = real_bodies(robot, prior) + limits.violations(
-            prior, _HOLDS * np.abs(limits.matrix) @ units
-        )
+        rounding = _HOLDS * np.abs(limits.matrix) @ bodies.sharing @ target.scale
+        cad_violations = real_bodies(robot, prior) + limits.violations(prior, rounding)
 
     # Scaled free parameters z: the set of real bodies, and grouping z = values
     matrix = limits.matrix @ bodies.sharing * target.scale
@@ -182,7 +179,15 @@ def consistent_model(
     # The answer, checked without the solver
     residual = float(np.abs((grouping @ found - aim) / (sizes * np.linalg.norm(found))).max())
     answer = bodies.sharing @ (target.scale * found)
-    _certify(robot, bodies, target, limits, answer, found, residual)
+    failed = list(real_bodies(robot, answer))
+    units = np.maximum(np.abs(answer), bodies.sharing @ target.scale)
+    failed += limits.violations(answer, 10 * _HOLDS * np.abs(limits.matrix) @ units)
+    if residual > _HOLDS:
+        failed.append(f"base parameters: relative error {residual:.1e}")
+    if (bodies.least(found) <= 0.0).any():
+        failed.append("a body has no inertia left")
+    if failed:
+        raise ModelError(f"consistency: the solver's answer does not hold ({'; '.join(failed)})")
     if feasible:
         close = bodies.least(found) < 1.01 * target.margins
         tight = real.matrix @ found > real.right - 1e-6 * np.linalg.norm(found)
@@ -247,27 +252,6 @@ def _prior(robot: Manipulator, cad: RobotLike | ArrayLike | None) -> Array | Non
             "a model of the same machine"
         )
     return parameters_of(robot, parameters(cad) if isinstance(cad, Manipulator) else cad, "cad")
-
-
-def _certify(
-    robot: Manipulator,
-    bodies: Bodies,
-    target: Target,
-    limits: LinearLimits,
-    answer: Array,
-    found: Array,
-    residual: float,
-) -> None:
-    """Check the answer without the solver: real bodies, the base parameters, the bounds."""
-    failed = list(real_bodies(robot, answer))
-    units = np.maximum(np.abs(answer), bodies.sharing @ target.scale)
-    failed += limits.violations(answer, 10 * _HOLDS * np.abs(limits.matrix) @ units)
-    if residual > _HOLDS:
-        failed.append(f"base parameters: relative error {residual:.1e}")
-    if (bodies.least(found) <= 0.0).any():
-        failed.append("a body has no inertia left")
-    if failed:
-        raise ModelError(f"consistency: the solver's answer does not hold ({'; '.join(failed)})")
 
 
 def _inside(bodies: Bodies, point: Array, deep: Array, margins: Array) -> Array:

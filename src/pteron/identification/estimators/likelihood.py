@@ -188,9 +188,8 @@ def _slopes(
     preprocessing: Preprocessing,
 ) -> sparse.csr_matrix:
     """Return the derivatives (T n, C n) of the forces by the motion's coefficients."""
-    smooth = values.copy()
     # Coulomb friction has no slope, but where the rate changes its sign.
-    smooth[[k for k, kind in enumerate(model.kinds) if kind in ("coulomb", "stribeck")]] = 0.0
+    smooth = np.where(np.isin(model.kinds, ("coulomb", "stribeck")), 0.0, values)
     n = observations.actuators
     motion = curve.motion
     total = sparse.csr_matrix((len(observations.time) * n, curve.coefficients.size))

@@ -87,7 +87,8 @@ def total(
     if given is None:
         relative = np.sqrt(factor.rest / (factor.rest + factor.image @ factor.image))
         errors = relative * factor.scale / np.sqrt(factor.rows)
-        errors[[k for k, kind in enumerate(observations.kinds) if kind in _CONSTANT]] = 0.0
+        if observations.kinds:
+            errors[np.isin(observations.kinds, _CONSTANT)] = 0.0
     else:
         # On average over the equations that there are: an actuator without any has no noise.
         weight = (observations.used / noise**2).sum() / observations.rows

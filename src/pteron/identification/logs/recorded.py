@@ -68,11 +68,15 @@ def check_recorded(log: Log) -> None:
             f"{'; '.join(still)}: no force of a drive that moves a machine; look at the channel, "
             "and record it again, or correct which columns are read",
         )
-    wraps = [
-        _wrapped(name, size, row + log.first_row, "rad" if turns else "m")
-        for name, joint, turns in zip(log.joint_names, log.joints.T, _turns(log), strict=True)
-        for size, row in _jump(log, joint, turns)
-    ]
+    wraps = []
+    for i, (name, joint) in enumerate(zip(log.joint_names, log.joints.T, strict=True)):
+        turns = log.symbols is not None and log.symbols[i].unit == "rad"
+        for size, row in _jump(log, joint, turns):
+            unit = "rad" if turns else "m"
+            turn = ", a turn," if turns and _is_turn(size) else ""
+            wraps.append(
+                f"{name} jumps by {size:.4g} {unit}{turn} at row {row + log.first_row + 1}"
+            )
     if wraps:
         raise LogError(
             "wrapped",
@@ -117,7 +121,7 @@ def _jump(log: Log, joint: NDArray[np.float64], turns: bool) -> list[tuple[float
     if size < _SPAN * np.ptp(joint) or np.abs(steps[~far]).max(initial=0.0) > _STILL * size:
         return []
     rows = np.flatnonzero(far)
-    turn = turns and abs(size - 2.0 * np.pi) <= _ALIKE * size
+    turn = turns and _is_turn(size)
     side = joint > joint.min() + 0.5 * size
     # What is away for some samples and back is a spike.
     if not turn and min(side.sum(), (~side).sum()) <= LONGEST:
@@ -125,11 +129,5 @@ def _jump(log: Log, joint: NDArray[np.float64], turns: bool) -> list[tuple[float
     return [(size, int(rows[0]) + 1)]
 
 
-def _wrapped(name: str, size: float, row: int, unit: str) -> str:
-    what = ", a turn," if unit == "rad" and abs(size - 2.0 * np.pi) <= _ALIKE * size else ""
-    return f"{name} jumps by {size:.4g} {unit}{what} at row {row + 1}"
-
-
-def _turns(log: Log) -> list[bool]:
-    symbols = log.symbols or ()
-    return [joint.unit == "rad" for joint in symbols] or [False] * log.joints.shape[1]
+def _is_turn(size: float) -> bool:
+    return abs(size - 2.0 * np.pi) <= _ALIKE * size

@@ -132,7 +132,9 @@ def _groups(values: Values, share: float, least: Values | float) -> Mask:
     steps = np.diff(values)
     jumps = steps - median_filter(steps, _WINDOW, mode="nearest")
     usual = _USUAL * float(np.percentile(np.abs(jumps), 95.0))
-    large = np.abs(jumps) > np.maximum(max(usual, share * _span(values)), least)
+    large = np.abs(jumps) > np.maximum(
+        max(usual, share * np.ptp(np.percentile(values, _SPAN))), least
+    )
     found = np.zeros(len(values), dtype=bool)
     places = np.flatnonzero(large)
     i = 0
@@ -153,11 +155,6 @@ def _groups(values: Values, share: float, least: Values | float) -> Mask:
                     i = k + 1
                 break
     return found
-
-
-def _span(values: Values) -> float:
-    low, high = np.percentile(values, _SPAN)
-    return float(high - low)
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
