@@ -19,9 +19,9 @@ from pteron.calibration.result import (
     Finding as Finding,
     HeldOut as HeldOut,
     Value as Value,
-    Verdict as Verdict,
 )
 from pteron.calibration.unknowns import TOLERANCES as TOLERANCES
 from pteron.public import publish as _publish
+from pteron.verdict import Verdict as Verdict
 
 _publish(__name__, checked=True)

@@ -17,13 +17,12 @@ from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
+from pteron.verdict import Verdict
 
 Array = NDArray[np.float64]
 
 Origin = Literal["data", "both", "tolerance"]
 """The source of a value: the measurements, the drawing with its tolerance, or both."""
-
-Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
 
 _BY_DATA = 0.3
 """Deviation after the fit, as a share of the tolerance, up to which the data made a value."""
@@ -63,15 +62,6 @@ class Value:
         """Where it is with 95 %."""
         half = _QUANTILE * self.deviation
         return self.found - half, self.found + half
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Whether the geometry can be trusted, with reasons and advice."""
-
-    grade: Grade
-    reasons: tuple[str, ...]
-    next_steps: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -199,7 +189,7 @@ class Calibration:
             "weak": list(self.observability.weak),
             "held_out": None if self.held_out is None else asdict(self.held_out),
             "findings": [asdict(finding) for finding in self.findings],
-            "verdict": asdict(self.verdict),
+            "verdict": self.verdict.as_dict(),
             "outliers": [self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)],
         }
 

@@ -10,7 +10,8 @@ from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
-from pteron.calibration.result import Finding, Grade, HeldOut, Verdict
+from pteron.calibration.result import Finding, HeldOut
+from pteron.verdict import Opinion, Verdict
 
 _AT_THE_NOISE = 1.3
 """Held-out error, over the one expected from noise and intervals, up to which it is trusted."""
@@ -31,63 +32,54 @@ def verdict_of(
     given: Measurements,
 ) -> Verdict:
     """Return the verdict."""
-    grade: Grade = "trustworthy"
-    reasons: list[str] = []
-    steps: list[str] = []
-
-    def worse(to: Grade) -> None:
-        nonlocal grade
-        order = ("trustworthy", "usable with care", "not trustworthy")
-        grade = max(grade, to, key=order.index)
-
+    found = Opinion()
     if held_out is None:
-        worse("usable with care")
-        reasons.append("No rows were left for a check: all were needed for the fit.")
-        steps.append("Measure at more poses, or give a second log (--held-out).")
+        found.lower("usable with care")
+        found.reasons.append("No rows were left for a check: all were needed for the fit.")
+        found.steps.append("Measure at more poses, or give a second log (--held-out).")
     else:
         for kind, after in held_out.after.items():
             expected, before = held_out.expected[kind], held_out.before[kind]
             ratio = after / expected
-            unit, factor = ("mrad", 1e3) if kind == "angle" else ("mm", 1e3)
+            unit = "mrad" if kind == "angle" else "mm"
             text = (
                 f"At {held_out.rows} rows that the fit did not see the {kind} error is "
-                f"{factor * after:.3g} {unit}, {factor * before:.3g} before"
+                f"{1e3 * after:.3g} {unit}, {1e3 * before:.3g} before"
             )
             if ratio <= _AT_THE_NOISE:
-                reasons.append(f"{text}: as noise and intervals expect.")
+                found.reasons.append(f"{text}: as noise and intervals expect.")
             else:
-                worse(
+                found.lower(
                     "not trustworthy"
                     if ratio > _FAR and after > 0.5 * before
                     else "usable with care"
                 )
-                reasons.append(f"{text}: {ratio:.2g} times what noise and intervals expect.")
-    total = fit.total
-    names = [u for block in blocks for u in block.unknowns]
+                found.reasons.append(f"{text}: {ratio:.2g} times what noise and intervals expect.")
+    unknowns = [u for block in blocks for u in block.unknowns]
     far = [
         u.name
-        for u, t in zip(names, total, strict=True)
+        for u, t in zip(unknowns, fit.total, strict=True)
         if u.group != "setup" and np.isfinite(u.tolerance) and abs(t) > _OFF * u.tolerance
     ]
     if far:
-        worse("usable with care")
+        found.lower("usable with care")
         several = f"{', '.join(far[:4])}{' ...' if len(far) > 4 else ''}"
-        reasons.append(f"More than {_OFF:g} tolerances from the drawing: {several}.")
-        steps.append(
+        found.reasons.append(f"More than {_OFF:g} tolerances from the drawing: {several}.")
+        found.steps.append(
             "Check the robot's file at these values, or say by `prior` how far off they may be."
         )
     if findings:
-        worse("usable with care")
-        reasons += [finding.text for finding in findings]
+        found.lower("usable with care")
+        found.reasons += [finding.text for finding in findings]
     out = int((~fit.kept).sum())
     if out > 0.1 * len(fit.kept):
-        worse("usable with care")
-        reasons.append(f"{out} of {len(fit.kept)} rows do not fit and were left out.")
+        found.lower("usable with care")
+        found.reasons.append(f"{out} of {len(fit.kept)} rows do not fit and were left out.")
     open_values = shown.columns - shown.shown
     if open_values:
         more = f"; at more poses {shown.rank} would" if shown.rank > shown.shown else ""
-        reasons.append(
+        found.reasons.append(
             f"{shown.shown} of {shown.columns} combinations show in these measurements, the other "
             f"{open_values} are kept at the drawing{more}."
         )
-    return Verdict(grade, tuple(reasons), tuple(steps))
+    return found.verdict()

@@ -77,8 +77,8 @@ from pteron.identification.signals import (
     States as States,
     preprocessing_of as preprocessing_of,
 )
-from pteron.identification.verdict import Verdict as Verdict
 from pteron.public import publish as _publish
+from pteron.verdict import Verdict as Verdict
 
 _publish(
     __name__,

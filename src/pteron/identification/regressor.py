@@ -24,8 +24,9 @@ from pteron.identification.observation import Observations
 from pteron.identification.prediction import FRICTION, Prediction
 from pteron.identification.recordings import FITTED
 from pteron.identification.signals.filters import white_noise
-from pteron.identification.verdict import Verdict, verdict_of
+from pteron.identification.verdict import verdict_of
 from pteron.kernels import Array
+from pteron.verdict import Verdict
 
 _LEAST_ROWS = 9
 """Least number of samples, from which the noise of forces can be found without a model."""

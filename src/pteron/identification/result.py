@@ -17,12 +17,12 @@ from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Preprocessing
 from pteron.identification.unknowns import Unknowns
-from pteron.identification.verdict import Verdict
 from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
 from pteron.renamed import former_attribute
+from pteron.verdict import Verdict
 
 
 @dataclass(frozen=True, repr=False)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,11 +13,8 @@ from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction, predict
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing
-from pteron.json_values import picked
 from pteron.kernels import Array
-
-Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
-"""The grades of a verdict, best first."""
+from pteron.verdict import Grade, Opinion, Verdict
 
 AT_THE_FLOOR = 1.5
 """Held-out error, over the noise floor, up to which it is all noise."""
@@ -67,44 +63,6 @@ _HIDDEN: dict[str, tuple[str, str]] = {
 }
 """Faults that a log may hide: the reason, and a remedy."""
 
-_ORDER: tuple[Grade, ...] = ("trustworthy", "usable with care", "not trustworthy")
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Whether a model can be trusted, and why.
-
-    Attributes
-    ----------
-    grade : {"trustworthy", "usable with care", "not trustworthy"}
-        The grade of the worst actuator: trustworthy where the held-out error is at most 1.5 times
-        the noise floor, or what is missed beyond the noise is at most 5 % of the force, and a
-        pick-and-place cycle is expected to be at most 3 % off, and no fault that matters shows; not
-        trustworthy where either is more than 15 %, or where the error is more than half of the
-        force.
-    reasons : tuple of str
-        The reasons, in sentences.
-    next_steps : tuple of str
-        Advice for a better result.
-    """
-
-    grade: Grade
-    reasons: tuple[str, ...]
-    next_steps: tuple[str, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the verdict as plain data."""
-        return picked(self, "grade reasons next_steps")
-
-
-@dataclass
-class _Opinion:
-    """A grade, and what is said with it."""
-
-    grade: Grade
-    reasons: list[str]
-    steps: list[str]
-
 
 def verdict_of(
     held_out: Sequence[Prediction],
@@ -126,23 +84,24 @@ def verdict_of(
     limits : sequence of str
         Sentences on forces that stay at their limit: then the grade is "usable with care" at best.
     """
-    opinions = [_Opinion("usable with care", list(limits), [])] if limits else []
-    opinions += [_of_prediction(one) for one in held_out]
+    found = Opinion("usable with care" if limits else "trustworthy", list(limits))
+    opinions = [_of_prediction(one) for one in held_out]
     if faults is not None:
         opinions.append(_of_faults(faults))
-    reasons = [reason for one in opinions for reason in one.reasons]
-    steps = [step for one in opinions for step in one.steps]
+    for one in opinions:
+        found.lower(one.grade)
+        found.reasons += one.reasons
+        found.steps += one.steps
     if repeats:
-        reasons.append(
+        found.reasons.append(
             "What was held out repeats the motion that was fitted: it tells of noise and drift, "
             "less of other motions."
         )
-        steps.append(
+        found.steps.append(
             "Record another motion, such as a pick-and-place cycle, and hold it out (--held-out): "
             "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv."
         )
-    grade = max((one.grade for one in opinions), key=_ORDER.index)
-    return Verdict(grade, tuple(reasons), tuple(dict.fromkeys(steps)))
+    return found.verdict()
 
 
 def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
@@ -192,12 +151,12 @@ def _graded(percent: float, small: float) -> Grade:
     return "usable with care" if percent <= LARGE else "not trustworthy"
 
 
-def _of_prediction(prediction: Prediction) -> _Opinion:
+def _of_prediction(prediction: Prediction) -> Opinion:
     ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
     missed = prediction.unexplained
     # The worst actuator is the one farthest beyond both limits.
     worst = int(np.argmax(np.where(ratio <= AT_THE_FLOOR, 0.0, missed)))
-    found = _Opinion("trustworthy", [], [])
+    found = Opinion()
     drowned = int(np.argmax(prediction.robust_nrms))
     if not (prediction.robust_nrms <= DROWNED).all():
         found.grade = "not trustworthy"
@@ -241,8 +200,8 @@ def _of_prediction(prediction: Prediction) -> _Opinion:
     return found
 
 
-def _of_faults(shown: FaultIsolation) -> _Opinion:
-    found = _Opinion("trustworthy", [one.message for one in shown.faults], [])
+def _of_faults(shown: FaultIsolation) -> Opinion:
+    found = Opinion(reasons=[one.message for one in shown.faults])
     if shown.matters:
         found.grade = "usable with care"
         found.reasons.append("The stated errors of the values do not allow for that.")
@@ -259,7 +218,7 @@ def _of_faults(shown: FaultIsolation) -> _Opinion:
         return found
     worst = int(np.argmax(shown.off))
     off = float(shown.off[worst])
-    found.grade = max(found.grade, _graded(off, CYCLE), key=_ORDER.index)
+    found.lower(_graded(off, CYCLE))
     found.reasons.append(
         f"A pick-and-place cycle as fast as this motion is expected to be up to {off:.2g} % off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "

@@ -1,0 +1,56 @@
+"""The verdict on what logs or measurements tell of a machine: a grade, reasons and advice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from pteron.json_values import picked
+
+Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
+"""The grades of a verdict, best first."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a result can be trusted, and why.
+
+    Attributes
+    ----------
+    grade : {"trustworthy", "usable with care", "not trustworthy"}
+        An identified model has the grade of its worst actuator: trustworthy where the held-out
+        error is at most 1.5 times the noise floor, or what is missed beyond the noise is at most
+        5 % of the force, and a pick-and-place cycle is expected to be at most 3 % off, and no fault
+        that matters shows; not trustworthy where either is more than 15 %, or where the error is
+        more than half of the force. A calibrated geometry is trustworthy where errors at rows that
+        were held out are those of noise and intervals, and no fault shows.
+    reasons : tuple of str
+        The reasons, in sentences.
+    next_steps : tuple of str
+        Advice for a better result.
+    """
+
+    grade: Grade
+    reasons: tuple[str, ...]
+    next_steps: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the verdict as plain data."""
+        return picked(self, "grade reasons next_steps")
+
+
+@dataclass
+class Opinion:
+    """A verdict in the making."""
+
+    grade: Grade = "trustworthy"
+    reasons: list[str] = field(default_factory=list)
+    steps: list[str] = field(default_factory=list)
+
+    def lower(self, grade: Grade) -> None:
+        """Lower the grade to another one, if that is worse."""
+        self.grade = max(self.grade, grade, key=get_args(Grade).index)
+
+    def verdict(self) -> Verdict:
+        """Return the verdict."""
+        return Verdict(self.grade, tuple(self.reasons), tuple(dict.fromkeys(self.steps)))
