@@ -128,7 +128,7 @@ def calibrate(
         shown,
         judged,
         findings,
-        verdict_of(fit, blocks, shown, judged, findings, measurements),
+        verdict_of(fit, blocks, shown, judged, findings),
         measurements,
         fit,
         blocks,

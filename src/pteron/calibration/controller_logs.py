@@ -78,7 +78,7 @@ def read_controller_log(path: str | Path, robot: Manipulator) -> Measurements | 
         if re.search(r"^(?:#\*# )?\[delta_calibrate\]", text, re.MULTILINE):
             return _stable(robot, text, file.name)
         for find in _READERS:
-            if touched := list(find(robot, text, file.name)):
+            if touched := list(find(text, file.name)):
                 return _where_touched(robot, touched)
     except DataError as error:
         raise DataError(error.message, subject=source) from None
@@ -152,7 +152,7 @@ def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
     )
 
 
-def _map(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+def _map(text: str, source: str) -> Iterator[_Touched]:
     """Yield the points of RepRapFirmware's height map: z where the probe touched."""
     if not text.startswith(_MAP):
         return
@@ -185,7 +185,7 @@ def _map(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
             )
 
 
-def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+def _g30(text: str, source: str) -> Iterator[_Touched]:
     """Yield the points of G30 P.. X.. Y.. with the heights that RepRapFirmware's G32 answers."""
     found = list(_HEIGHTS.finditer(text))
     if not found:
@@ -201,7 +201,7 @@ def _g30(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
         yield _Touched(f"{source}, G30 P{p}", _xyz(*points[p], z), 0.0)
 
 
-def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+def _klippy(text: str, source: str) -> Iterator[_Touched]:
     offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
     for match in _KLIPPER.finditer(text):
         x, y, word, z = match.groups()
@@ -211,13 +211,13 @@ def _klippy(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
         yield _Touched(_line(text, match, source), _xyz(float(x), float(y), float(z)), height)
 
 
-def _marlin(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+def _marlin(text: str, source: str) -> Iterator[_Touched]:
     """Yield the points of Marlin's G29 and G30."""
     for match in _MARLIN.finditer(text):
         yield _Touched(_line(text, match, source), _xyz(*map(float, match.groups())), 0.0)
 
 
-def _linuxcnc(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
+def _linuxcnc(text: str, source: str) -> Iterator[_Touched]:
     """Yield the lines of LinuxCNC's probe log."""
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
     faults = []
@@ -236,7 +236,7 @@ def _linuxcnc(robot: Manipulator, text: str, source: str) -> Iterator[_Touched]:
         yield _Touched(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
 
 
-_READERS: tuple[Callable[[Manipulator, str, str], Iterator[_Touched]], ...] = (
+_READERS: tuple[Callable[[str, str], Iterator[_Touched]], ...] = (
     _map,
     _g30,
     _klippy,

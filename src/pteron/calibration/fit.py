@@ -6,7 +6,8 @@ Noise that is not given is found from the residuals, by kind of measurement.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class Fit:
-    """The result of a search for the most probable values.
+    """Values, the rows' residuals there, and the normal equations; at best the most probable ones.
 
     Attributes
     ----------
@@ -62,48 +63,54 @@ class Fit:
         The values.
     total : array, shape (p,)
         All steps from the drawing.
-    covariance : array, shape (p, p)
-        Of all unknowns, from data and tolerances.
-    information : array, shape (p, p)
-        What the data alone say: J' W J.
     noise : dict
         Standard deviation by kind of measurement.
+    kept : array of bool, shape (N,)
+        The rows that are no outliers.
     poses : array, shape (N, m)
         Of all rows.
     residuals, measured : array, shape (N, K)
         Of all rows, computed minus measured, m and rad; and which of them count.
     distances : array, shape (N,)
-        Of each row's residuals from zero, in standard deviations (Mahalanobis); and
-    kept : array of bool, shape (N,)
-        the rows that are no outliers.
+        Of each row's residuals from zero, in standard deviations (Mahalanobis).
+    information, gradient : array, shapes (p, p) and (p,)
+        What the data alone say: J' W J and J' W r.
+    prior : array, shape (p,)
+        What tolerances say: one over their squares.
+    cost : float
+        Squared residuals, in variances, and tolerances.
     steps : int
         Gauss and Newton's steps in all.
     """
 
     guess: Guess
     total: Array
-    covariance: Array
-    information: Array
     noise: dict[str, float]
-    poses: Array
-    residuals: Array
-    measured: NDArray[np.bool_]
-    distances: Array
     kept: NDArray[np.bool_]
-    steps: int
-
-
-@dataclass
-class _Sums:
-    """The normal equations of a guess."""
-
-    matrix: Array
-    right: Array
-    cost: float
     poses: Array
     residuals: Array
     measured: NDArray[np.bool_]
     distances: Array
+    information: Array
+    gradient: Array
+    prior: Array
+    cost: float
+    steps: int = 0
+
+    @cached_property
+    def covariance(self) -> Array:
+        """The covariance of all unknowns (p, p), from data and tolerances."""
+        matrix = self.information + np.diag(self.prior)
+        size = np.sqrt(np.diag(matrix))
+        size[size == 0.0] = 1.0
+        try:
+            factor = cho_factor(matrix / np.outer(size, size))
+        except np.linalg.LinAlgError:
+            raise DataError(
+                "the measurements leave open what has no tolerance: free less, or give `prior` "
+                "finite standard deviations"
+            ) from None
+        return np.asarray(cho_solve(factor, np.eye(len(size))) / np.outer(size, size))
 
 
 class Fitter:
@@ -140,63 +147,45 @@ class Fitter:
             If it does not settle, or the measurements leave something without a tolerance open.
         """
         setup = self.given.setup.noise
-        noise = {kind: max(setup.get(kind, _START), _FLOOR) for kind in KINDS}
         sought = [kind for kind in self.given.kinds if kind not in setup]
-        kept = np.ones(len(self.given), dtype=bool)
-        guess, poses = self.begin, self.begin_poses
-        total = np.zeros(len(self.prior))
+        guess, total = self.begin, np.zeros(len(self.prior))
+        noise = {kind: max(setup.get(kind, _START), _FLOOR) for kind in KINDS}
         if before is not None:
-            guess, total, noise = before.guess, before.total, dict(before.noise)
-        steps = 0
+            guess, total, noise = before.guess, before.total, before.noise
+        kept = np.ones(len(self.given), dtype=bool)
+        at = self._at(guess, total, self.begin_poses, noise, kept)
         for _ in range(_ROUNDS):
-            guess, total, sums, taken = self._settled(guess, total, poses, noise, kept)
-            poses, steps = sums.poses, steps + taken
-            covariance = self._covariance(sums.matrix)
-            found = {**noise, **self._noise(sums, kept, covariance, guess, noise, sought)}
-            scaled = sums.distances * (noise[sought[0]] / found[sought[0]] if sought else 1.0)
-            limits = chi2.isf(_OUTLYING / len(kept), np.maximum(sums.measured.sum(axis=1), 1))
-            fine = scaled**2 <= limits
-            if 2 * fine.sum() < len(fine):  # no rows are the faultless ones
-                fine[:] = True
-            alike = all(abs(found[k] / noise[k] - 1.0) < 0.01 for k in sought)
-            if alike and (fine == kept).all():
+            at = self._settled(at)
+            noise = at.noise | self._noise(at, sought)
+            scaled = at.distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
+            limits = chi2.isf(_OUTLYING / len(kept), np.maximum(at.measured.sum(axis=1), 1))
+            kept = scaled**2 <= limits
+            if 2 * kept.sum() < len(kept):  # no rows are the faultless ones
+                kept[:] = True
+            alike = all(abs(noise[k] / at.noise[k] - 1.0) < 0.01 for k in sought)
+            if alike and (kept == at.kept).all():
                 break
-            noise, kept = found, fine
-        return Fit(
-            guess,
-            total,
-            covariance,
-            sums.matrix,
-            noise,
-            sums.poses,
-            sums.residuals,
-            sums.measured,
-            sums.distances,
-            kept,
-            steps,
-        )
+            again = self._at(at.guess, at.total, at.poses, noise, kept)
+            at = replace(again, steps=at.steps)
+        return at
 
-    def _settled(
-        self,
-        guess: Guess,
-        total: Array,
-        poses: Array,
-        noise: dict[str, float],
-        kept: NDArray[np.bool_],
-    ) -> tuple[Guess, Array, _Sums, int]:
-        sums = self._sums(guess, total, poses, noise, kept)
-        for taken in range(1, _STEPS + 1):
-            covariance = self._covariance(sums.matrix)
-            step = -covariance @ (sums.right + self.prior * total)
-            small = np.abs(step) / np.sqrt(np.diag(covariance))
+    def _settled(self, begin: Fit) -> Fit:
+        """Return the most probable values for a noise and rows that are kept."""
+        at, kept = begin, begin.kept
+        for taken in range(1, _STEPS + 1):  # noqa: B007 (told in the result)
+            step = -at.covariance @ (at.gradient + at.prior * at.total)
+            small = np.abs(step) / np.sqrt(np.diag(at.covariance))
             share = 1.0
             while True:
                 try:
-                    moved = guess.moved(self.blocks, share * step)
-                    after = self._sums(moved, total + share * step, sums.poses, noise, kept)
-                    fell = after.cost <= sums.cost * (1.0 + 1e-9) + 1e-12
+                    moved, total = (
+                        at.guess.moved(self.blocks, share * step),
+                        at.total + share * step,
+                    )
+                    after = self._at(moved, total, at.poses, at.noise, kept)
+                    fell = after.cost <= at.cost * (1.0 + 1e-9) + 1e-12
                     if not fell and share == 1.0:
-                        strays = self._strays(sums, after, kept)
+                        strays = self._strays(at, after, kept)
                         if strays is not None:
                             kept, fell = kept & ~strays, True
                 except ValueError:  # no such machine, or out of its reach
@@ -206,19 +195,19 @@ class Fitter:
                 share *= 0.5
                 if share < 1e-3:
                     if small.max() < 1e-2:
-                        return guess, total, sums, taken
+                        break
                     raise DataError(
                         "the search for the geometry does not settle: the measurements contradict "
                         "the machine as drawn; check units, the order of the joints, and the frame"
                     )
-            guess, total, sums = moved, total + share * step, after
+            if not fell:
+                break
+            at = after
             if share == 1.0 and small.max() < _SETTLED:
                 break
-        return guess, total, sums, taken
+        return replace(at, kept=begin.kept, steps=begin.steps + taken)
 
-    def _strays(
-        self, before: _Sums, after: _Sums, kept: NDArray[np.bool_]
-    ) -> NDArray[np.bool_] | None:
+    def _strays(self, before: Fit, after: Fit, kept: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
         """Return the few rows without which a step is a great one; None where there are none.
 
         The pose of a row next to a singularity jumps where the geometry moves by little.
@@ -227,38 +216,25 @@ class Fitter:
         if not 0 < strays.sum() <= max(1.0, _FEW * kept.sum()):
             return None
         others = kept & ~strays
-        squares = [float((sums.distances[others] ** 2).sum()) for sums in (before, after)]
+        squares = [float((fit.distances[others] ** 2).sum()) for fit in (before, after)]
         return strays if squares[1] < 0.1 * squares[0] else None
 
     def cost(self, guess: Guess, total: Array, fit: Fit) -> float:
         """Return the squared residuals, in variances, and tolerances of a guess; inf: no pose."""
         try:
-            return float(self._sums(guess, total, fit.poses, fit.noise, fit.kept).cost)
+            return self._at(guess, total, fit.poses, fit.noise, fit.kept).cost
         except ValueError:
             return float(np.inf)
 
-    def _covariance(self, information: Array) -> Array:
-        matrix = information + np.diag(self.prior)
-        size = np.sqrt(np.diag(matrix))
-        size[size == 0.0] = 1.0
-        try:
-            factor = cho_factor(matrix / np.outer(size, size))
-        except np.linalg.LinAlgError:
-            raise DataError(
-                "the measurements leave open what has no tolerance: free less, or give `prior` "
-                "finite standard deviations"
-            ) from None
-        inverse: Array = np.asarray(cho_solve(factor, np.eye(len(size)))) / np.outer(size, size)
-        return inverse
-
-    def _sums(
+    def _at(
         self,
         guess: Guess,
         total: Array,
         poses: Array,
         noise: dict[str, float],
         kept: NDArray[np.bool_],
-    ) -> _Sums:
+    ) -> Fit:
+        """Return residuals and normal equations at a guess; ValueError where it has no poses."""
         count, rows = len(self.prior), len(self.given)
         width = len(self.kind_of)
         matrix, right, cost = np.zeros((count, count)), np.zeros(count), 0.0
@@ -293,7 +269,8 @@ class Fitter:
         cost += float(self.prior @ total**2)
         if not np.isfinite(cost):
             raise ValueError
-        return _Sums(matrix, right, cost, found, residuals, measured, distances)
+        values = guess, total, noise, kept
+        return Fit(*values, found, residuals, measured, distances, matrix, right, self.prior, cost)
 
     def whitened(self, at: Rows, guess: Guess, noise: dict[str, float]) -> tuple[Array, Array]:
         """Return residuals and slopes in standard deviations, independent within a row."""
@@ -307,34 +284,28 @@ class Fitter:
         white = np.linalg.solve(root, both)
         return white[..., 0], white[..., 1:]
 
-    def _noise(
-        self,
-        sums: _Sums,
-        kept: NDArray[np.bool_],
-        covariance: Array,
-        guess: Guess,
-        noise: dict[str, float],
-        sought: list[str],
-    ) -> dict[str, float]:
+    def _noise(self, fit: Fit, sought: list[str]) -> dict[str, float]:
         """Return the noise by kind that the residuals show, less what the unknowns took of it."""
         if not sought:
             return {}
+        kept = fit.kept
         taken = dict.fromkeys(KINDS, 0.0)
         for start in range(0, len(kept), _CHUNK):
             chosen = np.arange(start, min(start + _CHUNK, len(kept)))
-            at = self.slopes.rows(guess, self.given, sums.poses, chosen[kept[chosen]])
+            at = self.slopes.rows(fit.guess, self.given, fit.poses, chosen[kept[chosen]])
             for kind in sought:
-                part = at.slopes[:, self.kind_of == kind].reshape(-1, len(covariance))
-                taken[kind] += float(np.einsum("ij,jk,ik->", part, covariance, part, optimize=True))
+                part = at.slopes[:, self.kind_of == kind].reshape(-1, len(fit.total))
+                took = np.einsum("ij,jk,ik->", part, fit.covariance, part, optimize=True)
+                taken[kind] += float(took)
         found = {}
         for kind in sought:
-            own = (self.kind_of == kind) & sums.measured & kept[:, None]
+            own = (self.kind_of == kind) & fit.measured & kept[:, None]
             count = int(own.sum())
             if not count:
                 continue
-            left = count - taken[kind] / noise[kind] ** 2
+            left = count - taken[kind] / fit.noise[kind] ** 2
             # Half the middle of their sizes serves where a few rows are far off.
-            values = np.abs(sums.residuals[own])
+            values = np.abs(fit.residuals[own])
             rms = float(np.sqrt((values**2).sum() / max(left, 1.0)))
             middle = float(np.median(values)) / 0.6745 * np.sqrt(count / max(left, 1.0))
             found[kind] = max(middle if rms > 2.0 * middle and count > 20 else rms, _FLOOR)

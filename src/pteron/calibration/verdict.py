@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block
-from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
 from pteron.calibration.result import Finding, HeldOut
 from pteron.verdict import Opinion, Verdict
@@ -29,7 +26,6 @@ def verdict_of(
     shown: Observability,
     held_out: HeldOut | None,
     findings: Sequence[Finding],
-    given: Measurements,
 ) -> Verdict:
     """Return the verdict."""
     found = Opinion()
@@ -59,7 +55,7 @@ def verdict_of(
     far = [
         u.name
         for u, t in zip(unknowns, fit.total, strict=True)
-        if u.group != "setup" and np.isfinite(u.tolerance) and abs(t) > _OFF * u.tolerance
+        if u.group != "setup" and abs(t) > _OFF * u.tolerance
     ]
     if far:
         found.lower("usable with care")
