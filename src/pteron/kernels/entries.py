@@ -1,0 +1,82 @@
+"""Entries of the table of functions that can be compiled: inputs, equations, conditions.
+
+For each function: its inputs, its outputs as CasADi expressions, and the conditions on the pose
+under which its result counts. `pose_functions` and `functions` fill the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pteron.bodies.motion import Expression
+from pteron.equations.machine import Machine
+
+Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
+"""An expression, of which a column becomes a vector; a list of expressions to be stacked; or an
+expression with the shape it is to have."""
+
+Outputs = dict[str, Output]
+"""Outputs by name, in order."""
+
+Need = Literal["rows", "reach", "type I", "angles", "type II"]
+"""A condition on the pose: in reach, not singular of type I, of type II; "rows" asks for the first
+two of those legs alone whose row [dq/dc | dq/dphi] depends on the pose; "angles" for angles of the
+platform that are not singular."""
+
+TYPE_I = 1e-4
+"""Least type-I measure of a leg (0 where it is singular) where a result is divided by it: the
+relative error is 1e-15 to 1e-14 over the measure's square, so that six digits are left here."""
+
+TYPE_II = 1e-9
+"""Least type-II measure of the machine where a result needs J^-1: six digits are left here."""
+
+ANGLES = 1e-9
+"""Least measure of the platform's angles where a result is the rate of one: six digits are left."""
+
+Symbols = dict[str, Any]
+"""The expressions an entry builds with, by name: the inputs, or what a caller puts for them."""
+
+
+_Build = Callable[[Machine, Symbols], Outputs]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A function: its inputs by name, the equations of its outputs, its conditions on the pose."""
+
+    inputs: tuple[str, ...]
+    build: _Build
+    needs: tuple[Need, ...] = ()
+    """Conditions on the pose for the result to count, in the order of the messages."""
+
+
+POSE, RATE = ("pose",), ("pose", "velocity")
+MOTION = ("pose", "velocity", "acceleration")
+BENT: tuple[Need, ...] = ("reach", "type I")
+HELD: tuple[Need, ...] = ("reach", "type I", "type II")
+MOVED: tuple[Need, ...] = (*BENT, "angles")
+
+TABLE: dict[str, Entry] = {}
+"""All functions by name."""
+
+
+def entry(inputs: tuple[str, ...], needs: tuple[Need, ...] = ()) -> Callable[[_Build], _Build]:
+    """Put a function's equations into the table, by their name."""
+
+    def put(build: _Build) -> _Build:
+        TABLE[build.__name__.removeprefix("_")] = Entry(inputs, build, needs)
+        return build
+
+    return put
+
+
+def state(m: Machine, v: Symbols) -> Any:
+    """Return the state of a machine, of the orders that the symbols have."""
+    return m.state(v["pose"], v.get("velocity"), v.get("acceleration"))
+
+
+def stacked(column: Expression) -> tuple[Expression, tuple[int, ...]]:
+    """Return a column as a vector, also where it has one element or none."""
+    return column, column.shape[:1]
