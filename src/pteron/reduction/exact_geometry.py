@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from itertools import combinations, permutations
+from itertools import permutations
 from typing import TypeVar
 
 import casadi as ca
@@ -21,30 +21,21 @@ import numpy as np
 from pteron.kernels import Array, Field, evaluate
 from pteron.legs.circles import plane_axis, pole
 from pteron.manipulator import Manipulator
-from pteron.reduction.surds import Surd, direction_cosine, length
+from pteron.reduction.exact_directions import (
+    FINE,
+    PARALLEL,
+    UNIT,
+    ZERO,
+    ExactVector,
+    Notes,
+    exact_directions,
+    lost_right_angles,
+    near_relations,
+    times,
+)
+from pteron.reduction.surds import Surd, direction_cosine
 
 Element = TypeVar("Element")
-
-ExactVector = tuple[Surd, Surd, Surd]
-"""Components along x, y and z."""
-
-_PARALLEL = 1e-9
-"""rad within which directions count as parallel, or at a right angle."""
-
-_FINE = 10**12
-"""Largest denominator of an approximation: its error is below 1e-12 times 1e-6."""
-
-_NOISE = 1e-14
-"""Error of a unit vector by rounding; a larger one is reported."""
-
-_NEARLY = 1e-5
-"""Angle, rad, within which a relation that does not hold was perhaps meant to hold."""
-
-ZERO = Surd(Fraction(0))
-
-_ONE = Surd(Fraction(1))
-
-_UNIT: tuple[ExactVector, ...] = (_ONE, ZERO, ZERO), (ZERO, _ONE, ZERO), (ZERO, ZERO, _ONE)
 
 
 @dataclass(frozen=True)
@@ -190,13 +181,13 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     if size > 0.0:
         unit["gravity"] = np.array(robot.gravity) / size
     frame = _best_frame(robot, list(unit.values()))
-    notes = _Notes([], [])
-    exact = _exact_directions({name: frame @ v for name, v in unit.items()}, notes)
+    notes = Notes([], [])
+    exact = exact_directions({name: frame @ v for name, v in unit.items()}, notes)
     legs = tuple(_exact_leg(robot, i, frame, exact, notes) for i in range(len(robot.legs)))
     gravity: ExactVector = (ZERO, ZERO, ZERO)
     if size > 0.0:
         scale = Fraction(size).limit_denominator(10**6) or Fraction(size)
-        gravity = _times(exact["gravity"], scale)
+        gravity = times(exact["gravity"], scale)
     distinct = {
         name: vector
         for name, vector in unit.items()
@@ -205,7 +196,7 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     own: dict[str, tuple[Surd, ...]] = {"center": (ZERO,) * 3}
     own |= {n: (Surd(Fraction(v[0])),) for n, v in platform.quantities.items() if len(v) == 1}
     # The whole machine but its platform's frame turns with a joint that has axes of its own.
-    axes = _rational_rotation(frame) if "second_axis" in platform.quantities else _UNIT
+    axes = _rational_rotation(frame) if "second_axis" in platform.quantities else UNIT
     return ExactGeometry(
         legs,
         gravity,
@@ -215,13 +206,13 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
         frame,
         tuple(notes.recognised),
         tuple(notes.approximated),
-        tuple(_lost_right_angles(distinct, exact)),
-        tuple(_near_relations(distinct)),
+        tuple(lost_right_angles(distinct, exact)),
+        tuple(near_relations(distinct)),
     )
 
 
 def _exact_leg(
-    robot: Manipulator, i: int, frame: Array, exact: dict[str, ExactVector], notes: _Notes
+    robot: Manipulator, i: int, frame: Array, exact: dict[str, ExactVector], notes: Notes
 ) -> ExactLeg:
     leg = robot.legs[i]
     # What does not turn only shifts what the leg is fixed to.
@@ -241,7 +232,7 @@ def _exact_leg(
             # It enters the regressor only through c - r: no rank hangs on its last digits.
             at = frame @ (np.array(q.value) - shift)
             values[q.name] = tuple(_fraction(float(c)) for c in at)
-            if robot.platform.planes and abs(at @ frame @ leg.plane_normal) < _PARALLEL:
+            if robot.platform.planes and abs(at @ frame @ leg.plane_normal) < PARALLEL:
                 # Planes of legs that meet in one line do so exactly.
                 x, y, _ = exact[f"d{i + 1}"]
                 along = _fraction(float(at[1] * float(x) - at[0] * float(y))).q
@@ -256,63 +247,11 @@ def _exact_leg(
             plain = () if q.role == "normal" else q.value
             values[q.name] = tuple(Surd(Fraction(v)) for v in plain)
     # A leg without one has no axis that a force depends on.
-    return ExactLeg(values, (directions or [_UNIT[2]])[0], lengths, s0)
+    return ExactLeg(values, (directions or [UNIT[2]])[0], lengths, s0)
 
 
 def _fraction(value: float) -> Surd:
     return Surd(Fraction(value).limit_denominator(10**9))
-
-
-@dataclass(frozen=True)
-class _Notes:
-    """The notes of a conversion to exact numbers: which were recognised, which approximated."""
-
-    recognised: list[str]
-    approximated: list[str]
-
-    def length(self, name: str, value: float) -> Surd:
-        """Return a length in exact numbers."""
-        exact = length(value)
-        if exact is None:
-            exact = Surd(Fraction(value).limit_denominator(_FINE))
-            self._approximated(name, value, exact)
-        elif exact.s != 1:
-            self._recognised(name, value, exact)
-        return exact
-
-    def direction(self, name: str, given: Array) -> ExactVector:
-        """Return a unit vector in exact numbers, of unit length exactly."""
-        simple = [direction_cosine(float(c)) for c in given]
-        known = [c for c in simple if c is not None]
-        if len(known) == 3 and sum(c.square for c in known) == 1:
-            for axis, value, exact in zip("xyz", given, known, strict=True):
-                if exact.s != 1 or abs(float(exact) - float(value)) > _NOISE:
-                    self._recognised(f"{name}.{axis}", float(value), exact)
-            return (known[0], known[1], known[2])
-        vector = _stereographic(given)
-        for axis, value, exact in zip("xyz", given, vector, strict=True):
-            self._approximated(f"{name}.{axis}", float(value), exact)
-        return vector
-
-    def planar(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
-        """Return a vector in the platform's plane; where only its length is simple, keep that."""
-        simple = length(x), length(y)
-        radius = length(float(np.hypot(x, y)))
-        if None in simple and radius is not None and radius.q != 0:
-            ux, uy, _ = _stereographic(np.array([x, y, 0.0]) / np.hypot(x, y))
-            polar = Surd(ux.q * radius.q, radius.s), Surd(uy.q * radius.q, radius.s)
-            for axis, value, exact in zip("xy", (x, y), polar, strict=True):
-                self._approximated(f"{name}.{axis}", value, exact)
-            return polar
-        return self.length(f"{name}.x", x), self.length(f"{name}.y", y)
-
-    def _recognised(self, name: str, value: float, exact: Surd) -> None:
-        self.recognised.append(f"{name} = {exact} (off by {abs(float(exact) - value):.0e})")
-
-    def _approximated(self, name: str, value: float, exact: Surd) -> None:
-        error = abs(float(exact) - value)
-        if error:
-            self.approximated.append(f"{name} (off by {error:.0e})")
 
 
 def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
@@ -345,7 +284,7 @@ def _rational_rotation(frame: Array) -> tuple[ExactVector, ...]:
     q = frame * sign[:, None]
     axial = np.array([q[2, 1] - q[1, 2], q[0, 2] - q[2, 0], q[1, 0] - q[0, 1]]) / (1 + np.trace(q))
     x, y, z = (
-        Fraction(0) if abs(v) < _PARALLEL else Fraction(float(v)).limit_denominator(_FINE)
+        Fraction(0) if abs(v) < PARALLEL else Fraction(float(v)).limit_denominator(FINE)
         for v in axial
     )
     square = 1 + x * x + y * y + z * z
@@ -362,74 +301,3 @@ def _simplicity(frame: Array, vectors: list[Array]) -> int:
     """Return a score of simple components: 3 for a zero, 2 for a rational, 1 for a root."""
     found = (direction_cosine(float(c)) for vector in vectors for c in frame @ vector)
     return sum(3 if c.q == 0 else 2 if c.s == 1 else 1 for c in found if c is not None)
-
-
-def _exact_directions(given: dict[str, Array], notes: _Notes) -> dict[str, ExactVector]:
-    """Return unit vectors in exact numbers; one parallel to another becomes plus or minus it."""
-    exact: dict[str, ExactVector] = {}
-    for name, vector in given.items():
-        for earlier, kept in exact.items():
-            if np.linalg.norm(np.cross(vector, given[earlier])) < _PARALLEL:
-                sense = Fraction(round(float(vector @ given[earlier])))
-                exact[name] = _times(kept, sense)
-                error = float(np.linalg.norm(vector - float(sense) * given[earlier]))
-                if error > _NOISE:
-                    notes.recognised.append(f"{name} parallel to {earlier} (off by {error:.0e})")
-                break
-        else:
-            exact[name] = notes.direction(name, vector)
-    return exact
-
-
-def _times(vector: ExactVector, factor: Fraction) -> ExactVector:
-    x, y, z = vector
-    return x.times(factor), y.times(factor), z.times(factor)
-
-
-def _stereographic(given: Array) -> ExactVector:
-    """Return a rational unit vector near one given; components that are zero stay zero.
-
-    It is projected from the pole opposite to its largest component, rounded, and projected back.
-    """
-    pole = int(np.argmax(np.abs(given)))
-    sign = Fraction(1 if given[pole] > 0 else -1)
-    others = [i for i in range(3) if i != pole]
-    plane: list[Fraction] = []
-    for i in others:
-        t = float(given[i]) / (1.0 + abs(float(given[pole])))
-        plane.append(Fraction(0) if abs(t) < _PARALLEL else Fraction(t).limit_denominator(_FINE))
-    square: Fraction = sum((t * t for t in plane), Fraction(0))
-    result = [Fraction(0)] * 3
-    result[pole] = sign * (1 - square) / (1 + square)
-    for i, tangent in zip(others, plane, strict=True):
-        result[i] = 2 * tangent / (1 + square)
-    return (Surd(result[0]), Surd(result[1]), Surd(result[2]))
-
-
-def _lost_right_angles(given: dict[str, Array], exact: dict[str, ExactVector]) -> list[str]:
-    return [
-        f"{a} at a right angle to {b}"
-        for (a, u), (b, v) in combinations(given.items(), 2)
-        if abs(float(u @ v)) < _PARALLEL and not _perpendicular(exact[a], exact[b])
-    ]
-
-
-def _near_relations(given: dict[str, Array]) -> list[str]:
-    found = []
-    for (a, u), (b, v) in combinations(given.items(), 2):
-        for relation, angle in (
-            ("at a right angle", abs(float(u @ v))),
-            ("parallel", float(np.linalg.norm(np.cross(u, v)))),
-        ):
-            if _PARALLEL <= angle < _NEARLY:
-                found.append(f"{a} and {b} are not {relation}, by {angle:.0e} rad")
-    return found
-
-
-def _perpendicular(a: ExactVector, b: ExactVector) -> bool:
-    """Say whether a . b = 0 exactly: the terms of each radicand must cancel by themselves."""
-    sums: dict[int, Fraction] = {}
-    for x, y in zip(a, b, strict=True):
-        term = Surd.root(Fraction(x.s * y.s), 1.0)
-        sums[term.s] = sums.get(term.s, Fraction(0)) + x.q * y.q * term.q
-    return not any(sums.values())

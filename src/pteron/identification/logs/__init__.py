@@ -19,8 +19,8 @@ from pteron.identification.logs.log_file import (
     LogFile as LogFile,
     open_log as open_log,
     read_log as read_log,
-    write_log as write_log,
 )
+from pteron.identification.logs.writing import write_log as write_log
 from pteron.public import publish as _publish
 
 _publish(__name__)

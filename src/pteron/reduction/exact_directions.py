@@ -1,0 +1,162 @@
+"""Lengths and unit vectors in exact numbers: recognised where they are simple, else approximated.
+
+Directions that are parallel, or at right angles, are kept so as far as fractions can.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.reduction.surds import Surd, direction_cosine, length
+
+ExactVector = tuple[Surd, Surd, Surd]
+"""Components along x, y and z."""
+
+PARALLEL = 1e-9
+"""rad within which directions count as parallel, or at a right angle."""
+
+FINE = 10**12
+"""Largest denominator of an approximation: its error is below 1e-12 times 1e-6."""
+
+_NOISE = 1e-14
+"""Error of a unit vector by rounding; a larger one is reported."""
+
+_NEARLY = 1e-5
+"""Angle, rad, within which a relation that does not hold was perhaps meant to hold."""
+
+ZERO = Surd(Fraction(0))
+
+_ONE = Surd(Fraction(1))
+
+UNIT: tuple[ExactVector, ...] = (_ONE, ZERO, ZERO), (ZERO, _ONE, ZERO), (ZERO, ZERO, _ONE)
+
+
+@dataclass(frozen=True)
+class Notes:
+    """The notes of a conversion to exact numbers: which were recognised, which approximated."""
+
+    recognised: list[str]
+    approximated: list[str]
+
+    def length(self, name: str, value: float) -> Surd:
+        """Return a length in exact numbers."""
+        exact = length(value)
+        if exact is None:
+            exact = Surd(Fraction(value).limit_denominator(FINE))
+            self._approximated(name, value, exact)
+        elif exact.s != 1:
+            self._recognised(name, value, exact)
+        return exact
+
+    def direction(self, name: str, given: Array) -> ExactVector:
+        """Return a unit vector in exact numbers, of unit length exactly."""
+        simple = [direction_cosine(float(c)) for c in given]
+        known = [c for c in simple if c is not None]
+        if len(known) == 3 and sum(c.square for c in known) == 1:
+            for axis, value, exact in zip("xyz", given, known, strict=True):
+                if exact.s != 1 or abs(float(exact) - float(value)) > _NOISE:
+                    self._recognised(f"{name}.{axis}", float(value), exact)
+            return (known[0], known[1], known[2])
+        vector = _stereographic(given)
+        for axis, value, exact in zip("xyz", given, vector, strict=True):
+            self._approximated(f"{name}.{axis}", float(value), exact)
+        return vector
+
+    def planar(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
+        """Return a vector in the platform's plane; where only its length is simple, keep that."""
+        simple = length(x), length(y)
+        radius = length(float(np.hypot(x, y)))
+        if None in simple and radius is not None and radius.q != 0:
+            ux, uy, _ = _stereographic(np.array([x, y, 0.0]) / np.hypot(x, y))
+            polar = Surd(ux.q * radius.q, radius.s), Surd(uy.q * radius.q, radius.s)
+            for axis, value, exact in zip("xy", (x, y), polar, strict=True):
+                self._approximated(f"{name}.{axis}", value, exact)
+            return polar
+        return self.length(f"{name}.x", x), self.length(f"{name}.y", y)
+
+    def _recognised(self, name: str, value: float, exact: Surd) -> None:
+        self.recognised.append(f"{name} = {exact} (off by {abs(float(exact) - value):.0e})")
+
+    def _approximated(self, name: str, value: float, exact: Surd) -> None:
+        error = abs(float(exact) - value)
+        if error:
+            self.approximated.append(f"{name} (off by {error:.0e})")
+
+
+def exact_directions(given: dict[str, Array], notes: Notes) -> dict[str, ExactVector]:
+    """Return unit vectors in exact numbers; one parallel to another becomes plus or minus it."""
+    exact: dict[str, ExactVector] = {}
+    for name, vector in given.items():
+        for earlier, kept in exact.items():
+            if np.linalg.norm(np.cross(vector, given[earlier])) < PARALLEL:
+                sense = Fraction(round(float(vector @ given[earlier])))
+                exact[name] = times(kept, sense)
+                error = float(np.linalg.norm(vector - float(sense) * given[earlier]))
+                if error > _NOISE:
+                    notes.recognised.append(f"{name} parallel to {earlier} (off by {error:.0e})")
+                break
+        else:
+            exact[name] = notes.direction(name, vector)
+    return exact
+
+
+def times(vector: ExactVector, factor: Fraction) -> ExactVector:
+    """Return a vector times a fraction."""
+    x, y, z = vector
+    return x.times(factor), y.times(factor), z.times(factor)
+
+
+def _stereographic(given: Array) -> ExactVector:
+    """Return a rational unit vector near one given; components that are zero stay zero.
+
+    It is projected from the pole opposite to its largest component, rounded, and projected back.
+    """
+    pole = int(np.argmax(np.abs(given)))
+    sign = Fraction(1 if given[pole] > 0 else -1)
+    others = [i for i in range(3) if i != pole]
+    plane: list[Fraction] = []
+    for i in others:
+        t = float(given[i]) / (1.0 + abs(float(given[pole])))
+        plane.append(Fraction(0) if abs(t) < PARALLEL else Fraction(t).limit_denominator(FINE))
+    square: Fraction = sum((t * t for t in plane), Fraction(0))
+    result = [Fraction(0)] * 3
+    result[pole] = sign * (1 - square) / (1 + square)
+    for i, tangent in zip(others, plane, strict=True):
+        result[i] = 2 * tangent / (1 + square)
+    return (Surd(result[0]), Surd(result[1]), Surd(result[2]))
+
+
+def lost_right_angles(given: dict[str, Array], exact: dict[str, ExactVector]) -> list[str]:
+    """Return in words the right angles between directions that their exact numbers lost."""
+    return [
+        f"{a} at a right angle to {b}"
+        for (a, u), (b, v) in combinations(given.items(), 2)
+        if abs(float(u @ v)) < PARALLEL and not _perpendicular(exact[a], exact[b])
+    ]
+
+
+def near_relations(given: dict[str, Array]) -> list[str]:
+    """Return in words the directions that are parallel, or at right angles, but for a little."""
+    found = []
+    for (a, u), (b, v) in combinations(given.items(), 2):
+        for relation, angle in (
+            ("at a right angle", abs(float(u @ v))),
+            ("parallel", float(np.linalg.norm(np.cross(u, v)))),
+        ):
+            if PARALLEL <= angle < _NEARLY:
+                found.append(f"{a} and {b} are not {relation}, by {angle:.0e} rad")
+    return found
+
+
+def _perpendicular(a: ExactVector, b: ExactVector) -> bool:
+    """Say whether a . b = 0 exactly: the terms of each radicand must cancel by themselves."""
+    sums: dict[int, Fraction] = {}
+    for x, y in zip(a, b, strict=True):
+        term = Surd.root(Fraction(x.s * y.s), 1.0)
+        sums[term.s] = sums.get(term.s, Fraction(0)) + x.q * y.q * term.q
+    return not any(sums.values())
