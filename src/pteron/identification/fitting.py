@@ -20,6 +20,7 @@ from pteron.identification.estimators import (
     total,
     weighted,
 )
+from pteron.identification.estimators.least_squares import median_noise
 from pteron.identification.exchanged_columns import DECISIVE, column_fault, exchanged_joints
 from pteron.identification.logs import Log
 from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cent_advice
@@ -29,7 +30,6 @@ from pteron.identification.observation import LinearModel, Observations, observa
 from pteron.identification.plausibility import left_over
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
-from pteron.identification.signals.filters import MEDIAN_SIZE
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
@@ -161,22 +161,14 @@ def balanced(parts: Sequence[Observations]) -> Observations:
     found = weighted(whole)
     ends = np.cumsum([len(part.forces) for part in parts])[:-1]
     rest = [
-        _size(part, left) for part, left in zip(parts, np.split(found.residuals, ends), strict=True)
+        median_noise(part, left)
+        for part, left in zip(parts, np.split(found.residuals, ends), strict=True)
     ]
-    usual = _size(whole, found.residuals)
+    usual = median_noise(whole, found.residuals)
     if (usual <= _NOISELESS * np.abs(whole.forces).max(axis=0)).any():
         return whole
     scales = [np.clip(usual / np.maximum(one, 1e-300), 1.0 / _MOST, _MOST) for one in rest]
     return stacked([_scaled(part, one) for part, one in zip(parts, scales, strict=True)])
-
-
-def _size(part: Observations, rest: Array) -> Array:
-    """Return the noise of residuals (R, n) for each actuator, which wild ones leave as it is."""
-    used = np.where(part.gain > 0.0, np.abs(rest), np.nan)
-    seen = part.used > 0
-    found = np.zeros(part.actuators)
-    found[seen] = np.nanmedian(used[:, seen], axis=0) / MEDIAN_SIZE
-    return found
 
 
 def _scaled(part: Observations, factor: Array) -> Observations:

@@ -143,10 +143,8 @@ class Payload:
     @property
     def felt(self) -> bool:
         """Whether the values differ from those of no payload by more than chance (Wald, 0.1 %)."""
-        deviations = self.deviations
-        correlation = self.covariance / np.outer(deviations, deviations)
-        scaled = self.values / deviations
-        return bool(scaled @ np.linalg.solve(correlation, scaled) > chi2.isf(CHANCE, len(scaled)))
+        chosen = [self.estimate.names.index(name) for name in self.names]
+        return self.estimate.wald(self.values, chosen) > float(chi2.isf(CHANCE, len(chosen)))
 
     @property
     def allowed_for(self) -> bool:

@@ -116,7 +116,9 @@ def huber(
     converged = False
     for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
         rest = residuals_of(observations, values)
-        scale = _median_noise(observations, rest, values)
+        scale = median_noise(observations, rest)
+        # An actuator without equations has a scale all the same.
+        scale = np.where(scale > 0.0, scale, actuator_noise(observations, values))
         reduction = np.minimum(1.0, threshold / np.maximum(np.abs(rest) / scale, 1e-300))
         factor = qr_factor(observations, np.sqrt(reduction) / scale)
         before, values = values, factor.values()
@@ -156,10 +158,8 @@ def actuator_noise(observations: Observations, values: Array) -> Array:
     return np.asarray(np.maximum(noise, 1e-6 * noise.max()))
 
 
-def _median_noise(observations: Observations, rest: Array, values: Array) -> Array:
-    """Return the robust standard deviation (n,) of residuals."""
+def median_noise(observations: Observations, rest: Array) -> Array:
+    """Return the robust standard deviation (n,) of residuals; 0 for an actuator without any."""
     used = observations.gain > 0.0
-    # An actuator without equations has none either; the fallback gives it one.
     sizes = np.where(used | ~used.any(axis=0), np.abs(rest), np.nan)
-    scale = np.nanmedian(sizes, axis=0) / MEDIAN_SIZE
-    return np.where(scale > 0.0, scale, actuator_noise(observations, values))
+    return np.asarray(np.nanmedian(sizes, axis=0) / MEDIAN_SIZE)
