@@ -17,6 +17,7 @@ from pteron.export.structured_text import function_block
 from pteron.kernels import Port, program
 from pteron.kernels.graph import Graph, Node, graph_of
 from pteron.kinematics import assembly_modes
+from pteron.motion import with_payload
 
 FUNCTIONS = (
     "inverse_kinematics",
@@ -392,6 +393,24 @@ def test_blocks_take_identified_values_and_tell_drives_per_cent(tmp_path):
 
 def enumerate_places(values):
     return (((k,), float(value)) for k, value in enumerate(values))
+
+
+def test_a_payload_is_set_while_the_blocks_run(tmp_path):
+    robot = CATALOG["par4"]
+    files = pteron.export_st(robot, ["set_payload", "inverse_dynamics"], tmp_path)
+    load, forces = (Block(read(file.read_text())) for file in files)
+
+    def array(values):
+        return {(i,): float(value) for i, value in enumerate(values)}
+
+    center = (0.03, -0.02, 0.0)
+    loaded = load(mass=array([0.7]), center=array(center), inertia=array([2e-3]))
+    state = [part[0] for part in states(robot, 1)]
+    given = dict(zip(("pose", "velocity", "acceleration"), map(array, state), strict=True))
+    found = forces(**given, parameters=loaded["loaded_parameters"])
+    carrying = with_payload(robot, 0.7, center, 2e-3)
+    expected = pteron.inverse_dynamics(carrying, *state)
+    np.testing.assert_allclose(list(found["forces"].values()), expected, rtol=0, atol=1e-11)
 
 
 def test_text_can_be_read():

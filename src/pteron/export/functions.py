@@ -145,8 +145,12 @@ def chosen(
     wrench: bool,
     output: Output,
     base: str | Path | None,
+    tables: bool = True,
 ) -> tuple[Exported, ...]:
     """Return the functions to export: the `usual` unless a choice is given.
+
+    `tables` says whether the code can have tables of the machine's own values, which `set_payload`
+    starts from; where not, they are folded into that.
 
     Without a closed form for every pose that joints have, there is the step from the last one.
 
@@ -196,10 +200,17 @@ def chosen(
             "written; name one of them"
         )
     controllers = CONTROLLERS | given
-    options = identified, specialised, wrench, output
     return tuple(
-        _exported(robot, name, *options, controllers.get(name.removesuffix(_BASE)))
-        for name in names
+        _exported(
+            robot,
+            name,
+            identified,
+            specialised or (not tables and what == _PAYLOAD),
+            wrench,
+            output,
+            controllers.get(what),
+        )
+        for name, what in ((name, name.removesuffix(_BASE)) for name in names)
     )
 
 

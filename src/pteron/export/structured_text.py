@@ -111,6 +111,7 @@ def export_st(
         wrench=wrench,
         output=output,
         base=base,
+        tables=False,
     )
     prefix = _camel(prefix_of(robot))
     blocks = {f"{prefix}_{_camel(item.name)}": item for item in exported}
