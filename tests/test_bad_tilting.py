@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import tilting
 from mechanisms import NIGHTLY, TILTED
+from scipy.optimize import root
+from scipy.spatial.transform import Rotation
 from test_cli import run
 
 import pteron
 from pteron.errors import ModelError, SingularPose, UnlikelyValue, UnreachablePose
-from pteron.workspace import home_pose
+from pteron.workspace import home_pose, screw_lengths
 from pteron.workspace.machine_warnings import machine_warnings
 
 
@@ -90,6 +92,40 @@ def test_equal_plates_are_told_to_move_with_their_rams_held(tmp_path):
         "with its rams held where a half turn takes the platform points of legs 1 and 4, 2 and 5"
     )
     assert words in " ".join(done.stdout.split())
+
+
+def test_a_screws_length_is_that_of_a_ram_between_universal_joints(tmp_path):
+    """Against the chain of its joints' rotations, solved by Powell's method."""
+    robot, lead = TILTED["stewart"], 0.005
+    legs = (robot.legs[0], replace(robot.legs[1], screw_lead=lead), *robot.legs[2:])
+    robot = replace(robot, legs=legs)
+    leg = robot.legs[1]
+    axis = np.array(leg.direction)
+    across = np.cross([0.0, 0.0, 1.0], axis)
+    along, rng = np.cross(axis, across), np.random.default_rng(6)
+
+    def turn(direction, angle):
+        return Rotation.from_rotvec(angle * direction)
+
+    def missed(angles, target):
+        held = turn(axis, angles[0]) * turn(across, angles[1])
+        piston = held * turn(along, angles[2])
+        platform = piston * turn(across, angles[3]) * turn(axis, angles[4])
+        end = leg.guide_point + angles[5] * held.apply(along)
+        return np.append((platform * target[0].inv()).as_rotvec(), end - target[1])
+
+    poses = home_pose(robot) + rng.uniform(-0.4, 0.4, (5, 6))
+    for pose, added in zip(poses, screw_lengths(robot, poses), strict=True):
+        place, rows = robot.platform.at(pose)
+        target = Rotation.from_matrix(rows.T), place + leg.platform_point @ rows
+        length = pteron.inverse_kinematics(robot, pose)[1]
+        found = root(missed, [0, 0, 0, 0, 0, length], args=(target,), tol=1e-14)
+        assert np.abs(found.fun).max() < 1e-12
+        assert added[1] == pytest.approx(lead * found.x[2] / (2.0 * np.pi), abs=1e-14)
+        assert np.abs(added[1]) > 1e-5
+        assert not np.delete(added, 1).any()
+    done = run(f"check {pteron.save(robot, tmp_path / 'screw.toml')}")
+    assert re.search(r"add up to [\d.]+ mm \(leg 2\)", done.stderr)
 
 
 @NIGHTLY

@@ -159,6 +159,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.workspace import home_pose, limited_joints, pose_margins
     from pteron.workspace.drive_warnings import load_warnings
     from pteron.workspace.machine_warnings import elbow_warnings
+    from pteron.workspace.screw_lengths import screw_warnings
 
     # Refuses a singular layout, and one without a common reach with by how much legs miss it
     home = home_pose(robot)
@@ -177,7 +178,10 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": layout.holds,
         "self_motions": list(layout.self_motions),
-        "doubts": [*unlikely, *loose, *elbow_warnings(robot, home), *load_warnings(robot, home)],
+        "doubts": [
+            *(*unlikely, *loose, *elbow_warnings(robot, home)),
+            *(*load_warnings(robot, home), *screw_warnings(robot)),
+        ],
     }
 
 

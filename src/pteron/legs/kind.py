@@ -258,6 +258,11 @@ class LegKind(ABC):
         return self.joint_axis or self.plane_normal
 
     @property
+    def screw_lead(self) -> float | None:
+        """The length that a turn of a ram's piston about its axis adds, m, if it has a screw."""
+        return None
+
+    @property
     def cylinder(self) -> float | None:
         """The length of a ram's cylinder, from the base joint, as pictures show it, m."""
         return None

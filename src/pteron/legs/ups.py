@@ -6,7 +6,7 @@ which the spin about their axis has no inertia.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from random import Random
@@ -87,7 +87,7 @@ class UPS(RamLeg):
         ),
         "screw_lead": Key(
             "length",
-            "m a turn, of a screw that turns where the piston spins about its axis",
+            "m a turn, of a screw that turns where the piston spins; what that would add is told",
             default=None,
             example=0.005,
         ),
@@ -131,14 +131,6 @@ class UPS(RamLeg):
 
     def rod_couple(self, motion: LegMotion) -> Expression:
         return ca.SX(3, 1)
-
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
-        if self.screw_lead is not None:
-            yield (
-                f"screw_lead: a turn of the piston about its axis is {self.screw_lead:g} m of its "
-                "length, but the ball joint leaves that turn free: lengths are told as if it kept "
-                "still"
-            )
 
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
         return (

@@ -49,6 +49,7 @@ from pteron.workspace import (
 from pteron.workspace.drive_warnings import load_warnings
 from pteron.workspace.machine_warnings import machine_warnings
 from pteron.workspace.reach_slices import Plane, reached, slice_planes
+from pteron.workspace.screw_lengths import screw_warnings
 from pteron.workspace.tilts import largest_tilt
 
 _ANGLES = 361
@@ -183,7 +184,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     home_points, guides = joint_points(robot, home), joint_guides(robot, shown.pose)
     return Report(
         robot=robot,
-        doubts=(*machine_warnings(robot), *load_warnings(robot, home)),
+        doubts=(*machine_warnings(robot), *load_warnings(robot, home), *screw_warnings(robot)),
         home=home,
         margins=at_home,
         least=least_margin(robot, home),

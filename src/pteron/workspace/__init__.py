@@ -56,6 +56,7 @@ from pteron.workspace.reach_slices import (
     reach_slice as reach_slice,
 )
 from pteron.workspace.regions import Box as Box, Cylinder as Cylinder, Region as Region
+from pteron.workspace.screw_lengths import screw_lengths as screw_lengths
 from pteron.workspace.tilts import (
     LargestTilt as LargestTilt,
     TiltedBall as TiltedBall,
