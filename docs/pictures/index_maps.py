@@ -1,4 +1,4 @@
-"""Draw the map of docs/how-to/maps.md: maps.png."""
+"""Draw the maps of docs/how-to: maps.png of a plane, tilts.png of a hexapod's angles."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from pteron.plots import map_figure
 
 
 def draw(docs: Path) -> None:
-    """Draw a Delta's condition number in a plane."""
-    grid = pose_grid("delta", {"z": -0.9}, points=150, rim=0.04)
-    map_figure(map_index("delta", "condition", grid)).savefig(
-        docs / "maps.png", dpi=80, facecolor="white"
-    )
+    """Draw a Delta's condition number in a plane, and a hexapod's over its tilts."""
+    tilts = {"roll": (-0.7, 0.7), "pitch": (-0.7, 0.7)}
+    planes = {
+        "maps": ("delta", "condition", {"z": -0.9}, None),
+        "tilts": ("stewart", "condition_points", {"x": 0.0, "y": 0.0, "z": 2.0, "yaw": 0.0}, tilts),
+    }
+    for name, (robot, index, held, ranges) in planes.items():
+        grid = pose_grid(robot, held, ranges, points=150, rim=0.04)
+        figure = map_figure(map_index(robot, index, grid))
+        figure.savefig(docs / f"{name}.png", dpi=80, facecolor="white")
