@@ -14,6 +14,7 @@ from tilting import machine
 import pteron
 from pteron.motion import Motion, joint_points, pick_and_place, with_payload
 from pteron.motion.trajectories.tool import pose_motion, tool_motion, tool_path
+from pteron.platforms.nearest_pose import pose_nearest_frame
 from pteron.plots import draw, film
 from pteron.report import write_motion_page, write_report
 from pteron.viewer import view
@@ -115,11 +116,13 @@ def test_a_frame_that_is_turned_becomes_the_nearest_pose(kinds):
     robot, home = tooled(*kinds)
     platform = robot.platform
     other = home + np.where(platform.angular, 0.3, 0.0)
-    np.testing.assert_allclose(platform.nearest_pose(home, platform.at(other)[1]), other, atol=1e-9)
+    np.testing.assert_allclose(
+        pose_nearest_frame(platform, home, platform.at(other)[1]), other, atol=1e-9
+    )
     # A frame that a tripod, or a universal joint, has in no pose.
     c, s = np.cos(0.2), np.sin(0.2)
     wanted = platform.at(other)[1] @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
-    found = platform.nearest_pose(home, wanted)
+    found = pose_nearest_frame(platform, home, wanted)
     steps = 1e-3 * np.eye(len(home))[platform.angular]
     beside = found + np.vstack([steps, -steps])
     apart = ((platform.at(beside)[1] - wanted) ** 2).sum(axis=(-1, -2))
@@ -136,7 +139,7 @@ def test_the_viewer_moves_a_platform_by_its_angles():
     np.testing.assert_allclose(session.state.pose, [np.radians(10.0), 0.1])
     low, high = session.pose_range
     np.testing.assert_array_equal(np.transpose([low, high]), robot.platform.limits)
-    assert choices(robot) == ("none",)
+    assert list(choices(robot)) == ["none", "alpha, beta"]
     with pytest.raises(pteron.DataError, match="2 expected: alpha beta, in degrees, with blanks"):
         session.type_pose("1 2 3")
 

@@ -19,7 +19,7 @@ from pteron.legs.installed import kind_named, kind_names
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Bar, Geared, Platform
-from pteron.platforms.platform import TILTING
+from pteron.platforms.kinds import TILTING
 from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
 
 _Built = TypeVar("_Built")

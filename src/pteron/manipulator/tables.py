@@ -33,7 +33,7 @@ from pteron.legs.drive import Drive, Stribeck
 from pteron.legs.keys import Key, KeyRole
 from pteron.legs.reading import Reading
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
-from pteron.platforms.platform import TILTING, AngleOrder, Motion
+from pteron.platforms.kinds import TILTING, AngleOrder, Motion
 from pteron.toml import told
 
 

@@ -1,8 +1,8 @@
-"""The classes of the platforms' equations; `equations_class` picks a platform's."""
+"""The motions of platforms and the classes of their equations: `equations_class` picks one."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Literal, Protocol
 
 from pteron.platforms.motion import PlatformEquations
 from pteron.platforms.sliding import Sliding
@@ -17,6 +17,17 @@ from pteron.platforms.translating import PlanarTranslating, Translating
 from pteron.platforms.tripod import Tripod
 from pteron.platforms.turning import PlanarTurning, Turning
 
+Motion = Literal["3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"]
+"""3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion). 2T and
+2T1R: the same in the plane across its axis. Platforms that tilt: 3T3R moves freely, 3R and 2R turn
+about a centre, on a ball joint or a universal joint, 1T2R is a tripod's."""
+
+AngleOrder = Literal["rpy", "xyz"]
+"""rpy: R = Rz(yaw) Ry(pitch) Rx(roll). xyz: R = Rx(rx) Ry(ry) Rz(rz)."""
+
+TILTING: tuple[Motion, ...] = ("3T3R", "3R", "2R", "1T2R")
+"""The motions of platforms that turn about more axes than one."""
+
 _EQUATIONS: dict[str, type[PlatformEquations]] = {
     "3T": Translating,
     "3T1R": Turning,
@@ -27,7 +38,8 @@ _EQUATIONS: dict[str, type[PlatformEquations]] = {
     "2R": Universal,
     "1T2R": Tripod,
 }
-_XYZ: dict[str, type[PlatformEquations]] = {"3T3R": TurnsXYZ, "3R": CentredXYZ}
+XYZ: dict[str, type[PlatformEquations]] = {"3T3R": TurnsXYZ, "3R": CentredXYZ}
+"""Those whose angles are rx, ry and rz."""
 
 
 class Described(Protocol):
@@ -50,4 +62,5 @@ def equations_class(platform: Described) -> type[PlatformEquations]:
     """Return the kind of equations of a platform."""
     if platform.slides:
         return Sliding
-    return (_XYZ if platform.angle_order == "xyz" else _EQUATIONS)[platform.motion]
+    turns = XYZ if platform.angle_order == "xyz" else _EQUATIONS
+    return turns.get(platform.motion) or _EQUATIONS[platform.motion]

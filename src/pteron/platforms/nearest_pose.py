@@ -12,6 +12,18 @@ from pteron.platforms.platform import Platform
 
 Array = NDArray[np.float64]
 
+_TURN_STEPS = 30
+"""Most steps in the search for the angles of a frame."""
+
+_TURN_APART = 1e-6
+"""Angle of the differences there, rad."""
+
+_TURN_MOST = 0.5
+"""Longest step of an angle, rad."""
+
+_TURN_ROUNDING = 1e-9
+"""Step that ends the search, rad."""
+
 _SINGULAR = 1e-12
 """Cosine of the middle angle below which the pose's angles are taken for singular."""
 
@@ -27,6 +39,26 @@ def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
     named |= dict(zip(platform.lengths, lengths, strict=True))
     parts = np.broadcast_arrays(*(named[name] for name in platform.coordinates))
     return np.stack(parts, axis=-1)
+
+
+def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
+    """Return a pose (m,) whose angles, next to those of `pose`, bring its axes nearest to others.
+
+    `axes` (3, 3) are those of a frame, one a row, which the platform may not be able to have: the
+    sum of squared differences becomes least, by Gauss and Newton's steps.
+    """
+    found, turns = np.array(pose, dtype=float), np.flatnonzero(platform.angular)
+    for _ in range(_TURN_STEPS):
+        beside = np.eye(len(found))[turns] * _TURN_APART
+        ahead, behind = (
+            platform.at(found + side * beside)[1].reshape(-1, 9) for side in (1.0, -1.0)
+        )
+        slopes = (ahead - behind).T / (2.0 * _TURN_APART)
+        step = np.linalg.lstsq(slopes, (axes - platform.at(found)[1]).ravel(), rcond=None)[0]
+        found[turns] += np.clip(step, -_TURN_MOST, _TURN_MOST)
+        if np.abs(step).max(initial=0.0) < _TURN_ROUNDING:
+            break
+    return found
 
 
 def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:

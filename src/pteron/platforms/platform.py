@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import casadi as ca
 import numpy as np
@@ -19,59 +19,16 @@ from pteron.bodies.motion import HeldPlane
 from pteron.bodies.vectors import (
     Vector,
     cross,
-    interval,
-    parallel,
-    perpendicular,
-    unit_vector,
-    vector,
 )
 from pteron.errors import ModelError
+from pteron.platforms.checked_fields import BASE_Z, checked_fields
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
-from pteron.platforms.kinds import equations_class
+from pteron.platforms.kinds import TILTING, AngleOrder, Motion, equations_class
 from pteron.platforms.motion import PlatformMotion
 from pteron.platforms.parts import Bar, Geared, HeldPoint
 from pteron.toml import told
 
-Motion = Literal["3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"]
-"""3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion). 2T and
-2T1R: the same in the plane across its axis. Platforms that tilt: 3T3R moves freely, 3R and 2R turn
-about a centre, on a ball joint or a universal joint, 1T2R is a tripod's."""
-
-AngleOrder = Literal["rpy", "xyz"]
-"""rpy: R = Rz(yaw) Ry(pitch) Rx(roll). xyz: R = Rx(rx) Ry(ry) Rz(rz)."""
-
-_COORDINATES: dict[Motion, tuple[str, ...]] = {
-    "3T": ("x", "y", "z"),
-    "3T1R": ("x", "y", "z", "phi"),
-    "2T": ("x", "y"),
-    "2T1R": ("x", "y", "phi"),
-    "3T3R": ("x", "y", "z", "roll", "pitch", "yaw"),
-    "3R": ("roll", "pitch", "yaw"),
-    "2R": ("alpha", "beta"),
-    "1T2R": ("z", "roll", "pitch"),
-}
-_XYZ: dict[Motion, tuple[str, ...]] = {
-    "3T3R": ("x", "y", "z", "rx", "ry", "rz"),
-    "3R": ("rx", "ry", "rz"),
-}
-TILTING: tuple[Motion, ...] = ("3T3R", "3R", "2R", "1T2R")
-_CENTRED = ("3R", "2R")
-
-_TURN_STEPS = 30
-"""Most steps in the search for the angles of a frame."""
-
-_TURN_APART = 1e-6
-"""Angle of the differences there, rad."""
-
-_TURN_MOST = 0.5
-"""Longest step of an angle, rad."""
-
-_TURN_ROUNDING = 1e-9
-"""Step that ends the search, rad."""
-
 Limits = tuple[float, float]
-
-_BASE_Z: Vector = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -118,7 +75,7 @@ class Platform:
 
     motion: Motion
     inertia: PlanarInertia | SpatialInertia
-    axis: Vector = _BASE_Z
+    axis: Vector = BASE_Z
     x_axis: Vector | None = None
     slides: bool = False
     limits: Limits | tuple[Limits, ...] | None = None
@@ -134,101 +91,18 @@ class Platform:
         if self.motion not in get_args(Motion):
             valid = " or ".join(f'"{m}"' for m in get_args(Motion))
             raise ModelError(f"motion: {self.motion!r} is not {valid}")
-        faults: list[str] = []
-        checks = self._checked_axes, self._checked_limits, self._checked_tool, self._checked_joint
-        for checked in checks:
-            try:
-                for name, value in checked().items():
-                    object.__setattr__(self, name, value)
-            except ModelError as error:
-                faults += error.faults
-        for name in ("bars", "geared"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-        if self.slides and self.motion != "3T1R":
-            faults.append(f"slides: a {self.motion} platform has no halves that slide; only 3T1R")
-        if self.slides and any(bar.hinge[2] != 0.0 for bar in self.bars):
-            faults.append("bars: what slides moves across the axis; give 0 as hinge's third number")
-        if self.geared and not self.turns:
-            faults.append(f"geared: a {self.motion} platform has no axis for a gear to turn about")
-        if self.bars and self.tilts:
-            faults.append(f"bars: a {self.motion} platform tilts, and takes none")
-        expected = SpatialInertia if self.tilts else PlanarInertia
-        if not isinstance(self.inertia, expected):
-            faults.append(
-                f"inertia: {type(self.inertia).__name__} given, but a {self.motion} platform "
-                f"{'tilts' if self.tilts else 'does not tilt'}: {expected.__name__} expected"
-            )
+        sound, faults = checked_fields(self)
         if faults:
             raise ModelError(told(faults), faults=faults)
-
-    def _checked_axes(self) -> dict[str, Any]:
-        axis = unit_vector(self.axis, "axis")
-        if self.x_axis is not None and self.motion == "2R":
-            raise ModelError(
-                "x_axis: a 2R platform's frame is the base frame at angles zero; leave it out"
-            )
-        if self.x_axis is not None:
-            return {"axis": axis, "x_axis": perpendicular(self.x_axis, axis, "x_axis", "axis")}
-        if axis == _BASE_Z or self.motion == "2R":
-            return {"axis": axis, "x_axis": None if self.motion == "2R" else (1.0, 0.0, 0.0)}
-        raise ModelError(
-            f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
-            "where the platform frame's x points at phi = 0"
-        )
-
-    def _checked_limits(self) -> dict[str, Any]:
-        if self.limits is None:
-            return {}
-        if not self.angles:
-            raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
-        if not self.tilts:
-            return {"limits": interval(self.limits, "limits")}
-        try:
-            pairs = [tuple(pair) for pair in self.limits]  # type: ignore[arg-type]
-        except TypeError:
-            pairs = []
-        if len(pairs) != len(self.angles):
-            raise ModelError(
-                f"limits: {self.limits!r} given, one pair for each of {', '.join(self.angles)} "
-                "expected, rad"
-            )
-        return {"limits": tuple(interval(p, f"limits[{i}]") for i, p in enumerate(pairs))}
-
-    def _checked_tool(self) -> dict[str, Any]:
-        return {"tool": vector(self.tool, "tool")}
-
-    def _checked_joint(self) -> dict[str, Any]:
-        """Return what a platform on a joint with the base has, and no other."""
-        faults, found = [], {}
-        if self.angle_order not in get_args(AngleOrder):
-            faults.append(f'angles: {self.angle_order!r} is not "rpy" or "xyz"')
-        elif self.angle_order != "rpy" and self.motion not in _XYZ:
-            faults.append(f'angles: a {self.motion} platform has no "xyz"; only 3T3R and 3R')
-        wanted = {"center": self.motion in _CENTRED, "second_axis": self.motion == "2R"}
-        for name, needed in wanted.items():
-            value = getattr(self, name)
-            if (value is None) == needed:
-                faults.append(
-                    f"{name}: missing; a {self.motion} platform turns about it"
-                    if needed
-                    else f"{name}: a {self.motion} platform has none; leave it out"
-                )
-            elif needed:
-                check = vector if name == "center" else unit_vector
-                found[name] = check(value, name)
-        second = found.get("second_axis")
-        if second and parallel(unit_vector(self.axis, "axis"), second):
-            faults.append("second_axis: along axis, so that both angles turn alike; turn one")
-        if faults:
-            raise ModelError(told(faults), faults=faults)
-        return found
+        for name, value in sound.items():
+            object.__setattr__(self, name, value)
 
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
         """The platform frame's x, y and z at angles zero, in the base frame."""
         x = self.x_axis
         if x is None:  # of a 2R platform
-            return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), _BASE_Z
+            return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), BASE_Z
         return (x, cross(self.axis, x), self.axis)
 
     @property
@@ -254,9 +128,7 @@ class Platform:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the pose's coordinates, in order; see `platforms.coordinates`."""
-        if self.angle_order == "xyz" and self.motion in _XYZ:
-            return _XYZ[self.motion]
-        return _COORDINATES[self.motion]
+        return equations_class(self).coordinates
 
     @property
     def units(self) -> tuple[Unit, ...]:
@@ -344,27 +216,6 @@ class Platform:
         place, axes = (np.asarray(part) for part in _placing(self)(rows.T))
         # The columns of each (3, 3) stand one behind the other.
         return place.T.reshape(*shape, 3), axes.T.reshape(*shape, 3, 3)
-
-    def nearest_pose(
-        self, pose: NDArray[np.float64], axes: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return a pose (m,) with the angles, next to its own, that bring its axes nearest others.
-
-        `axes` (3, 3) are those of a frame, one a row, which it may not be able to have: the sum of
-        squared differences becomes least, by Gauss and Newton's steps.
-        """
-        found, turns = np.array(pose, dtype=float), np.flatnonzero(self.angular)
-        for _ in range(_TURN_STEPS):
-            beside = np.eye(len(found))[turns] * _TURN_APART
-            ahead, behind = (
-                self.at(found + side * beside)[1].reshape(-1, 9) for side in (1.0, -1.0)
-            )
-            slopes = (ahead - behind).T / (2.0 * _TURN_APART)
-            step = np.linalg.lstsq(slopes, (axes - self.at(found)[1]).ravel(), rcond=None)[0]
-            found[turns] += np.clip(step, -_TURN_MOST, _TURN_MOST)
-            if np.abs(step).max(initial=0.0) < _TURN_ROUNDING:
-                break
-        return found
 
     def tool_motion(
         self,

@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.platforms.nearest_pose import pose_nearest_frame
 from pteron.viewer.solids import axes_of, quaternion
 from pteron.viewer.state import ViewerState
 
@@ -87,7 +88,7 @@ class Handle:
         """
         w, x, y, z = self._turner.wxyz
         if self._robot.platform.tilts:
-            return self._robot.platform.nearest_pose(self._pose, axes_of(self._turner.wxyz))
+            return pose_nearest_frame(self._robot.platform, self._pose, axes_of(self._turner.wxyz))
         first = np.array(
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
         )
