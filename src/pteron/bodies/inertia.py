@@ -296,9 +296,9 @@ class SpatialInertia:
         return SpatialInertia(self.mass, (x, y, z), (xx, xy, xz, yy, yz, zz))
 
 
-def inertia_count(kind: type[Inertia] | Inertia) -> int:
-    """Return how many numbers the inertia of a body has, beside its mass and first moment."""
-    return sum(name.startswith("I") for name in kind.kinds)
+def inertia_count(kinds: Sequence[str]) -> int:
+    """Return how many of the kinds of a body's parameters are of its inertia tensor."""
+    return sum(kind.startswith("I") for kind in kinds)
 
 
 def carried_values(

@@ -129,7 +129,7 @@ def export_fmu(
         "freedom": robot.freedom,
         "joint_count": robot.joint_count,
         "wrench_count": len(robot.platform.wrench_columns),
-        "inertia_count": inertia_count(robot.platform.inertia),
+        "inertia_count": inertia_count(robot.platform.inertia.kinds),
         "inertial": tables["parameters"],
         "drives": tables["drives"],
         "least_square": LEAST**2,

@@ -223,7 +223,7 @@ def _program(
         "twist": 6,
         "mass": 1,
         "center": 3,
-        "inertia": inertia_count(machine.robot.platform.inertia),
+        "inertia": inertia_count(machine.robot.platform.inertia.kinds),
         "drives": len(Drives._fields) * machine.freedom,
         **control.input_sizes(what, machine.freedom, selected),
     }

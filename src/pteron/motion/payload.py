@@ -89,7 +89,7 @@ def with_payload(
             f"where a payload cannot be modelled; give {place} [0, 0, z]",
             subject=robot.name,
         )
-    kind, count = type(own), inertia_count(own)
+    kind, count = type(own), inertia_count(own.kinds)
     given = np.ravel(inertia).tolist()
     tensor = numbers([0.0] * count if given == [0.0] else given, "inertia", count)
     if carried == 0.0 and not any(tensor):
