@@ -129,11 +129,15 @@ class Tilting(PlatformEquations):
         _, _, w, dw = turned
         points, shifts = [], []
         swing = ca.skew(dw) + ca.mtimes(w, w.T) - ca.dot(w, w) * ca.SX.eye(3)
-        for arm in self.arms:
-            s = ca.mtimes(turned.matrix, arm)
-            points.append(PointMotion(p + s, dp + ca.cross(w, s), ddp + ca.mtimes(swing, s)))
-            shifts.append(ca.blockcat([[ca.SX.eye(3), -ca.skew(s)], [ca.SX(3, 3), ca.SX.eye(3)]]))
         axes = ca.mtimes(turned.matrix, self.zero)
+        # Of six points that have but x and y, the axes' accelerations cost less than each point's.
+        flat = len(self.points) == 6 and all(s[2].is_zero() for s in self.points)
+        pulled = ca.mtimes(swing, axes[:, :2])
+        for arm, s0 in zip(self.arms, self.points, strict=True):
+            s = ca.mtimes(turned.matrix, arm)
+            dds = ca.mtimes(pulled, s0[:2]) if flat else ca.mtimes(swing, s)
+            points.append(PointMotion(p + s, dp + ca.cross(w, s), ddp + dds))
+            shifts.append(ca.blockcat([[ca.SX.eye(3), -ca.skew(s)], [ca.SX(3, 3), ca.SX.eye(3)]]))
         x, y, _ = ca.horzsplit(axes)
         ddx, ddy = (ca.cross(dw, v) + ca.cross(w, ca.cross(w, v)) for v in (x, y))
         spin = ca.horzcat(ca.SX(3, 3), ca.SX.eye(3))
