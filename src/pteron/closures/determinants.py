@@ -157,7 +157,7 @@ class _Reflected(NamedTuple):
                 row = _mirrored(row, mirror)
             first, square = row[k], ca.dot(row[k:], row[k:])
             if k < 5:
-                size = ca.sqrt(square) * (1 - 2 * (first < 0))
+                size = ca.sqrt(square) * (ca.if_else(first > 0, 2, 0) - 1)
                 v = ca.vertcat(ca.SX(k, 1), first + size, row[k + 1 :])
                 mirrors.append((v, 1 / (square + size * first)))
                 first = -size

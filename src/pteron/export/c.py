@@ -208,7 +208,8 @@ class CPrinter:
             by_number = node.operation == "div" and nodes[node.arguments[1]].operation == CONSTANT
             form = f"const {self.real} {{0}} = {{1}};"
             lines += statements(graph, [k], names, plain if by_number else guarded, form)
-            if node.operation in ("sqrt", "less") and not node.shared:
+            of_number = nodes[node.arguments[0]].operation == CONSTANT
+            if node.operation in ("sqrt", "less") and not (node.shared or of_number):
                 radicands.append(names[node.arguments[0]])
         finite = []
         for port, places in zip(item.outputs, graph.outputs, strict=True):
