@@ -58,6 +58,7 @@ def test_the_files_agree_with_the_terminal():
         ("log.csv --robot linear-delta --prior p.toml --out a", "a standard deviation in m or rad"),
         ("log.csv --robot linear-delta --prior no.toml --out a", "no.toml: there is no such file"),
         ("log.csv --robot linear-delta --out log.csv", "it is a file"),
+        ("--plan 9 --robot ankle --out plan.csv", "a point that stays where it is"),
         ("log.csv --robot robot.toml --out .", "would replace a file that is read"),
     ],
 )

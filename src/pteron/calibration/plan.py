@@ -133,7 +133,7 @@ def plan(
     Raises
     ------
     DataError
-        If the count is not above 0, or a choice is unknown.
+        If the count is not above 0, a choice is unknown, or the tool stays where it is.
     ModelError
         If no box of poses around home, or on the plane, is proved to serve.
     """
@@ -146,6 +146,11 @@ def plan(
     ):
         if value not in get_args(choices):
             raise DataError(f"{name}: {value!r} is not one of {', '.join(get_args(choices))}")
+    if measure != "poses" and not (robot.platform.lengths or any(robot.platform.tool)):
+        raise DataError(
+            f"measure: {measure} of a point that stays where it is show nothing of this machine; "
+            "measure poses, or give the platform's tool"
+        )
     home = home_pose(robot)
     setup = setup or Setup()
     if measure == "heights":

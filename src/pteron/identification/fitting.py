@@ -235,7 +235,8 @@ def too_little_motion(
         f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
         f"({names}), their standard deviations are larger than their usual size; "
         f"{'mend that, or ' if cause else ''}move faster and along all coordinates, as the motion "
-        "does that pteron excite ROBOT --out motion.csv writes",
+        "does that pteron excite ROBOT --out motion.csv writes, faster still with --speed and "
+        "--acceleration",
     )
 
 
