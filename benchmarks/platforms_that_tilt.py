@@ -34,8 +34,8 @@ _MACHINES, _STATES = (1, 20) if quick() else (10, 200)
 _FEWEST = _STATES // 2
 """States of a machine: one that reaches less of its surroundings is drawn anew."""
 
-_FAR = 1e-3
-"""Type-II measure of a state, at least."""
+_TYPE_I, _TYPE_II = 0.05, 1e-3
+"""Measures of a state, at least."""
 
 _BOUNDS = {"loops": 1e-13, "J": 1e-10, "MuJoCo": 1e-8, "Lagrange": 1e-8, "forward": 1e-10}
 _METHODS: tuple[Literal["exact", "svd", "qr"], ...] = ("exact", "svd", "qr")
@@ -123,7 +123,8 @@ def look(motion: str, kind: str, seed: int, worst: Worst) -> None:
 def drawn(robot: pteron.Manipulator, home: Array, count: int, seed: int) -> States:
     """Draw states that are not next to a singularity, where all ways lose digits."""
     states = tilting.states(robot, home, count, seed)
-    far = np.abs(numeric(robot, "type_ii")(states[0])[0]) > _FAR
+    bent = numeric(robot, "squared_type_i")(states[0])[0].min(axis=-1)
+    far = (np.abs(numeric(robot, "type_ii")(states[0])[0]) > _TYPE_II) & (bent > _TYPE_I**2)
     return states[0][far], states[1][far], states[2][far]
 
 

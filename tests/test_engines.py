@@ -81,6 +81,20 @@ def test_forces_through_the_closure(case, engine):
     assert relative_error(forces, pteron.inverse_dynamics(robot, *motion)) < 1e-8
 
 
+@pytest.mark.clients
+@pytest.mark.parametrize("name", mechanisms.TILTED)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_files_of_the_catalogs_tilting_machines_have_its_forces(name, engine):
+    pytest.importorskip(NEEDS[engine.split()[-1]])
+    robot = mechanisms.TILTED[name]
+    poses = pteron.random_poses(robot, COUNT, seed=1, type_ii=0.1)
+    rates = np.random.default_rng(1).normal(size=(2, *poses.shape))
+    forces, jacobian, gap = trees.projected(robot, ENGINES[engine](robot), poses, *rates)
+    assert gap < 1e-13
+    assert relative_error(jacobian, pteron.jacobian(robot, poses)) < 1e-10
+    assert relative_error(forces, pteron.inverse_dynamics(robot, poses, *rates)) < 1e-8
+
+
 @mechanisms.NIGHTLY
 @pytest.mark.parametrize("name", EACH)
 def test_ten_random_machines_of_each_platform_that_tilts_with_each_leg(name):

@@ -12,7 +12,7 @@ import pteron
 from pteron.maps import pose_grid
 from pteron.motion import replay
 from pteron.playback import playback
-from pteron.workspace import bounding_box, home_pose, pose_margins
+from pteron.workspace import bounding_box, home_pose, largest_cube, pose_margins
 
 HOMES = {
     "ankle": [0.0, 0.0],
@@ -64,6 +64,12 @@ def test_commands_serve_platforms_that_have_no_place_to_move_to(name, tmp_path):
         farthest = max(farthest, np.linalg.norm(leg.platform_point))
     turning = np.linalg.norm(cycle.acceleration[:, TILTED[name].platform.angular], axis=-1)
     assert 9.0 < farthest * turning.max() < 10.01
+
+
+def test_a_cube_is_found_where_it_is_far_smaller_than_the_machine():
+    found = largest_cube("rubin-m2-hexapod", np.zeros(6))
+    assert found.edge > 0.02
+    assert found.proof.holds
 
 
 def test_tables_of_poses_may_be_in_mm_and_degrees(tmp_path):

@@ -20,6 +20,7 @@ from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.samples import Shape, cube
 from pteron.workspace.smooth_conditions import smooth_conditions
+from pteron.workspace.volume import bounding_box
 
 _STARTS = 3
 """Places of a search grid from which the shape is enlarged."""
@@ -194,8 +195,16 @@ def _largest(
         center = np.append(fit.center, at[lengths:])
         return Inscribed(center, 0.5 * fit.edge, region(center, 0.5 * fit.edge), proof)
 
+    def around(ball: tuple[Array, float], failing: Array) -> Fit:
+        return largest_fit(smooth, geometry, at[None], ball, failing, shape, _STARTS)
+
     def search(failing: Array) -> Fit:
-        return largest_fit(smooth, geometry, at[None], search_ball(robot), failing, shape, _STARTS)
+        fit = around(search_ball(robot), failing)
+        if fit.edge > 0.0:
+            return fit
+        # A grid through the ball of every orientation may pass by what one of them leaves.
+        low, high = bounding_box(robot, at)
+        return around((0.5 * (low + high), 0.5 * float((high - low).max())), failing)
 
     def proofs(fit: Fit) -> tuple[Proof, ...]:
         return (prove(robot, inscribed(fit, None).region, given=asked),)

@@ -14,6 +14,7 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
+from pteron.workspace import home_pose
 
 _GOOD = 0.1
 """Least singularity measures at which the middle of the joints' ranges is taken."""
@@ -28,6 +29,8 @@ _ALIKE = 1e-9
 def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     """Return the pose given, checked, or one chosen by the joints' ranges.
 
+    Of a platform that tilts it is the home pose, which is level where that can be.
+
     Raises
     ------
     DataError, UnreachablePose
@@ -36,7 +39,7 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
         If the machine is singular at every pose.
     """
     if home is None:
-        return np.array(_middle(robot))
+        return home_pose(robot) if robot.platform.tilts else np.array(_middle(robot))
     pose = checked_one(robot, home, "home")
     inverse_kinematics(robot, pose)
     return pose.copy()

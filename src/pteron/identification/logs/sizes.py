@@ -132,7 +132,7 @@ def standstill(
     if travelled[j] > _STANDSTILL * spans[j]:
         return ()
     joint = joint_symbols(robot)[j]
-    machine = f", where the machine extends about {spans[j]:.2g} m" if joint.unit == "m" else ""
+    machine = f", where {spans[j]:.2g} m is usual of this machine" if joint.unit == "m" else ""
     message = (
         f"{source}: the {joint.noun}s, read as {group.units[j]}, travel at most {travelled[j]:.2g} "
         f"{joint.unit}{machine}; check their unit"
@@ -146,9 +146,10 @@ def standstill(
 
 
 def joint_spans(robot: Manipulator) -> NDArray[np.float64]:
-    """Return the usual travel of each joint (n,): the machine's size, m; 1 rad."""
+    """Return the usual travel of each joint (n,): the machine's size or 1 rad, or its stroke."""
     size = _size_of(robot)
-    return np.array([size if leg.joint.unit == "m" else 1.0 for leg in robot.legs])
+    strokes = [np.ptp(leg.limits) if leg.limits else np.inf for leg in robot.legs]
+    return np.minimum([size if leg.joint.unit == "m" else 1.0 for leg in robot.legs], strokes)
 
 
 def _size_of(robot: Manipulator) -> float:
