@@ -26,11 +26,11 @@ from pteron.design import (
 )
 from pteron.design.paths import places
 from pteron.design.rows import evaluated
-from pteron.design.stretched_links import stretched
 from pteron.design.variables import geometry_slopes
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.indices import evaluate
+from pteron.manipulator.stretched_links import stretched
 from pteron.workspace import Box, conditions, largest_cube, prove
 from pteron.workspace.conditions import keeps
 

@@ -5,6 +5,7 @@ import runpy
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mechanisms import CATALOG
 from pydantic import TypeAdapter
@@ -12,7 +13,8 @@ from pydantic import TypeAdapter
 import pteron
 from pteron import Manipulator, OutputError
 from pteron.legs import KINDS
-from pteron.manipulator.files import explained
+from pteron.manipulator import with_dimensions
+from pteron.manipulator.explained import explained
 from pteron.manipulator.tables import PlatformTable, leg_table
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -111,6 +113,64 @@ def test_a_file_of_one_s_own_is_explained_too(tmp_path):
     assert tomllib.loads(again.read_text())["name"] == "my quadrupteron"
     with pytest.raises(OutputError):
         pteron.save(robot, tmp_path / "no" / "where.toml")
+
+
+def test_dimensions_are_what_a_file_written_by_hand_gives(program):
+    given = [
+        "--base-radius",
+        "0.2",
+        "--platform-radius",
+        "0.06",
+        "--crank",
+        "0.25",
+        "--rod",
+        "0.55",
+    ]
+    stock = ["--mass-from", "aluminium-tube:30x2", "--mass-from", "lower=carbon-rod:8"]
+    done = program("new", "delta", *given, *stock, "--limits", "-1:1.2", "--out", "robot.toml")
+    assert done.exit_code == 0, done.output
+    robot, like = pteron.load("robot.toml"), CATALOG["delta"]
+    tube = 2700.0 * np.pi * (0.015**2 - 0.013**2) * 0.25
+    rods = 2.0 * 1600.0 * np.pi * 0.004**2 * 0.55
+    crank = tube * ((0.015**2 + 0.013**2) / 4.0 + 0.25**2 / 3.0)
+    rod = rods * (0.004**2 / 4.0 + 0.55**2 / 3.0)
+    for leg, old in zip(robot.legs, like.legs, strict=True):
+        np.testing.assert_allclose(leg.guide_point, np.array(old.guide_point) * 0.2 / 0.33)
+        np.testing.assert_allclose(leg.platform_point, np.array(old.platform_point) * 0.06 / 0.125)
+        assert (leg.upper_length, leg.lower_length, leg.limits) == (0.25, 0.55, (-1.0, 1.2))
+        np.testing.assert_allclose(leg.upper.values, [tube, tube * 0.125, 0.0, crank])
+        np.testing.assert_allclose(leg.lower.values, [rods, -rods * 0.275, rod])
+    assert program("check", "robot.toml").exit_code == 0
+
+
+@pytest.mark.parametrize("name", sorted(set(CATALOG) - {"five-bar"}))
+def test_machines_have_radii(name):
+    robot, platform = CATALOG[name], CATALOG[name].platform
+    other = with_dimensions(robot, base_radius=0.4, platform_radius=0.1)
+    flat = np.eye(3) - np.outer(platform.axis, platform.axis)
+    points = np.array([leg.guide_point for leg in other.legs])
+    ends = [leg.platform_point @ np.array(platform.frame) + leg.fixed_offset for leg in other.legs]
+    for radius, across in ((0.4, (points - points.mean(axis=0)) @ flat), (0.1, ends @ flat)):
+        assert np.linalg.norm(across, axis=1).max() == pytest.approx(radius, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["five-bar", "--platform-radius", "0.1"], "platform_radius: the points are on one line"),
+        (["stewart", "--crank", "0.2"], "crank: the legs of stewart have no such length"),
+        (["delta", "--rod", "0"], "rod: 0 m is not positive"),
+        (["delta", "--mass-from", "wood-rod:8"], "'wood-rod:8' is no stock"),
+        (["delta", "--mass-from", "steel-tube:8x5"], "a wall of 5 mm is more than half of 8 mm"),
+        (["delta", "--mass-from", "middle=steel-rod:8"], "middle: no link of delta"),
+        (["delta", "--limits", "3"], "LOW:HIGH expected"),
+    ],
+)
+def test_dimensions_that_cannot_be_are_told_in_a_line(program, given, told):
+    refused = program("new", *given)
+    assert refused.exit_code == 2
+    assert told in refused.stderr
+    assert refused.stderr.count("\n") == 1
 
 
 # The page.

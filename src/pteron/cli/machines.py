@@ -13,7 +13,7 @@ from typer import Exit
 from pteron.cli.arguments import load_robot, signs
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import complain, note, plain, show, show_json, table, write
-from pteron.errors import ModelError, OutputError, PteronError
+from pteron.errors import DataError, ModelError, OutputError, PteronError
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
@@ -59,13 +59,20 @@ def _list(json: bool) -> None:
 def new(
     kind: str | None = None,
     *,
+    base_radius: float | None = None,
+    platform_radius: float | None = None,
+    crank: float | None = None,
+    rod: float | None = None,
+    limits: str | None = None,
+    mass_from: list[str] | None = None,
     out: str | None = None,
     overwrite: bool = False,
     json: bool = False,
 ) -> None:
     """Write a file for a machine of your own, which says what every key is.
 
-    It is a machine like KIND, to put your numbers into; without KIND the kinds are listed.
+    It is a machine like KIND, to put your numbers into; without KIND the kinds are listed. The
+    dimensions that are given hold for all legs, and the file says what follows from them.
 
     Arguments
     ---------
@@ -73,6 +80,13 @@ def new(
 
     Options
     -------
+    --base-radius: Greatest distance of a guide point from the machine's axis, m.
+    --platform-radius: Greatest distance of a platform point from the platform's axis, m.
+    --crank: Length of the cranks or upper links, m.
+    --rod: Length of the rods or lower links, m.
+    --limits LOW:HIGH: Of the joints, m or rad; of rams their length.
+    --mass-from STOCK: Masses and inertias of links as cut from aluminium-tube:30x2 or steel-rod:8,
+        mm; again, with upper= or lower= before it, for one of the two.
     --out FILE: Write it to this TOML file.
     --overwrite: Replace the file if it is there.
 
@@ -80,16 +94,25 @@ def new(
     --------
     pteron new
     pteron new delta --out robot.toml
+    pteron new delta --base-radius 0.2 --crank 0.25 --rod 0.55 --mass-from aluminium-tube:30x2
     """
     if kind is None:
         _list(json)
         return
     from pteron.atomic import write_text
-    from pteron.manipulator.files import explained
+    from pteron.manipulator.explained import explained
 
+    given = {
+        "base_radius": base_radius,
+        "platform_radius": platform_radius,
+        "crank": crank,
+        "rod": rod,
+        "limits": _interval(limits),
+        "stock": _stocks(mass_from),
+    }
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
-    text = explained(kind)
+    text = explained(kind, {key: value for key, value in given.items() if value not in (None, {})})
     if out is not None:
         write_text(out, text)
     if json:
@@ -98,6 +121,25 @@ def new(
         write(text)
     else:
         show(f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}")
+
+
+def _interval(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise DataError(f"--limits: {text!r} given, LOW:HIGH expected, such as -0.3:0.3") from None
+    return low, high
+
+
+def _stocks(texts: list[str] | None) -> dict[str, str]:
+    """Return what links are cut from, by their key; without a key it is for both."""
+    found = {}
+    for text in texts or ():
+        key, _, stock = text.rpartition("=")
+        found |= {key: stock} if key else dict.fromkeys(("upper", "lower"), stock)
+    return found
 
 
 def _machine(robot: Manipulator) -> dict[str, Any]:

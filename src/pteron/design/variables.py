@@ -10,12 +10,12 @@ import numpy as np
 
 from pteron.design.paths import Place, places
 from pteron.design.spec import VariableTable
-from pteron.design.stretched_links import with_stretched_bodies
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.unlikely_values import unlikely_length
 from pteron.manipulator import Manipulator
+from pteron.manipulator.stretched_links import with_stretched_bodies
 from pteron.toml import told
 
 _STEP = 1e-6

@@ -185,6 +185,11 @@ class LegKind(ABC):
                 new[name] = body.mass if key.role == "slider" else body
         return replace(self, **new)
 
+    def with_length(self, body: str, length: float) -> Self | None:
+        """Return the same leg with a link of another length, m, by its key; None if it has none."""
+        key = f"{body}_length"
+        return replace(self, **{key: length}) if key in self.every_key() else None
+
     def with_zero(self, zero: float) -> Self | None:
         """Return the same leg with its coordinate counted from `zero`, m or rad: less by so much.
 

@@ -1,5 +1,6 @@
 """A robot as a value: legs, platform and gravity, its TOML files, and the catalog."""
 
+from pteron.manipulator.dimensions import with_dimensions as with_dimensions
 from pteron.manipulator.files import catalog as catalog, load as load
 from pteron.manipulator.given import RobotLike as RobotLike, as_manipulator as as_manipulator
 from pteron.manipulator.manipulator import (

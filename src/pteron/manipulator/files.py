@@ -24,7 +24,8 @@ from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
 
 _Built = TypeVar("_Built")
 
-_DEFAULT_KIND = "PRRR"
+DEFAULT_KIND = "PRRR"
+"""The kind of a leg whose file says none."""
 
 
 def catalog() -> tuple[str, ...]:
@@ -94,31 +95,6 @@ def _contents(name_or_path: str | Path) -> tuple[bytes, str]:
     names = ", ".join(catalog())
     absent = f"neither a file nor a machine of the catalog ({names}){guess}"
     return toml_bytes(name_or_path, ModelError, absent)
-
-
-def explained(name_or_path: str | Path) -> str:
-    """Return the text of a file of a machine like a given one, which says what every key is.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        A catalog name, or the path of a file.
-
-    Raises
-    ------
-    ModelError
-        As `load`.
-    """
-    from pteron.manipulator.names import LONGEST_NAME
-    from pteron.manipulator.writing import written
-
-    given = document(name_or_path)
-    name = _machine(given, str(name_or_path)).name
-    legs = [{"type": _DEFAULT_KIND, **leg} for leg in given["legs"]]
-    about = (f"Made after {shown(name, bare=True)}. Put in your numbers, then: pteron check FILE",)
-    return written(
-        {**given, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}, explained=True, about=about
-    )
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
@@ -256,7 +232,7 @@ class _Reading:
         if not isinstance(given, dict):
             self.faults.append(f"{prefix}{shown(given)} given, a table [[legs]] expected")
             return None
-        name = given.get("type", _DEFAULT_KIND)
+        name = given.get("type", DEFAULT_KIND)
         try:
             kind = kind_named(name) if isinstance(name, str) else None
         except ModelError as error:

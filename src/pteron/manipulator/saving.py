@@ -36,8 +36,14 @@ def save(robot: RobotLike, path: str | Path) -> Path:
 
 def text_of(robot: Manipulator) -> str:
     """Return the text of a manipulator's file: machines that differ in anything differ in it."""
-    from pteron.manipulator.tables import leg_items
     from pteron.manipulator.writing import written
+
+    return written(document_of(robot))
+
+
+def document_of(robot: Manipulator) -> dict[str, Any]:
+    """Return the contents of a manipulator's file."""
+    from pteron.manipulator.tables import leg_items
 
     own = robot.platform
     platform: dict[str, Any] = {"motion": own.motion, "axis": own.axis}
@@ -53,7 +59,8 @@ def text_of(robot: Manipulator) -> str:
     legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
     machine = {"name": robot.name, "gravity": robot.gravity, **radii}
     machine |= {"platform": platform, "legs": legs}
-    return written(_plain(machine))
+    found: dict[str, Any] = _plain(machine)
+    return found
 
 
 def _plain(value: Any) -> Any:

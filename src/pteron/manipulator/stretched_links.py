@@ -1,4 +1,4 @@
-"""Inertia of links whose length a design search changes.
+"""Inertia of links whose length changes, in a design search or in a file of other dimensions.
 
 A longer or shorter link keeps its section and is drawn out along its own x: mass and the centre's
 distance along x grow with the length, distances across x stay. So the moment of inertia grows with

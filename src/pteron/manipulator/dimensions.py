@@ -1,0 +1,202 @@
+"""`with_dimensions`: a machine like another one, of other radii, lengths and sections of links."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from pteron.bodies.vectors import Vector, interval, positive, vector
+from pteron.errors import ModelError
+from pteron.legs import LegKind
+from pteron.manipulator.given import RobotLike, as_manipulator
+from pteron.manipulator.manipulator import Manipulator
+from pteron.manipulator.stretched_links import with_stretched_bodies
+
+_DENSITIES = {"steel": 7850.0, "aluminium": 2700.0, "carbon": 1600.0}
+"""kg/m^3, ordinary ones; carbon is fibre in resin."""
+
+_STOCK = re.compile(r"(\w+)-(?:tube:([\d.]+)x([\d.]+)|rod:([\d.]+))")
+
+
+@dataclass(frozen=True)
+class Stock:
+    """What links are cut from: a round tube, or a rod.
+
+    Parameters
+    ----------
+    density : float
+        kg/m^3.
+    outer, inner : float
+        Diameters, m; the inner one of a rod is 0.
+    """
+
+    density: float
+    outer: float
+    inner: float = 0.0
+
+    @classmethod
+    def of(cls, text: str) -> Self:
+        """Read it from a text such as aluminium-tube:30x2 or steel-rod:8, mm.
+
+        Examples
+        --------
+        >>> from pteron.manipulator.dimensions import Stock
+        >>> Stock.of("aluminium-tube:30x2")
+        Stock(density=2700.0, outer=0.03, inner=0.026)
+        """
+        found = _STOCK.fullmatch(text)
+        if found is None or found[1] not in _DENSITIES:
+            raise ModelError(
+                f"{text!r} is no stock; MATERIAL-tube:DIAMETERxWALL or MATERIAL-rod:DIAMETER in mm "
+                f"expected, of {', '.join(_DENSITIES)}, such as aluminium-tube:30x2"
+            )
+        outer = positive(found[2] or found[4], "diameter", "mm")
+        wall = positive(found[3], "wall", "mm") if found[3] else outer / 2.0
+        if 2.0 * wall > outer:
+            raise ModelError(f"{text}: a wall of {wall:g} mm is more than half of {outer:g} mm")
+        return cls(_DENSITIES[found[1]], outer / 1e3, round(outer - 2.0 * wall, 9) / 1e3)
+
+    def link(self, kind: Any, low: float, high: float, count: int = 1) -> Any:
+        """Return the inertia of a link, or several alike, from x = low to high of its frame."""
+        length, squares = high - low, self.outer**2 + self.inner**2
+        area = math.pi / 4.0 * (self.outer**2 - self.inner**2)
+        mass, middle = count * self.density * area * length, (low + high) / 2.0
+        about = mass * (3.0 * squares / 4.0 + length**2) / 12.0 + mass * middle**2
+        return kind.of_body(mass, (middle, 0.0)[: len(kind.kinds) - 2], about)
+
+
+def with_dimensions(
+    robot: RobotLike,
+    *,
+    base_radius: float | None = None,
+    platform_radius: float | None = None,
+    crank: float | None = None,
+    rod: float | None = None,
+    limits: tuple[float, float] | None = None,
+    stock: Mapping[str, str | Stock] | None = None,
+) -> Manipulator:
+    """Return a machine of the same kind with other dimensions, which hold for all of its legs.
+
+    Links of another length keep their section, unless a stock says what they are cut from; the
+    platform's inertia stays.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine to begin with.
+    base_radius : float, optional
+        Greatest distance of a guide point from the axis, along the platform's, through the middle
+        of them all, m: they move away from it, or towards it, by one factor.
+    platform_radius : float, optional
+        Greatest distance of a platform point from the platform's axis through P, m, likewise.
+    crank, rod : float, optional
+        Lengths of the cranks or upper links, and of the rods or lower links, m.
+    limits : (float, float), optional
+        Least and greatest joint coordinate: of rams the length, m.
+    stock : mapping, optional
+        What links are cut from, by their key, ``upper`` or ``lower``: see `Stock.of`.
+
+    Returns
+    -------
+    Manipulator
+
+    Raises
+    ------
+    ModelError
+        If the legs have no such dimension, or no machine has it.
+
+    Examples
+    --------
+    >>> from pteron.manipulator import with_dimensions
+    >>> robot = with_dimensions("delta", base_radius=0.2, stock={"lower": "carbon-tube:12x1"})
+    >>> [round(x, 4) for x in robot.legs[0].guide_point]
+    [0.2, 0.0, 0.0]
+    >>> round(robot.legs[0].lower.mass, 4)
+    0.1167
+    """
+    robot = as_manipulator(robot)
+    if base_radius is not None:
+        robot = _with_base(robot, positive(base_radius, "base_radius", "m"))
+    if platform_radius is not None:
+        robot = _with_platform(robot, positive(platform_radius, "platform_radius", "m"))
+    for name, body, value in (("crank", "upper", crank), ("rod", "lower", rod)):
+        if value is not None:
+            robot = _with_length(robot, name, body, positive(value, name, "m"))
+    if limits is not None:
+        held = interval(limits, "limits")
+        robot = _of_legs(robot, (replace(leg, limits=held) for leg in robot.legs))
+    for key, given in (stock or {}).items():
+        robot = _cut(robot, key, Stock.of(given) if isinstance(given, str) else given)
+    return robot
+
+
+def _of_legs(robot: Manipulator, legs: Iterable[LegKind]) -> Manipulator:
+    return replace(robot, legs=tuple(legs))
+
+
+def _with_base(robot: Manipulator, radius: float) -> Manipulator:
+    points = np.array([leg.guide_point for leg in robot.legs])
+    axis = np.array(robot.platform.axis)
+    across = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
+    factor = _factor("base_radius", across, radius)
+    moved = points + (factor - 1.0) * across
+    pairs = zip(robot.legs, moved, strict=True)
+    return _of_legs(robot, (replace(leg, guide_point=_vector(p)) for leg, p in pairs))
+
+
+def _with_platform(robot: Manipulator, radius: float) -> Manipulator:
+    platform = robot.platform
+    axis, frame = np.array(platform.axis), np.array(platform.frame)
+    fixed = np.array([leg.fixed_offset for leg in robot.legs])
+    points = np.array([leg.platform_point for leg in robot.legs])
+    flat = np.eye(3) - np.outer(axis, axis)
+    factor = _factor("platform_radius", (points @ frame + fixed) @ flat, radius)
+    own = frame @ (np.eye(3) + (factor - 1.0) * flat) @ frame.T
+    legs = (
+        replace(
+            leg,
+            platform_point=_vector(point @ own),
+            fixed_offset=_vector(offset + (factor - 1.0) * flat @ offset),
+        )
+        for leg, point, offset in zip(robot.legs, points, fixed, strict=True)
+    )
+    bars = tuple(replace(bar, hinge=_vector(np.array(bar.hinge) @ own)) for bar in platform.bars)
+    return replace(robot, legs=tuple(legs), platform=replace(platform, bars=bars))
+
+
+def _factor(name: str, across: Any, radius: float) -> float:
+    greatest = float(np.linalg.norm(across, axis=1).max())
+    if greatest < 1e-9:
+        raise ModelError(f"{name}: the points are on one line along the axis, and have no radius")
+    return radius / greatest
+
+
+def _vector(values: Any) -> Vector:
+    return vector([round(float(x), 12) + 0.0 for x in values], "point")
+
+
+def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Manipulator:
+    changed = [leg.with_length(body, length) for leg in robot.legs]
+    if not any(changed):
+        raise ModelError(f"{name}: the legs of {robot.name} have no such length")
+    pairs = zip(robot.legs, changed, strict=True)
+    return _of_legs(robot, (with_stretched_bodies(old, new) if new else old for old, new in pairs))
+
+
+def _cut(robot: Manipulator, key: str, stock: Stock) -> Manipulator:
+    legs, found = [], False
+    for leg in robot.legs:
+        bodies = dict(leg.bodies)
+        for letter, (own, low, high, _) in leg.extents.items():
+            if own == key:
+                count = getattr(leg, "rods", 1) if key == "lower" else 1
+                bodies[letter], found = stock.link(type(bodies[letter]), low, high, count), True
+        legs.append(leg.with_bodies(bodies))
+    if not found:
+        raise ModelError(f"{key}: no link of {robot.name}; upper or lower, which its legs have")
+    return _of_legs(robot, legs)

@@ -1,0 +1,57 @@
+"""`explained`: the text of a file for a machine of one's own, which says what every key is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pteron.errors import shown
+from pteron.manipulator.dimensions import with_dimensions
+from pteron.manipulator.files import DEFAULT_KIND, document, load
+from pteron.manipulator.names import LONGEST_NAME
+from pteron.manipulator.saving import document_of
+from pteron.manipulator.writing import written
+
+_FOLLOWS = {
+    "base_radius": "Base radius {} m: every guide_point follows from it.",
+    "platform_radius": "Platform radius {} m: every platform_point follows from it.",
+    "crank": "Cranks or upper links of {} m: their section stays where no stock is given.",
+    "rod": "Rods or lower links of {} m: their section stays where no stock is given.",
+    "limits": "Joint coordinates from {}.",
+    "stock": "Masses and inertias of links from {}: a first guess, without their ends and joints.",
+}
+"""What the file says of each argument of `with_dimensions`."""
+
+
+def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
+    """Return the text of a file of a machine like a given one, which says what every key is.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A catalog name, or the path of a file.
+    dimensions : mapping, optional
+        What is to be otherwise, as arguments of `with_dimensions`.
+
+    Raises
+    ------
+    ModelError
+        As `load` and `with_dimensions`.
+    """
+    robot, given = load(name_or_path), document(name_or_path)
+    name = robot.name
+    about = [f"Made after {shown(name, bare=True)}. Put in your numbers, then: pteron check FILE"]
+    if dimensions:
+        given = document_of(with_dimensions(robot, **dimensions))
+        about += [_FOLLOWS[key].format(_told(value)) for key, value in dimensions.items()]
+    legs = [{"type": DEFAULT_KIND, **leg} for leg in given["legs"]]
+    return written(
+        {**given, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}, explained=True, about=about
+    )
+
+
+def _told(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{stock} ({key})" for key, stock in value.items())
+    return " to ".join(f"{one:g}" for one in value) if isinstance(value, tuple) else f"{value:g}"
