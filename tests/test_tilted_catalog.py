@@ -10,7 +10,7 @@ from test_cli import run
 
 import pteron
 from pteron.maps import pose_grid
-from pteron.motion import replay
+from pteron.motion import pick_and_place, replay
 from pteron.playback import playback
 from pteron.workspace import bounding_box, home_pose, largest_cube, pose_margins
 
@@ -64,6 +64,11 @@ def test_commands_serve_platforms_that_have_no_place_to_move_to(name, tmp_path):
         farthest = max(farthest, np.linalg.norm(leg.platform_point))
     turning = np.linalg.norm(cycle.acceleration[:, TILTED[name].platform.angular], axis=-1)
     assert 9.0 < farthest * turning.max() < 10.01
+
+
+def test_the_cycle_of_a_tripod_on_a_wall_goes_along_its_axis():
+    cycle = pick_and_place("sprint-z3", home_pose("sprint-z3"), scale=0.5, samples=51)
+    np.testing.assert_allclose(np.ptp(cycle.pose[:, 0]), 0.0125, rtol=1e-2)
 
 
 def test_a_cube_is_found_where_it_is_far_smaller_than_the_machine():

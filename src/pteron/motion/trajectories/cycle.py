@@ -190,11 +190,11 @@ def moves(
 ) -> tuple[tuple[Array, Array], ...]:
     """Return pairs of unit vectors across and up: those of a direction, or some to choose from.
 
-    Up is against gravity, or the platform's axis where there is none; of a planar machine, against
-    what gravity does in its plane or, where that is nothing, the axis times across. Across is
-    horizontal, and in the plane: the given direction as far as it is so, or `count` directions that
-    go round from the platform's x axis (or y, where x is nearer to the vertical); two, to and fro,
-    in an upright plane.
+    Up is against gravity, or the platform's axis where there is none, and of a tripod; of a planar
+    machine, against what gravity does in its plane or, where that is nothing, the axis times
+    across. Across is horizontal, and in the plane: the given direction as far as it is so, or
+    `count` directions that go round from the platform's x axis (or y, where x is nearer to the
+    vertical); two, to and fro, in an upright plane.
     """
     platform, gravity = robot.platform, np.array(robot.gravity)
     axis = np.array(platform.axis)
@@ -206,6 +206,8 @@ def moves(
         upright = -weight / strength
     elif not platform.planar:
         upright = axis
+    if len(platform.lengths) == 1:  # a tripod, which moves along its axis however it is mounted
+        upright = -axis if axis @ gravity > 0.0 else axis
     if upright is not None:
         level = level - np.outer(upright, upright)
 
