@@ -9,6 +9,7 @@ from mechanisms import TILTED, gated
 from test_cli import run
 
 import pteron
+from pteron.export.engines import tree
 from pteron.maps import pose_grid
 from pteron.motion import pick_and_place, replay
 from pteron.playback import playback
@@ -39,6 +40,7 @@ def test_it_is_clean_and_level_at_home(name):
     assert pose_margins(robot, home).least > 0.4
     turned = pteron.rotation_of(robot, home, form="tilt-torsion")
     np.testing.assert_allclose(turned, 0.0, atol=1e-12)
+    np.testing.assert_array_equal(tree(robot).home, home)  # where its files start
 
 
 @pytest.mark.parametrize("name", gated(TILTED, ["ankle", "wrist", "hexaglide"]))
