@@ -395,6 +395,9 @@ class LegKind(ABC):
         vectors += ["fixed_offset", *(["platform_point"] if platform else [])]
         cones = [*self.base_cones, *(["platform_cone"] if platform else [])]
         given = {name: getattr(self, name, None) for name in (*vectors, *cones)}
-        found = {name: turn(given[name]) for name in vectors if given[name] is not None}
-        found |= {n: replace(given[n], axis=turn(given[n].axis)) for n in cones if given[n]}
+        found = {
+            name: replace(value, axis=turn(value.axis)) if name in cones else turn(value)
+            for name, value in given.items()
+            if value is not None
+        }
         return replace(self, **found)
