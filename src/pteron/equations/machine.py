@@ -100,6 +100,22 @@ class Machine:
         assert closure is not None  # the manipulator has asked
         return cls(robot, legs, platform, closure(legs, platform), gravity)
 
+    def in_platform_axes(self, pose: Expression) -> tuple[Machine, Expression] | None:
+        """Return the machine with all vectors along the platform's axes, and those, (3, 3).
+
+        Forces at the joints are the same; the platform's points stand still, which saves
+        operations. None where it saves none.
+        """
+        seen = self.platform.in_own_axes(pose)
+        if seen is None:
+            return None
+        platform, axes = seen
+        legs = tuple(moved for leg in self.legs if (moved := leg.along(axes, pose[:3])) is not None)
+        if len(legs) < len(self.legs):
+            return None
+        closure, gravity = type(self.closure)(legs, platform), ca.mtimes(axes.T, self.gravity)
+        return Machine(self.robot, legs, platform, closure, gravity), axes
+
     def state(
         self,
         pose: Expression,

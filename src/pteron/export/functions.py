@@ -231,7 +231,7 @@ def _exported(
     else:
         learnt = controller.base(robot) if controller else None
         columns = None if learnt is None else columns_of(learnt)
-        given = program(robot, what, columns, wrench=loaded)
+        given = program(robot, what, columns, wrench=loaded, named=True)
     bodies = "parameters" in {port.name for port in given.inputs} or name in SELECTED
     if identified and bodies:
         other = f"ask for {what + _BASE}" if what in (*REDUCIBLE, _PAYLOAD) else "leave it out"

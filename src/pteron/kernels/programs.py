@@ -55,6 +55,9 @@ LOADED = (
 )
 """Functions that may take a load, a wrench on the platform, as one more input."""
 
+_FORCES = ("inverse_dynamics", "drive_forces", "feed_forward")
+"""Functions whose results, at the joints, are the same along any axes."""
+
 SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
 """Functions that take a choice of base parameters, but not their values."""
 
@@ -73,13 +76,15 @@ def program(
     wrench: bool = False,
     guarded: bool = False,
     plain: bool = False,
+    named: bool = False,
 ) -> Program:
     """Return the function `what` of a machine's geometry; inertial parameters stay inputs.
 
     With `columns` the dynamics are those of base parameters, which are then the input; with
     `wrench` a wrench on the platform is an input too; with `guarded` a last output, `status`, is 1
     where the result counts and 0 where the pose, or a number, does not serve; with `plain` the
-    equations are as they are written, without the pass that saves operations.
+    equations are as they are written, without the pass that saves operations; with `named` vectors
+    are along the base's axes, as the names of exported code say.
 
     Raises
     ------
@@ -95,7 +100,7 @@ def program(
         raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
-    return _known(bare(robot), what, columns, wrench, guarded, plain)
+    return _known(bare(robot), what, columns, wrench, guarded, plain, named)
 
 
 def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
@@ -154,10 +159,11 @@ def _built(
     wrench: bool,
     guarded: bool,
     plain: bool,
+    named: bool,
 ) -> Program:
     machine = Machine.of(robot)
     if columns is None:
-        return _program(machine, what, wrench=wrench, guarded=guarded, plain=plain)
+        return _program(machine, what, wrench=wrench, guarded=guarded, plain=plain, named=named)
     selection = ca.SX(len(machine.parameters), len(columns))
     for k, members in enumerate(columns):
         for j in members:
@@ -177,6 +183,7 @@ def _built(
             wrench=wrench,
             guarded=guarded,
             plain=plain,
+            named=named,
         )
         for carried in (True, False)
     ]
@@ -211,6 +218,7 @@ def _program(
     wrench: bool = False,
     guarded: bool = False,
     plain: bool = False,
+    named: bool = False,
 ) -> Program:
     """Return a function of the table; `constants` stand for inputs, `extra` are more inputs."""
     entry = TABLE[what]
@@ -230,7 +238,15 @@ def _program(
     given = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked}
     given |= extra or {}
     symbols = {name: given[name] for name in sorted(given, key=_shared_last)}
-    built = entry.build(machine, symbols | (constants or {}))
+    known = symbols | (constants or {})
+    if what in _FORCES and not named and vector is None:
+        seen = machine.in_platform_axes(symbols["pose"])
+        if seen is not None:
+            machine, axes = seen
+            if wrench:
+                parts = ca.vertsplit(symbols["wrench"], 3)
+                known["wrench"] = ca.vertcat(*(ca.mtimes(axes.T, part) for part in parts))
+    built = entry.build(machine, known)
     forms = [{name: _shaped(output) for name, output in built.items()}]
     if guarded:
         results = [expression for expression, _ in forms[0].values()]

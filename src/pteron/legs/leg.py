@@ -220,6 +220,13 @@ class LegEquations(ABC):
     def reach(self, c: Expression) -> Reach:
         """Return whether the leg reaches c."""
 
+    def along(self, axes: Expression, origin: Expression) -> LegEquations | None:
+        """Return the leg with vectors along other axes, the columns of (3, 3), from an origin.
+
+        None where the leg has directions, which are cheaper where they stand still.
+        """
+        return None
+
     def lever(self, length: Expression) -> Expression:
         """Return the metres that a unit of its joint counts for; 1 for a slider.
 

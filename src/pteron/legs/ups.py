@@ -170,6 +170,10 @@ class UPSEquations(LegEquations):
     def __init__(self, guide_point: Expression, direction: Expression, elbow: Expression) -> None:
         self.r, self.d = guide_point, direction
 
+    def along(self, axes: Expression, origin: Expression) -> UPSEquations:
+        guide = ca.mtimes(axes.T, self.r) - ca.mtimes(axes.T, origin)
+        return UPSEquations(guide, ca.mtimes(axes.T, self.d), ca.SX(1))
+
     def _ram(self, point: PointMotion) -> _Ram:
         """Return the ram in motion.
 

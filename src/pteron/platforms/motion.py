@@ -168,6 +168,13 @@ class PlatformEquations(ABC):
         """Return where the pose's angles stand."""
         return np.flatnonzero(are_angles(cls.coordinates)).tolist()
 
+    def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
+        """Return the platform with vectors along its own axes, from P, and the axes (3, 3).
+
+        None where that saves nothing.
+        """
+        return None
+
     def moments(self, rows: Sequence[Expression]) -> PlatformMoments:
         """Return the platform's inertia from the rows (1, K) of its parameters."""
         return moments_of(self.kinds, list(rows))

@@ -87,6 +87,8 @@ class Tilting(PlatformEquations):
     ) -> None:
         super().__init__(frame, platform_points, fixed_offsets)
         self.more = more or {}
+        self.based: Tilting | None = None
+        """The same along the base's axes, where vectors are along the platform's."""
         self.zero = ca.horzcat(*frame)
         """(3, 3): the platform's axes at angles zero."""
         self.arms = [ca.mtimes(self.zero, s) for s in platform_points]
@@ -98,14 +100,19 @@ class Tilting(PlatformEquations):
         known = {"roll": x, "rx": x, "pitch": y, "ry": y, "yaw": k, "rz": k}
         return [known[name] for name in self.order]
 
-    def rotated(self, pose: Expression, velocity: Expression, acceleration: Expression) -> Rotation:
-        """Return the rotation of a pose; the columns of E are in the order of the coordinates."""
-        places = [self.coordinates.index(name) for name in self.order]
+    def rotated(
+        self, pose: Expression, velocity: Expression, acceleration: Expression, sign: int = 1
+    ) -> Rotation:
+        """Return the rotation of a pose; the columns of E are in the order of the coordinates.
+
+        With sign -1 it is the base's against the platform, whose rates are those of -angles.
+        """
+        places = [self.coordinates.index(name) for name in self.order][::sign]
         found = rotation(
-            self.turn_axes(),
-            [(ca.cos(pose[i]), ca.sin(pose[i])) for i in places],
-            [velocity[i] for i in places],
-            [acceleration[i] for i in places],
+            self.turn_axes()[::sign],
+            [(ca.cos(pose[i]), sign * ca.sin(pose[i])) for i in places],
+            [sign * velocity[i] for i in places],
+            [sign * acceleration[i] for i in places],
         )
         columns = [places.index(i) for i in sorted(places)]
         return found._replace(axes=found.axes[:, columns])
@@ -113,9 +120,32 @@ class Tilting(PlatformEquations):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        turned = self.rotated(pose, velocity, acceleration)
-        place = PointMotion(pose[:3], velocity[:3], acceleration[:3])
+        if self.based is not None:
+            into, turned = self.based.turned_back(pose, velocity, acceleration)
+            rates = (ca.mtimes(into, v[:3]) for v in (velocity, acceleration))
+            place = PointMotion(ca.SX(3, 1), *rates)
+        else:
+            turned = self.rotated(pose, velocity, acceleration)
+            place = PointMotion(pose[:3], velocity[:3], acceleration[:3])
         return self.moved(place, turned, ca.SX.eye(6), turned.axes)
+
+    def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
+        if "x" not in self.coordinates:
+            return None
+        own = type(self)(ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.more)
+        own.based, rest = self, ca.SX.zeros(len(self.coordinates))
+        return own, self.turned_back(pose, rest, rest)[0].T
+
+    def turned_back(
+        self, pose: Expression, velocity: Expression, acceleration: Expression
+    ) -> tuple[Expression, Rotation]:
+        """Return the matrix of vectors along the platform's axes, and its rotation along them."""
+        back, own = self.rotated(pose, velocity, acceleration, -1), self.zero.T
+        turning, growth = (-ca.mtimes(own, v) for v in (back.turning, back.growth))
+        return (
+            ca.mtimes(own, back.matrix),
+            Rotation(ca.SX.eye(3), ca.mtimes(own, back.axes), turning, growth),
+        )
 
     def moved(
         self, place: PointMotion, turned: Rotation, twist: Expression, angular: Expression | None
