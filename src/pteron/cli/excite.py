@@ -92,7 +92,7 @@ def excite(
     --type-i: Least type-I measure of every leg.
     --type-ii: Least type-II measure.
     --clearance: Of the joints from their limits, m or rad.
-    --passive-clearance: Of passive joints and phi, share of half their range.
+    --passive-clearance: Of passive joints and the platform's angles, share of half their range.
 
     File
     ----
@@ -100,7 +100,7 @@ def excite(
     --contents: All columns, or t with the joints or the poses only.
     --columns NAMES: Names of the joints' columns, such as A1,A2.
     --length-unit: Of sliders and poses.
-    --angle-unit: Of cranks and phi.
+    --angle-unit: Of cranks and the pose's angles.
     --time-unit: Of t.
     --separator: Of the cells. [default: , or ; with a decimal comma]
     --decimal: The decimal sign.
