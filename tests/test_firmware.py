@@ -1,4 +1,4 @@
-"""Printers' firmware: a linear Delta's numbers out and in, held against the firmware's formulas."""
+"""Printers' firmware: a Delta's numbers out and in, held against the firmware's formulas."""
 
 import re
 from dataclasses import replace
@@ -8,6 +8,7 @@ import pytest
 from test_measured_logs import CFG
 
 import pteron
+from pteron.calibration import read_measurements
 from pteron.errors import DataError
 from pteron.export import export_klipper, export_marlin, export_reprap, from_klipper
 from pteron.export.printers.linear_delta import LinearDelta
@@ -90,6 +91,65 @@ def test_a_printers_configuration_comes_back_as_it_was(tmp_path):
     assert np.isfinite(pteron.inverse_dynamics(robot, [0.0, 0.0, 0.1], [0.0] * 3, [0.0] * 3)).all()
 
 
+ROTARY = """[printer]
+kinematics: rotary_delta
+shoulder_radius: 33.9
+shoulder_height: 412.9
+[stepper_a]
+microsteps: 16
+gear_ratio: 107.000:16, 60:16
+upper_arm_length: 170.0
+lower_arm_length: 320.0
+position_endstop: 252.0
+[stepper_b]
+microsteps: 16
+gear_ratio: 107.000:16, 60:16
+angle: 151.25
+upper_arm_length: 170.6
+[stepper_c]
+microsteps: 16
+gear_ratio: 107.000:16, 60:16
+position_endstop: 251.2
+[delta_calibrate]
+height0: 252.0
+height0_pos: 0, 0, 0
+height1: 200.0
+height1_pos: 2000.0, 1900.0, 2100.0
+"""
+
+
+def test_a_rotary_printer_comes_back_as_it_was_and_its_stable_positions_are_angles(tmp_path):
+    robot = from_klipper(ROTARY)
+    (path,) = export_klipper(robot, tmp_path)
+    given, again = printer_cfg(ROTARY), printer_cfg(path.read_text())
+    assert again["printer"]["kinematics"] == "rotary_delta"
+    for section, key in (
+        *(("printer", f"shoulder_{k}") for k in ("radius", "height")),
+        *((f"stepper_{t}", f"{k}_arm_length") for t in "abc" for k in ("upper", "lower")),
+        *((f"stepper_{t}", k) for t in "abc" for k in ("position_endstop", "angle")),
+    ):
+        usual = {"stepper_a": 30.0, "stepper_c": 270.0}.get(section)
+        own = setting(given, section, key) or setting(given, "stepper_a", key) or usual
+        assert setting(again, section, key) == pytest.approx(own, abs=1e-9)
+    motor = 107.0 / 16.0 * 60.0 / 16.0
+    assert again["stepper_b"]["gear_ratio"] == f"{motor:.9g}:1"
+    # Its rotary_delta.py: 0 where an arm is level, elbows a lower arm away from the wrists.
+    poses = 1e-3 * places(60.0)
+    joints = pteron.inverse_kinematics(robot, poses)
+    for leg, angle, q in zip(robot.legs, (30.0, 151.25, 270.0), joints.T, strict=True):
+        out = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+        elbow = (0.0339 + leg.upper_length * np.cos(q))[:, None] * out
+        elbow[:, 2] = 0.4129 + leg.upper_length * np.sin(q)
+        np.testing.assert_allclose(np.linalg.norm(poses - elbow, axis=1), 0.32, atol=1e-12)
+    (tmp_path / "printer.cfg").write_text(ROTARY)
+    found = read_measurements(robot, tmp_path / "printer.cfg")
+    np.testing.assert_allclose(found.heights, [0.252, 0.2])
+    ends = np.array([leg.limits[1] for leg in robot.legs])
+    np.testing.assert_allclose(found.readings[0], ends, atol=1e-12)
+    turned = 2.0 * np.pi / (200 * 16 * motor) * np.array([2000.0, 1900.0, 2100.0])
+    np.testing.assert_allclose(found.readings[1], ends - turned, atol=1e-12)
+
+
 def leaning(millimetres):
     """Return a printer whose second tower stands farther out, and leans."""
     robot = from_klipper(CFG, name="leaning")
@@ -138,10 +198,10 @@ def test_other_machines_are_refused(tmp_path, robot, told):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (("kinematics: delta", "kinematics: corexy"), "kinematics are 'corexy'; delta is read"),
+        (("kinematics: delta", "kinematics: corexy"), "kinematics are 'corexy'; delta and rotary"),
         (("delta_radius: 141.553523", ""), "delta_radius: None given, mm above 0"),
         (("arm_length: 280.0", "arm_length: 2o0"), "arm_length: '2o0' given, a number"),
-        (("arm_length: 280.0", "arm_length: 100"), "arm_length: 100 is not above delta_radius"),
+        (("arm_length: 280.0", "arm_length: 100"), "[stepper_a] arm_length: too short to reach"),
         (("gear_ratio: 80:40", "gear_ratio: 80"), "gear_ratio: '80' given, such as 5:1"),
         (("[printer]", "printer"), "no printer.cfg of Klipper"),
     ],

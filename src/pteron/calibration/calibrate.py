@@ -163,7 +163,7 @@ def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurem
     errors: dict[str, dict[str, float]] = {"before": {}, "after": {}, "expected": {}}
     spread = np.einsum("nkp,pq,nkq->nk", new.slopes, fit.covariance, new.slopes, optimize=True)
     for kind, noise in fit.noise.items():
-        here = new.measured & (other.kind_of == kind)
+        here = new.measured & (other.kind_of == kind) & np.isfinite(spread)
         if here.any():
             for name, squares in (
                 ("before", old.residuals**2),

@@ -18,7 +18,7 @@ import numpy as np
 from pteron.calibration.measurements import Measurements
 from pteron.errors import DataError, shown
 from pteron.export.linuxcnc import linuxcnc_axes
-from pteron.export.printers.printer_cfg import millimetres_a_step, printer_cfg, setting
+from pteron.export.printers.printer_cfg import printer_cfg, setting, way_a_step
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import to_readings
@@ -94,7 +94,7 @@ def read_controller_log(path: str | Path, robot: Manipulator) -> Measurements | 
 def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
     """Return the stable positions of a printer.cfg as readings."""
     config = printer_cfg(text, source)
-    steps = [millimetres_a_step(config, tower) for tower in "abc"]
+    steps = [way_a_step(config, tower) for tower in "abc"]
     lacking = [f"[stepper_{t}]" for t, step in zip("abc", steps, strict=True) if not step]
     if lacking:
         raise DataError(
@@ -104,15 +104,17 @@ def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
     ends, downwards = [], []
     for i, leg in enumerate(robot.legs, start=1):
         axis = leg.joint_axis
-        if len(robot.legs) != 3 or leg.joint.unit != "m" or leg.limits is None or not axis:
+        if len(robot.legs) != 3 or leg.limits is None or not axis:
             raise DataError(
-                f"stable positions count from three sliders' end stops, and leg {i} of "
-                f"{robot.name} is no slider with limits; give them: the upper is the end stop"
+                f"stable positions count from three end stops, and leg {i} of {robot.name} is no "
+                "slider or crank with limits; give them: the upper is the end stop"
             )
-        up = axis[2] > 0.0
+        # A crank lifts about an axis across the way out.
+        out = np.cross([*leg.guide_point[:2], 0.0], [0.0, 0.0, 1.0])
+        up = (axis[2] if leg.joint.unit == "m" else out @ np.array(axis)) > 0.0
         ends.append(leg.limits[1 if up else 0])
-        downwards.append(-1.0 if up else 1.0)
-    away = 1e-3 * np.array(downwards) * np.array([step or 0.0 for step in steps])
+        downwards.append((-1.0 if up else 1.0) * (1e-3 if leg.joint.unit == "m" else 1.0))
+    away = np.array(downwards) * np.array([step or 0.0 for step in steps])
     faults: list[str] = []
 
     def position(key: str) -> list[float]:

@@ -74,10 +74,13 @@ def exact_rank(
         prime = next(primes)
         drawn = _Drawn(start, blocks, prime, rng)
         found: list[list[int]] = []
+        independent = 0  # of the rows of a pose no more are than it has freedoms
         try:
-            while len(found) < count + _SPARE * len(kinds):
+            while independent < count + _SPARE * len(kinds):
                 for kind in kinds:
-                    found += (np.array(drawn.rows(kind)) % prime).tolist()
+                    more = (np.array(drawn.rows(kind)) % prime).tolist()
+                    found += more
+                    independent += min(len(more), start.robot.freedom)
         except ZeroDivisionError:
             return None, (), 0
         kept, _ = dependencies(found, range(count), prime)

@@ -40,6 +40,9 @@ _DOUBTED = 0.99
 _LOST = 30.0
 """Cost of a row whose readings lead to no pose, in variances, as if it hardly fitted."""
 
+_BEYOND = 1e3
+"""Standard deviations at which such a row counts, so that it is left out in the end."""
+
 _STRAY = 30.0
 """Standard deviations beyond which a row may be left out of a step that improves all others."""
 
@@ -153,7 +156,13 @@ class Fitter:
         if before is not None:
             guess, total, noise = before.guess, before.total, before.noise
         kept = np.ones(len(self.given), dtype=bool)
-        at = self._at(guess, total, self.begin_poses, noise, kept)
+        try:
+            at = self._at(guess, total, self.begin_poses, noise, kept)
+        except ValueError:
+            raise DataError(
+                "most readings lead to no pose of the machine as drawn; check their units, zeros "
+                "and order"
+            ) from None
         for _ in range(_ROUNDS):
             at = self._settled(at)
             noise = at.noise | self._noise(at, sought)
@@ -175,6 +184,8 @@ class Fitter:
         for taken in range(1, _STEPS + 1):  # noqa: B007 (told in the result)
             step = -at.covariance @ (at.gradient + at.prior * at.total)
             small = np.abs(step) / np.sqrt(np.diag(at.covariance))
+            if small.max() < _SETTLED:
+                break
             share = 1.0
             while True:
                 try:
@@ -203,8 +214,6 @@ class Fitter:
             if not fell:
                 break
             at = after
-            if share == 1.0 and small.max() < _SETTLED:
-                break
         return replace(at, kept=begin.kept, steps=begin.steps + taken)
 
     def _strays(self, before: Fit, after: Fit, kept: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
@@ -262,13 +271,15 @@ class Fitter:
             cost += float(
                 (kept[chosen] * np.where(far > limit, 2 * limit * far - limit**2, squares)).sum()
             )
-            flat = slopes.reshape(-1, count)
-            heavy = np.repeat(weights, width)
-            matrix += (flat * heavy[:, None]).T @ flat
-            right += flat.T @ (heavy * r.reshape(-1))
+            used = at.measured.any(axis=0)
+            heavy = np.sqrt(weights)[:, None] * at.measured[:, used]
+            flat = (heavy[..., None] * slopes[:, used]).reshape(-1, count)
+            matrix += flat.T @ flat
+            right += flat.T @ (heavy * r[:, used]).reshape(-1)
         cost += float(self.prior @ total**2)
         if not np.isfinite(cost):
             raise ValueError
+        distances[lost] = _BEYOND
         values = guess, total, noise, kept
         return Fit(*values, found, residuals, measured, distances, matrix, right, self.prior, cost)
 
@@ -289,21 +300,18 @@ class Fitter:
         if not sought:
             return {}
         kept = fit.kept
-        taken = dict.fromkeys(KINDS, 0.0)
-        for start in range(0, len(kept), _CHUNK):
-            chosen = np.arange(start, min(start + _CHUNK, len(kept)))
-            at = self.slopes.rows(fit.guess, self.given, fit.poses, chosen[kept[chosen]])
-            for kind in sought:
-                part = at.slopes[:, self.kind_of == kind].reshape(-1, len(fit.total))
-                took = np.einsum("ij,jk,ik->", part, fit.covariance, part, optimize=True)
-                taken[kind] += float(took)
+        rows = np.flatnonzero(kept & (fit.distances < _BEYOND))
+        some = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _CHUNK)).astype(int))]
+        at = self.slopes.rows(fit.guess, self.given, fit.poses, some)
         found = {}
         for kind in sought:
             own = (self.kind_of == kind) & fit.measured & kept[:, None]
             count = int(own.sum())
             if not count:
                 continue
-            left = count - taken[kind] / fit.noise[kind] ** 2
+            part = at.slopes[:, self.kind_of == kind].reshape(-1, len(fit.total))
+            took = np.einsum("ij,jk,ik->", part, fit.covariance, part, optimize=True)
+            left = count - took * len(rows) / len(some) / fit.noise[kind] ** 2
             # Half the middle of their sizes serves where a few rows are far off.
             values = np.abs(fit.residuals[own])
             rms = float(np.sqrt((values**2).sum() / max(left, 1.0)))

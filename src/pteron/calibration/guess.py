@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -91,11 +91,15 @@ class Guess:
         """Return the readings (N, n) at joint coordinates."""
         return (joints - self.zeros) / self.scales
 
+    def marked(self, names: Iterable[str]) -> Array:
+        """Return the points (N, 3) of marks, in the platform's frame, m."""
+        order = {name: k for k, name in enumerate(self.marks)}
+        return np.stack([*self.marks.values()])[[order[name] for name in names]]
+
     def points(self, marks: Sequence[str], poses: Array) -> Array:
         """Return where each row's mark is (N, 3) at its pose, in the base frame, m."""
         place, axes = self.robot.platform.at(poses)
-        own = np.stack([self.marks[name] for name in marks])
-        return np.asarray(place + np.einsum("nij,ni->nj", axes, own))
+        return np.asarray(place + np.einsum("nij,ni->nj", axes, self.marked(marks)))
 
     def moved(self, blocks: Sequence[Block], step: Array) -> Guess:
         """Return the guess after a step in all unknowns."""

@@ -98,8 +98,8 @@ def _read(robot: Manipulator, path: str | Path) -> Measurements:
     faults = [*_undescribed(found)]
     if faults:
         raise DataError(told(faults), subject=source)
-    for text in _unlikely(robot, found):
-        warnings.warn(f"{source}: {text}", UnlikelyValue, stacklevel=3)
+    for text in _unlikely(robot, found, source):
+        warnings.warn(text, UnlikelyValue, stacklevel=3)
     return found
 
 
@@ -145,7 +145,11 @@ def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _O
         text = f"{file.source}: {listed(unread)}: not read; what is measured is called "
         text += listed([*dict.fromkeys((*_POSITION, *robot.coordinates)), "height", "distance"])
         warnings.warn(text, UnlikelyValue, stacklevel=5)
-    return _Opened(whole_table(file), columns)
+    table = whole_table(file)
+    first = _first_line(table)
+    if first is not None:  # each is else looked for from the file's beginning
+        table = replace(table, line_of=lambda i: first + i)
+    return _Opened(table, columns)
 
 
 def _name_and_unit(column: str) -> tuple[str, str]:
@@ -196,16 +200,16 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
             )
         else:
             origins[i] = int(row) - 1
-    for i in range(n):
-        starts = (not np.isnan(given[i])) + bool(anchors[i])
-        if not np.isnan(distances[i]) and starts != 1:
-            both = "both" if starts else "neither"
-            faults.append(
-                f"{table.place(i)}: a distance with {both} from and anchor; give one, the row or "
-                "the point that it is measured from"
-            )
-        elif starts and np.isnan(distances[i]):
-            faults.append(f"{table.place(i)}: from or anchor, but no distance; give all, or none")
+    apart = ~np.isnan(distances)
+    starts = (~np.isnan(given)).astype(int) + [bool(name) for name in anchors]
+    for i in np.flatnonzero(apart & (starts != 1)):
+        both = "both" if starts[i] else "neither"
+        faults.append(
+            f"{table.place(int(i))}: a distance with {both} from and anchor; give one, the row or "
+            "the point that it is measured from"
+        )
+    for i in np.flatnonzero(~apart & (starts > 0)):
+        faults.append(f"{table.place(int(i))}: from or anchor, but no distance; give all, or none")
     faults = list(dict.fromkeys(fault.removeprefix(f"{table.source}: ") for fault in faults))
     if faults:
         raise DataError(told(faults), subject=table.source)
@@ -232,28 +236,28 @@ def _numbers(table: Table, column: str, faults: list[str]) -> Array:
         if len(table) == 1:
             faults.append(str(error))
             return np.zeros(1)
-    # Rows one by one, as each fault is to be told.
-    return np.concatenate([_numbers(_row(table, i), column, faults) for i in range(len(table))])
+    half, first, line_of = len(table) // 2, table.first_row, table.line_of
+    later = line_of and (lambda i: line_of(half + i))
+    parts = (
+        replace(table, frame=table.frame[:half]),
+        replace(table, frame=table.frame[half:], first_row=first + half, line_of=later),
+    )
+    return np.concatenate([_numbers(part, column, faults) for part in parts])
 
 
-def _row(table: Table, i: int) -> Table:
-    line_of = table.line_of
-    line = None if line_of is None else (lambda _: line_of(i))
-    return replace(table, frame=table.frame[i : i + 1], first_row=table.first_row + i, line_of=line)
+def _first_line(table: Table) -> int | None:
+    """Return the line of the first row where all are lines that follow each other, else None."""
+    if table.line_of is None:
+        return None
+    first, last = table.line_of(0), table.line_of(len(table) - 1)
+    return first if last - first == len(table) - 1 else None
 
 
 def _places(table: Table, source: str) -> tuple[str, ...]:
-    """Return where each row stands, for messages: its line, or its number where that is not known.
-
-    A line is looked for from the file's beginning: of many rows only where they are lines that
-    follow each other.
-    """
-    n = len(table)
-    if table.line_of is not None:
-        first, last = table.line_of(0), table.line_of(n - 1)
-        if last - first == n - 1:
-            return tuple(f"{source}, line {first + i}" for i in range(n))
-    return tuple(f"{source}, row {i + 1}" for i in range(n))
+    """Return where each row stands, for messages: its line, or its number where that is slow."""
+    first = _first_line(table)
+    word, start = ("row", 1) if first is None else ("line", first)
+    return tuple(f"{source}, {word} {start + i}" for i in range(len(table)))
 
 
 def _undescribed(found: Measurements) -> Iterator[str]:
@@ -268,12 +272,13 @@ def _undescribed(found: Measurements) -> Iterator[str]:
             )
 
 
-def _unlikely(robot: Manipulator, found: Measurements) -> Iterator[str]:
+def _unlikely(robot: Manipulator, found: Measurements, source: str) -> Iterator[str]:
     size = 0.1 * unlikely_length(robot)
     measured = np.concatenate([found.positions, found.angles], axis=-1)
     names = (*robot.joint_names, *_POSITION, *robot.platform.angles)
     values = np.concatenate([found.readings, measured], axis=-1)
-    yield from unlikely_values(robot, names, values)
+    for text in unlikely_values(robot, names, values):
+        yield f"{source}: {text}"
     joints = from_readings(robot, found.readings)
     for j, leg in enumerate(robot.legs):
         low, high = leg.limits or (-np.inf, np.inf)
@@ -284,16 +289,19 @@ def _unlikely(robot: Manipulator, found: Measurements) -> Iterator[str]:
                 f"{found.places[row]}: {robot.joint_names[j]} = {joints[row, j]:g} is far beyond "
                 f"its limits {low:g} to {high:g} {leg.joint.unit}: is it in another unit?"
             )
-    for name, lengths in (("height", found.heights), ("distance", found.distances)):
+    for name, lengths, most in (
+        ("height", found.heights, size),
+        ("distance", found.distances, 10.0 * size),  # an anchor may stand far away
+    ):
         sizes = np.nan_to_num(np.abs(lengths))
-        if (sizes > size).any():
+        if (sizes > most).any():
             row = int(np.argmax(sizes))
             yield (
                 f"{found.places[row]}: {name} {lengths[row]:g} is more than the machine's size, "
                 f"{size:.3g} m: is it in mm? m are expected"
             )
-    for k in np.flatnonzero(found.distances == 0.0):
-        yield f"{found.places[k]}: a distance of 0: was it measured?"
+    if len(none := np.flatnonzero(found.distances == 0.0)):
+        yield f"{listed([found.places[row] for row in none])}: a distance of 0: was it measured?"
     seen = ~np.isnan(np.column_stack([measured, found.heights, found.distances])).all(axis=1)
     seen[found.origins[found.origins >= 0]] = True
     if not seen.all() and robot.joint_count == robot.freedom:

@@ -109,7 +109,12 @@ def observability_of(
         name: np.unique(given.heights[[plane == name for plane in given.planes]])
         for name in set(given.planes)
     }
-    kinds = tuple(sorted({_kind(given, i, levels) for i in range(len(given))}, key=repr))
+    parts = given.positions, given.angles, given.heights, given.distances
+    seen = np.isnan(np.column_stack(parts))
+    ends = [given.marks[row] if row >= 0 else None for row in given.origins]
+    alike = zip(map(bytes, seen), given.marks, given.planes, given.anchors, ends, strict=True)
+    some = dict(zip(alike, range(len(given)), strict=True)).values()
+    kinds = tuple(sorted({_kind(given, i, levels) for i in some}, key=repr))
     rank, primes, rows = exact_rank(start, blocks, kinds, seed)
     tolerances = tolerances_of(blocks)
     tolerances[~np.isfinite(tolerances)] = 1.0

@@ -176,7 +176,8 @@ def plan(
     noise = {**_NOISE, **setup.noise}
     seen = rows.slopes / np.array([noise[kind] for kind in given.kind_of])[:, None]
     used = rows.measured.any(axis=0)
-    tool = slopes.pose_slopes(start, given, poses)[1]
+    # Of a machine that turns only, the angles are what goes wrong.
+    tool = slopes.pose_slopes(start, given, poses)[bool(robot.platform.lengths)]
     tolerances = tolerances_of(blocks)
     if not np.isfinite(tolerances).all():
         raise DataError("prior: a plan needs finite tolerances; give no inf")

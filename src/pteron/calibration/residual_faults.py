@@ -25,6 +25,9 @@ _ROWS = 3000
 _CHANCE = 1e-6
 """Probability, over all faults tried, of a finding where there is no fault."""
 
+_HEAVIEST = 3.0
+"""Most that a row may be off, in what a middle row is off: a few rows alone are no such fault."""
+
 _SHARE = 0.2
 """Least share of the squared residuals that a reported fault explains."""
 
@@ -76,6 +79,11 @@ def _shown(
     chosen = evenly(len(given), _ROWS)
     at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
     r, slopes = fitter.whitened(at, fit.guess, fit.noise)
+    off = np.sqrt(np.einsum("nk,nk->n", r, r) / np.maximum(at.measured.sum(axis=1), 1))
+    weights = np.minimum(1.0, _HEAVIEST * np.median(off) / np.maximum(off, 1e-12))
+    weights[~np.isfinite(slopes).all(axis=(1, 2))] = 0.0  # no pose
+    r = weights[:, None] * r
+    slopes = weights[:, None, None] * np.nan_to_num(slopes)
     own, more = slopes[..., :count], slopes[..., count:]
     flat = own.reshape(-1, count)
     covariance = np.linalg.inv(flat.T @ flat + np.diag(fitter.prior[:count]))

@@ -214,7 +214,7 @@ class MachineSlopes:
         slopes: Array,
     ) -> tuple[Array, Array]:
         """Return the rows' marks (N, 3) in the base frame and their slopes."""
-        own = np.stack([guess.marks[given.marks[i]] for i in chosen])
+        own = guess.marked(given.marks[i] for i in chosen.tolist())
         arms = np.einsum("nij,nj->ni", turned, own)
         moved = slopes[:, :3] - _skew(arms) @ slopes[:, 3:6]
         for block in self.blocks:

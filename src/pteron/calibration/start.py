@@ -47,7 +47,11 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     begin[:, robot.platform.angular] = np.where(
         seen, given.angles, begin[:, robot.platform.angular]
     )
-    places = given.positions[:, length_columns(robot)]
+    lengths = length_columns(robot)
+    arms = guess.points(given.marks, begin) - robot.platform.at(begin)[0]
+    if len(lengths) not in (0, 3):
+        arms = arms @ np.array(robot.platform.frame).T
+    places = (given.positions - arms)[:, lengths]
     if given.setup.frame_known:
         at = np.flatnonzero(~robot.platform.angular)
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from scipy.stats import chi2  # type: ignore[import-untyped]
+
 from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block
 from pteron.calibration.observability import Observability
@@ -12,6 +15,9 @@ from pteron.verdict import Opinion, Verdict
 
 _AT_THE_NOISE = 1.3
 """Held-out error, over the one expected from noise and intervals, up to which it is trusted."""
+
+_SURE = 0.999
+"""Probability with which a faultless calibration is trusted, however few its rows are."""
 
 _FAR = 2.0
 """The same ratio above which it is not trusted."""
@@ -42,7 +48,9 @@ def verdict_of(
                 f"At {held_out.rows} rows that the fit did not see the {kind} error is "
                 f"{1e3 * after:.3g} {unit}, {1e3 * before:.3g} before"
             )
-            if ratio <= _AT_THE_NOISE:
+            # The error of few rows strays further by chance.
+            chance = np.sqrt(chi2.ppf(_SURE, held_out.rows) / held_out.rows)
+            if ratio <= max(_AT_THE_NOISE, chance):
                 found.reasons.append(f"{text}: as noise and intervals expect.")
             else:
                 found.lower(

@@ -154,14 +154,13 @@ def _plan(
             machine.coordinates, machine.units, low.tolist(), high.tolist(), strict=True
         )
     )
-    error = (
-        f"The tool's place is off by up to {1e3 * found.before:.3g} mm as drawn (one standard "
-        f"deviation of ordinary tolerances); {1e3 * found.after:.3g} mm are expected to be left."
-    )
+    what, unit = ("tool's place", "mm") if machine.platform.lengths else ("angles", "mrad")
+    off = "is" if unit == "mm" else "are"
     show(
-        f"{plain(machine.name)}: {count} poses to measure their {measure}, in a box where every "
+        f"{plain(machine.name)}: {count} poses at which to measure {measure}, in a box where every "
         f"pose is proved to serve: {sides}",
-        *([error] if found.before else []),  # none where the tool stays on the platform's joint
+        f"The {what} {off} off by up to {1e3 * found.before:.3g} {unit} as drawn (one standard "
+        f"deviation of the tolerances); {1e3 * found.after:.3g} {unit} are expected to be left.",
         *written(path),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from io import StringIO
@@ -33,7 +34,7 @@ from pteron.cli.size import size
 from pteron.cli.terminal import complain, note
 from pteron.cli.view import view
 from pteron.cli.workspace import workspace
-from pteron.errors import PteronError
+from pteron.errors import PteronError, UnlikelyValue
 
 _USER_ERROR = 2
 """Exit code for a user's error."""
@@ -56,7 +57,8 @@ class CommandGroup(TyperGroup):
         """Run a subcommand and exit."""
         _open_closed_streams()
         try:
-            with insistent_interrupts():
+            with insistent_interrupts(), warnings.catch_warnings():
+                warnings.showwarning = _noted
                 status = super().main(*args, **extra | {"standalone_mode": False})
                 sys.stdout.flush()
             if status == _INTERRUPTED:  # Typer has caught it
@@ -85,6 +87,14 @@ class CommandGroup(TyperGroup):
             complain(_usage(error))
             status = _USER_ERROR
         sys.exit(status if isinstance(status, int) else 0)
+
+
+def _noted(message: Warning | str, category: type[Warning], *place: Any) -> None:
+    """Show a warning of unlikely values as a note; others are a programmer's."""
+    if issubclass(category, UnlikelyValue):
+        note(f"Note: {message}")
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, *place[:2]))
 
 
 def _open_closed_streams() -> None:

@@ -1,4 +1,4 @@
-"""Reading of Klipper's printer.cfg: its sections, and the linear Delta that it describes."""
+"""Reading of Klipper's printer.cfg: its sections, and the Delta, linear or rotary, that it describes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,44 @@ from pteron.manipulator import Manipulator, load
 _SAVED = "#*#"
 """Prefix of the lines that SAVE_CONFIG wrote; they override the lines above them."""
 
-_ANGLES = (210.0, 330.0, 90.0)
-"""Degrees at which Klipper's towers stand where the file does not say."""
-
 _STEPS = 200
 """Full steps a turn where the file does not say."""
 
 _EFFECTOR = 0.02
 """Assumed radius of the rods' ends about P, m: Klipper has only the towers' radius less it."""
+
+_POWERS = {"m": 1, "mgx": 2, "mgy": 2, "I": 3}
+"""Powers of its length with which a bar's parameters grow, its mass a metre the same."""
+
+
+class _Kind(NamedTuple):
+    """One of Klipper's kinematics: the catalog's machine, and keys of lengths in mm."""
+
+    template: str
+    angles: tuple[float, float, float]
+    """Degrees at which its towers stand where the file does not say."""
+    own: tuple[float, float, float]
+    """Degrees at which the template's do."""
+    printer: tuple[str, ...]
+    tower: tuple[str, ...]
+
+
+_KINDS = {
+    "delta": _Kind(
+        "linear-delta",
+        (210.0, 330.0, 90.0),
+        (210.0, 330.0, 90.0),
+        ("delta_radius",),
+        ("arm_length",),
+    ),
+    "rotary_delta": _Kind(
+        "delta",
+        (30.0, 150.0, 270.0),
+        (0.0, 120.0, 240.0),
+        ("shoulder_radius", "shoulder_height"),
+        ("upper_arm_length", "lower_arm_length"),
+    ),
+}
 
 
 def printer_cfg(text: str, source: str = "printer.cfg") -> configparser.RawConfigParser:
@@ -74,11 +105,13 @@ def setting(config: configparser.RawConfigParser, section: str, key: str) -> flo
     return value
 
 
-def millimetres_a_turn(config: configparser.RawConfigParser, tower: str) -> float | None:
-    """Return a carriage's way a turn of its motor, mm; None where the file does not say."""
+def _way_a_turn(config: configparser.RawConfigParser, tower: str) -> float | None:
+    """Return a joint's way a turn of its motor, mm or rad; None where the file does not say."""
     section = f"stepper_{tower}"
     turn = setting(config, section, "rotation_distance")
     text = config.get(section, "gear_ratio", fallback="")
+    if text and config.get("printer", "kinematics", fallback="") == "rotary_delta":
+        turn = 2.0 * math.pi
     for pair in filter(None, (part.strip() for part in text.split(","))):
         driven, _, driving = pair.partition(":")
         try:
@@ -88,21 +121,22 @@ def millimetres_a_turn(config: configparser.RawConfigParser, tower: str) -> floa
     return turn
 
 
-def millimetres_a_step(config: configparser.RawConfigParser, tower: str) -> float | None:
-    """Return a carriage's way a step of its motor, mm; None where the file does not say."""
+def way_a_step(config: configparser.RawConfigParser, tower: str) -> float | None:
+    """Return a joint's way a step of its motor, mm or rad; None where the file does not say."""
     section = f"stepper_{tower}"
-    turn, micro = millimetres_a_turn(config, tower), setting(config, section, "microsteps")
+    turn, micro = _way_a_turn(config, tower), setting(config, section, "microsteps")
     if turn is None or micro is None:
         return setting(config, section, "step_distance")  # as files said until 2021
     return turn / (micro * (setting(config, section, "full_steps_per_rotation") or _STEPS))
 
 
 def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
-    """Return the linear Delta that a Klipper configuration describes.
+    """Return the Delta that a Klipper configuration describes, of `delta` or `rotary_delta`.
 
-    Its z = 0 is Klipper's, the bed; a joint coordinate is the carriage's height over it, and the
-    upper limit is the end stop. Klipper does not know masses, nor the effector: those of the
-    catalog's `linear-delta` are taken, rods with the same mass a metre.
+    Its z = 0 is Klipper's, the bed. A joint coordinate is the carriage's height over it, or the
+    angle of the upper arm, 0 where it is level, growing as it lifts; the upper limit is the end
+    stop. Klipper does not know masses, nor the effector: those of the catalog's `linear-delta` or
+    `delta` are taken, bars with the same mass a metre.
 
     Parameters
     ----------
@@ -118,7 +152,7 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
     Raises
     ------
     DataError
-        If it is no printer.cfg of a printer with `kinematics: delta`, or lacks its numbers.
+        If it is no printer.cfg of a printer with such kinematics, or lacks its numbers.
 
     Examples
     --------
@@ -146,41 +180,79 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
     else:
         text = config
     parser = printer_cfg(text, source)
-    kind = parser.get("printer", "kinematics", fallback=None)
-    if kind != "delta":
+    name_of = parser.get("printer", "kinematics", fallback=None)
+    kind = _KINDS.get(name_of or "")
+    if kind is None:
         raise DataError(
-            f"{source}: its [printer] kinematics are {shown(kind)}; delta is read, a linear Delta"
+            f"{source}: its [printer] kinematics are {shown(name_of)}; {' and '.join(_KINDS)} are "
+            "read, Deltas with sliders and with cranks"
         )
-    radius = setting(parser, "printer", "delta_radius")
-    first = {key: setting(parser, "stepper_a", key) for key in ("arm_length", "position_endstop")}
-    for section, key, value in (
-        ("printer", "delta_radius", radius),
-        *(("stepper_a", key, value) for key, value in first.items()),
-    ):
-        if value is None or value <= 0.0:
+
+    def length(section: str, key: str, default: float | None = None) -> float:
+        value = setting(parser, section, key)
+        found = default if value is None else 1e-3 * value
+        if found is None or found <= 0.0:
             raise DataError(f"{source}: [{section}] {key}: {value} given, mm above 0 expected")
-    assert radius is not None
+        return found
+
+    base = [length("printer", key) for key in kind.printer]
+    first = {key: length("stepper_a", key) for key in (*kind.tower, "position_endstop")}
     legs = []
-    template = load("linear-delta")
-    for tower, usual, leg in zip("abc", _ANGLES, template.legs, strict=True):
+    template = load(kind.template)
+    for tower, usual, own, leg in zip("abc", kind.angles, kind.own, template.legs, strict=True):
         section = f"stepper_{tower}"
-        own = {key: setting(parser, section, key) for key in ("angle", *first)}
-        angle = usual if own["angle"] is None else own["angle"]
-        arm, end = (own[key] or first[key] or 0.0 for key in first)
-        if arm <= radius:
-            raise DataError(f"{source}: [{section}] arm_length: {arm:g} is not above delta_radius")
-        turn = millimetres_a_turn(parser, tower)
-        legs.append(_leg(leg, math.radians(angle - usual), 1e-3 * radius, 1e-3 * arm, 1e-3 * end))
-        if turn:
-            legs[-1] = replace(legs[-1], drive=Drive(ratio=2000.0 * math.pi / turn))
+        angle = setting(parser, section, "angle")
+        lengths = [length(section, key, default) for key, default in first.items()]
+        turn = math.radians((usual if angle is None else angle) - own)
+        try:
+            legs.append((_crank if len(base) == 2 else _slider)(leg, turn, base, lengths))
+        except ValueError:
+            keys = ", ".join(kind.tower)
+            raise DataError(
+                f"{source}: [{section}] {keys}: too short to reach the z axis at its end stop"
+            ) from None
+        way = _way_a_turn(parser, tower)
+        if way:
+            one = 1.0 if len(base) == 2 else 1e3
+            legs[-1] = replace(legs[-1], drive=Drive(ratio=one * 2.0 * math.pi / way))
     try:
         return replace(template, name=name, legs=tuple(legs))
     except ModelError as error:
         raise DataError(f"{source}: {error}") from None
 
 
-def _leg(leg: LegKind, turn: float, radius: float, arm: float, end: float) -> LegKind:
-    """Return the catalog's leg turned about z, with Klipper's radius, arm and end stop in m."""
+def _slider(leg: LegKind, turn: float, base: list[float], lengths: list[float]) -> LegKind:
+    """Return the catalog's leg turned about z, with Klipper's radius, arm and end stop."""
+    (radius,), (arm, end) = base, lengths
+    if arm <= radius:
+        raise ValueError
+    return replace(
+        _placed(leg, turn, radius, 0.0, {"l": arm}),
+        limits=(math.sqrt(max(0.0, arm**2 - 4.0 * radius**2)), end + math.sqrt(arm**2 - radius**2)),
+    )
+
+
+def _crank(leg: LegKind, turn: float, base: list[float], lengths: list[float]) -> LegKind:
+    """Return the catalog's leg turned about z, with Klipper's shoulder, arms and end stop."""
+    (radius, height), (upper, lower, end) = base, lengths
+    moved = _placed(leg, turn, radius, height, {"u": upper, "l": lower})
+    away = math.hypot(radius, end - height)
+    if lower <= radius - upper:
+        raise ValueError
+    bend = math.acos((away**2 + upper**2 - lower**2) / (2.0 * away * upper))
+    top = math.atan2(end - height, -radius) + bend
+    out = np.array([*moved.guide_point[:2], 0.0])
+    return replace(
+        moved,
+        zero_direction=vector((out / np.linalg.norm(out)).tolist(), "zero_direction"),
+        limits=(-0.5 * math.pi, top),
+    )
+
+
+def _placed(
+    leg: LegKind, turn: float, radius: float, height: float, lengths: dict[str, float]
+) -> LegKind:
+    """Return a leg turned about z, at a radius and height, with links of given lengths, m."""
     cos, sin = math.cos(turn), math.sin(turn)
 
     def turned(v: Vector) -> Vector:
@@ -188,16 +260,16 @@ def _leg(leg: LegKind, turn: float, radius: float, arm: float, end: float) -> Le
 
     moved = leg.turned(turned)
     out = np.array([*moved.guide_point[:2], 0.0]) / math.hypot(*moved.guide_point[:2])
-    size = arm / leg.size
-    kinds = zip(leg.bodies["l"].kinds, leg.bodies["l"].values, strict=True)
-    powers = {"m": 1, "mgx": 2, "I": 3}
-    rods = type(leg.bodies["l"]).of_values([v * size ** powers[kind] for kind, v in kinds])
-    (length,) = (quantity.name for quantity in leg.quantities if quantity.role == "length")
-    lowest = math.sqrt(max(0.0, arm**2 - (2.0 * radius) ** 2))
+    names = [quantity.name for quantity in leg.quantities if quantity.role == "length"]
+    bodies, changes = dict(moved.bodies), {}
+    for name, (link, length) in zip(names, lengths.items(), strict=True):
+        body, size = leg.bodies[link], length / getattr(leg, name)
+        kinds = zip(body.kinds, body.values, strict=True)
+        bodies[link] = type(body).of_values([v * size ** _POWERS[kind] for kind, v in kinds])
+        changes[name] = length
     return replace(
-        moved.with_bodies({**moved.bodies, "l": rods}),
-        guide_point=vector(((radius + _EFFECTOR) * out).tolist(), "guide_point"),
+        moved.with_bodies(bodies),
+        guide_point=vector([*((radius + _EFFECTOR) * out)[:2].tolist(), height], "guide_point"),
         platform_point=vector((_EFFECTOR * out).tolist(), "platform_point"),
-        limits=(lowest, end + math.sqrt(arm**2 - radius**2)),
-        **{length: arm},
+        **changes,
     )
