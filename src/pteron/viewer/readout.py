@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Template
 
+from pteron.manipulator.readings import has_readings, to_readings
 from pteron.plots.canvas import LEG_COLORS
 from pteron.report.quantities import nouns, readable
 from pteron.report.typeset import fixed, template
@@ -43,7 +44,8 @@ def readout(state: ViewerState, found: Readings) -> str:
         "\u2013" if np.isnan(force) else f"{fixed(force, PLACES)} {leg.joint.force_unit}"
         for leg, force in zip(legs, found.forces, strict=True)
     )
-    joints = map(readable, found.joints, (leg.joint.unit for leg in legs))
+    units = [leg.joint.unit for leg in legs]
+    cells = [map(readable, found.joints, units)]
     limited = not np.isnan(found.shares).all()
     margins = {
         f"leg {leg + 1} to its end (type I)": float(found.type_i[leg]),
@@ -51,10 +53,20 @@ def readout(state: ViewerState, found: Readings) -> str:
         f"leg {joint + 1} to a joint's limit": float(found.clearances[joint]),
     }
     headings = ["leg", nouns([leg.joint for leg in legs]), "drive"]
+    if has_readings(state.robot):
+        headings.insert(2, "reads")
+        cells.append(map(readable, to_readings(state.robot, found.joints), units))
     return _template().render(
         colors=_COLORS,
         headings=[*headings, "of its most"] if limited else headings,
-        legs=list(zip(LEG_COLORS, joints, forces, map(_share, found.shares), strict=False)),
+        legs=list(
+            zip(
+                LEG_COLORS,
+                zip(*cells, forces, strict=True),
+                map(_share, found.shares),
+                strict=False,
+            )
+        ),
         limited=limited,
         condition=found.condition,
         margins=[(name, value, level(value)) for name, value in margins.items()],

@@ -1,4 +1,4 @@
-"""Reading of Klipper's printer.cfg: its sections, and the Delta, linear or rotary, that it describes."""
+"""Reading of Klipper's printer.cfg: its sections, and the Delta that it describes."""
 
 from __future__ import annotations
 
