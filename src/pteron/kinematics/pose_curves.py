@@ -77,7 +77,7 @@ def second_slopes(closed: Closed, machines: Array) -> Array:
     length_a, length_b = (np.linalg.norm(v, axis=-1) for v in (a, b))
     bends = (length_a + length_b) ** 2 + 4.0 * closed.moves + r
     bends[:, closed.spheres :] = (2.0 * length_a * (2.0 + length_b) + 2.0 * r)[:, closed.spheres :]
-    return np.sqrt((bends**2).sum(axis=-1) + closed.moves)
+    return np.asarray(np.sqrt((bends**2).sum(axis=-1) + closed.moves))
 
 
 def of_length_one(z: Array) -> Array:

@@ -1,7 +1,7 @@
 """Figures of six rams' ends for which a hexapod's platform can move while all rams are held.
 
 Two kinds are told from the figures alone: line-symmetric motions (Borel and Bricard, 1906) and
-translations. `direct_kinematics` finds any at the joints that it is asked for.
+translations. Of others `direct_kinematics` looks for those at the joints that it is asked for.
 """
 
 from __future__ import annotations
