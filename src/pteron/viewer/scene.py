@@ -204,10 +204,14 @@ class Scene:
             self._add_label("g", "g", start - 0.3 * way)
         for axis, name in zip(np.eye(3), "xyz", strict=True):
             self._add_label(f"base-{name}", name, corner + 0.16 * self.size * axis)
+        taken: list[Array] = []
         for i, (line, guide) in enumerate(zip(points.links, self._guides, strict=True), start=1):
             way = line[0] - points.reference
             beside = way - (way @ guide.axis) * guide.axis
-            end = guide.path[0] if guide.slides else line[0]
+            ends = guide.path if guide.slides else line[:1]
+            # Of two sliders on one rail the second has its number at the other end.
+            end = next((p for p in ends if not any(np.allclose(p, q) for q in taken)), ends[0])
+            taken.append(end)
             away = beside / (np.linalg.norm(beside) or 1.0)
             self._add_label(f"leg{i}", str(i), end + 0.06 * self.size * away)
 
