@@ -72,6 +72,19 @@ def test_c_of_a_tilting_machine_returns_what_the_library_does(tmp_path, motion):
         np.testing.assert_allclose(found, given, rtol=0, atol=1e-9 * np.abs(given).max())
 
 
+def test_c_of_a_hexapod_takes_every_state_of_its_reach(tmp_path):
+    """The library's code has vectors along the platform's axes, exported code along the base's."""
+    robot = pteron.load("stewart")
+    call, _ = compiled(robot, ("inverse_dynamics",), tmp_path, wrench=True, specialised=True)
+    rng = np.random.default_rng(4)
+    for x in pteron.random_poses(robot, 20, seed=rng):
+        state = x, *rng.normal(size=(2, 6)), 1e3 * rng.normal(size=6)
+        status, found = call("inverse_dynamics", *state, sizes=(6,))
+        assert status == 0
+        expected = pteron.inverse_dynamics(robot, *state)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("motion", gated(tilting.LEGS, ["2R"]))
 def test_structured_text_of_a_tilting_machine_returns_what_the_library_does(motion):
     robot, states = drawn(motion)
