@@ -135,7 +135,7 @@ def _interval(text: str | None) -> tuple[float, float] | None:
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
     """Return what links are cut from, by their key; without a key it is for both."""
-    found = {}
+    found: dict[str, str] = {}
     for text in texts or ():
         key, _, stock = text.rpartition("=")
         found |= {key: stock} if key else dict.fromkeys(("upper", "lower"), stock)
