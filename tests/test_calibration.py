@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
-from calibrated import GEOMETRY, PRINTERS, measured, off_drawing, printer, tool_places
+from calibrated import GEOMETRY, NOISE, PRINTERS, measured, off_drawing, printer, tool_places
 from mechanisms import NIGHTLY
 from scipy.spatial.transform import Rotation
 
@@ -13,7 +13,7 @@ import pteron
 from pteron.calibration import Measurements, Place, Plane, Setup, calibrate, plan
 from pteron.calibration.exact_rank import RowKind, exact_rank
 from pteron.calibration.fit import Fitter
-from pteron.calibration.guess import Guess
+from pteron.calibration.guess import Guess, tolerances_of
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
 from pteron.errors import DataError
@@ -33,7 +33,10 @@ COUNTS = {
     "hexaglide": 54,
     "hexa": 66,
 }
-"""What whole poses in known frames show."""
+"""What whole poses in known frames show of the legs."""
+
+TURNING = {"quadrupteron-oblique": 24, "ankle": 24, "wrist": 24, "par4": 42}
+"""And with the centre and the axes about which the platform turns."""
 
 GATE = ("quadrupteron-oblique", "delta", "five-bar", "par4")
 
@@ -45,9 +48,16 @@ def poses_seen(robot, poses):
     return Measurements.of(robot, joints, poses=poses, positions=tool_places(robot, poses, tool))
 
 
-def ranks(robot, given, poses):
-    """Return the exact rank of geometry and zeros, and that of singular values."""
-    blocks, start = blocks_of(robot, given, GEOMETRY), Guess.drawn(robot, given)
+def of_legs(robot, given):
+    """Return the names of the legs' values."""
+    blocks = blocks_of(robot, given, GEOMETRY)
+    names = [unknown.name for block in blocks for unknown in block.unknowns]
+    return [name for name in names if not name.startswith("platform.")]
+
+
+def ranks(robot, given, poses, free=GEOMETRY):
+    """Return the exact rank of what is free, and that of singular values."""
+    blocks, start = blocks_of(robot, given, free), Guess.drawn(robot, given)
     rows = MachineSlopes(robot, blocks).rows(start, given, poses, np.arange(len(poses)))
     slopes = rows.slopes.reshape(-1, blocks[-1].where.stop)[rows.measured.reshape(-1)]
     size = np.linalg.norm(slopes, axis=0)
@@ -69,14 +79,40 @@ def ranks(robot, given, poses):
 def test_whole_poses_show_as_much_as_the_literature_counts(name):
     robot = pteron.load(name)
     poses = pteron.random_poses(robot, 120)
-    assert ranks(robot, poses_seen(robot, poses), poses) == (COUNTS[name], COUNTS[name])
+    given = poses_seen(robot, poses)
+    assert ranks(robot, given, poses, of_legs(robot, given)) == (COUNTS[name], COUNTS[name])
+
+
+TURN = Rotation.from_rotvec([0.3, -0.5, 0.7]).as_matrix()
 
 
 @pytest.mark.parametrize("name", ["linear-delta", pytest.param("hexa", marks=NIGHTLY)])
 def test_a_turned_machine_shows_as_much(name):
-    robot = pteron.turned(pteron.load(name), Rotation.from_rotvec([0.3, -0.5, 0.7]).as_matrix())
+    robot = pteron.turned(pteron.load(name), TURN)
     poses = pteron.random_poses(robot, 120)
     assert ranks(robot, poses_seen(robot, poses), poses) == (COUNTS[name], COUNTS[name])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        n if n in ("quadrupteron-oblique", "ankle") else pytest.param(n, marks=NIGHTLY)
+        for n in TURNING
+    ],
+)
+def test_what_a_platform_turns_about_shows_too(name):
+    robot = pteron.turned(pteron.load(name), TURN)
+    poses = pteron.random_poses(robot, 120)
+    assert ranks(robot, poses_seen(robot, poses), poses) == (TURNING[name], TURNING[name])
+
+
+def test_a_printers_radius_and_angles_have_an_exact_rank():
+    robot = pteron.turned(pteron.load("linear-delta"), TURN)
+    poses = pteron.random_poses(robot, 120)
+    setup = Setup(planes={"": Plane(tuple(TURN[:, 2]), known=False)})
+    joints = pteron.inverse_kinematics(robot, poses)
+    given = Measurements.of(robot, joints, heights=poses @ TURN[:, 2], setup=setup)
+    assert ranks(robot, given, poses, ["radius", "angles", "zeros", "lengths"]) == (11, 11)
 
 
 @pytest.mark.parametrize(
@@ -102,6 +138,7 @@ def test_heights_over_an_unknown_plane_show_less(name, equal, count):
     [
         pteron.load("quadrupteron-oblique"),
         tilting.machine("1T2R", ("PRS", "RRS", "RPS"), 3)[0],
+        tilting.machine("2R", ("PSS", "RSS"), 3)[0],
         pytest.param(tilting.machine("3T3R", ("UPS", "PSS", "RSS"), 5)[0], marks=NIGHTLY),
         pytest.param(pteron.load("3-rrr"), marks=NIGHTLY),
     ],
@@ -310,6 +347,7 @@ def test_swapped_marks_are_told():
         ]
     )
     setup = Setup(marks={name: Place(at) for name, at in marks.items()})
+    places += NOISE * np.random.default_rng(0).standard_normal(places.shape)
     seen = Measurements.of(robot, readings, poses=poses, positions=places, setup=setup)
     given = replace(seen, marks=names)
     assert calibrate(robot, given, free=GEOMETRY).verdict.grade == "trustworthy"
@@ -353,6 +391,30 @@ def test_readings_noise_is_carried_to_what_is_measured():
     assert result.fit.kept.all()
     assert np.median(result.fit.distances) < 3.0
     assert result.misfit(steps) < 3.0 * len(steps)
+
+
+def test_intervals_hold_where_many_distances_share_a_rows_readings():
+    robot, rows, held = pteron.load("linear-delta"), 41, []
+    origins = np.where(np.arange(rows) > 0, 0, -1)
+    for seed in range(8):
+        truth, steps, poses, readings = off_drawing(robot, seed, rows)
+        rng = np.random.default_rng(seed)
+        places = tool_places(truth.robot, poses, truth.marks[""])
+        lengths = np.linalg.norm(places - places[0], axis=1) + 1e-5 * rng.standard_normal(rows)
+        setup = Setup(noise={"distance": 1e-5, "readings": 1e-4})
+        noisy = readings + 1e-4 * rng.standard_normal(readings.shape)
+        given = Measurements.of(robot, noisy, setup=setup)
+        lengths[0] = np.nan
+        given = replace(given, distances=lengths, origins=origins)
+        blocks = blocks_of(robot, given, GEOMETRY)
+        found = Fitter(given, blocks, Guess.drawn(robot, given), poses).run()
+        units = tolerances_of(blocks)
+        variances, axes = np.linalg.eigh(found.covariance / np.outer(units, units))
+        seen = variances < 0.05  # of what the distances show
+        missed = np.abs(axes.T @ ((found.total - steps) / units)) / np.sqrt(variances)
+        held += (missed < 1.96)[seen].tolist()
+    assert len(held) > 40
+    assert np.mean(held) > 0.85
 
 
 @pytest.mark.parametrize("measure", ["positions", "heights", "distances"])

@@ -14,14 +14,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.bodies.vectors import Vector
 from pteron.calibration.guess import Block, Guess, across
 from pteron.calibration.measurements import position_axes
-from pteron.calibration.variations import AXIAL, slope_matrix, slope_terms
+from pteron.calibration.variations import slope_matrix, slope_terms
 from pteron.kernels import NoSquareRoot, PrimeField, evaluate, general_program
 from pteron.kernels.geometry_slopes import slope_columns, slopes_program
 from pteron.kernels.programs import bare
 from pteron.reduction.elimination import dependencies
 from pteron.reduction.exact import primes_of
+from pteron.reduction.exact_directions import rational_unit
 from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.exact_regressor import is_square
 
@@ -62,9 +64,6 @@ def exact_rank(
     start: Guess, blocks: Sequence[Block], kinds: Sequence[RowKind], seed: int
 ) -> tuple[int | None, tuple[int, ...], int]:
     """Return rank, primes and number of rows; None for a rank where something has no exact form."""
-    free = [c for block in blocks for c in block.changes]
-    if any(change.group in AXIAL for change in free):
-        return None, (), 0
     geometry = exact_geometry(start.robot)
     count = blocks[-1].where.stop
     rng = random.Random(seed)
@@ -74,17 +73,18 @@ def exact_rank(
         prime = next(primes)
         drawn = _Drawn(start, blocks, prime, rng)
         found: list[list[int]] = []
-        independent = 0  # of the rows of a pose no more are than it has freedoms
+        rank, grows = 0, True
         try:
-            while independent < count + _SPARE * len(kinds):
-                for kind in kinds:
-                    more = (np.array(drawn.rows(kind)) % prime).tolist()
-                    found += more
-                    independent += min(len(more), start.robot.freedom)
+            while grows:  # a leg may need more poses than all rows together
+                wanted = max(count, len(found)) + _SPARE * len(kinds)
+                while len(found) < wanted:
+                    for kind in kinds:
+                        found += (np.array(drawn.rows(kind)) % prime).tolist()
+                before, rank = rank, len(dependencies(found, range(count), prime)[0])
+                grows = before < rank < count
         except ZeroDivisionError:
             return None, (), 0
-        kept, _ = dependencies(found, range(count), prime)
-        best, rows = max(best, len(kept)), len(found)
+        best, rows = max(best, rank), len(found)
         used.append(prime)
     return best, tuple(used), rows
 
@@ -126,10 +126,26 @@ class _Drawn:
         self.columns = slope_columns(layout)
         changes = next((b.changes for b in blocks if b.kind == "geometry"), ())
         terms, vector = slope_terms(layout, changes), np.array(self.vector, dtype=object)
-        self.steps: Residues = slope_matrix(layout, changes, terms, vector) % prime
+        radial = [self._radial(leg.guide_point) for leg in robot.legs]
+        self.steps: Residues = slope_matrix(layout, changes, terms, vector, radial) % prime
         self.frame: Residues = np.array(
             [[n.within(self.field) for n in axis] for axis in self.geometry.axes], dtype=object
         )
+
+    def _radial(self, point: Vector) -> tuple[Residues, Residues]:
+        """Return unit vectors from the platform's axis to a point, and across both.
+
+        They are rational ones near the machine's: no relation to the other numbers is meant.
+        """
+        axis = np.array(self.start.robot.platform.axis)
+        outward = np.array(point) - (axis @ point) * axis
+        size = np.linalg.norm(outward)
+        own = self.geometry.frame
+        u, k = (
+            np.array([n.within(self.field) for n in rational_unit(own @ v)], dtype=object)
+            for v in (outward / size if size > 0.0 else np.eye(3)[0], axis)
+        )
+        return u, _skew(k) @ u
 
     def rows(self, kind: RowKind) -> list[Residues]:
         """Return the rows (p,) of a random pose."""

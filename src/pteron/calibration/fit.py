@@ -84,6 +84,9 @@ class Fit:
         Squared residuals, in variances, and tolerances.
     steps : int
         Gauss and Newton's steps in all.
+    shared : array, shape (p, p), or 0
+        By how much `information` is too great where several distances share a row's readings: each
+        row is weighted as if its noise were its own alone.
     """
 
     guess: Guess
@@ -99,6 +102,7 @@ class Fit:
     prior: Array
     cost: float
     steps: int = 0
+    shared: Array | float = 0.0
 
     @cached_property
     def covariance(self) -> Array:
@@ -113,7 +117,10 @@ class Fit:
                 "the measurements leave open what has no tolerance: free less, or give `prior` "
                 "finite standard deviations"
             ) from None
-        return np.asarray(cho_solve(factor, np.eye(len(size))) / np.outer(size, size))
+        inverse = cho_solve(factor, np.eye(len(size))) / np.outer(size, size)
+        return np.asarray(
+            inverse if np.ndim(self.shared) == 0 else inverse + inverse @ self.shared @ inverse
+        )
 
 
 class Fitter:
@@ -176,7 +183,7 @@ class Fitter:
                 break
             again = self._at(at.guess, at.total, at.poses, noise, kept)
             at = replace(again, steps=at.steps)
-        return at
+        return replace(at, shared=self._shared(at))
 
     def _settled(self, begin: Fit) -> Fit:
         """Return the most probable values for a noise and rows that are kept."""
@@ -250,9 +257,10 @@ class Fitter:
         joints = guess.joints(self.given.readings)
         found = self.slopes.poses(guess, joints, poses)
         lost: NDArray[np.bool_] = np.asarray(np.isnan(found).any(axis=1))
+        lost |= (self.given.origins >= 0) & lost[self.given.origins]
         if 2 * lost[kept].sum() > kept.sum():
             raise ValueError
-        found[lost] = poses[lost]  # out of reach by little; it may come back
+        found = np.where(np.isnan(found), poses, found)  # out of reach by little; it may come back
         cost += _LOST * float((lost & kept).sum())
         residuals = np.zeros((rows, width))
         measured = np.zeros((rows, width), dtype=bool)
@@ -261,7 +269,7 @@ class Fitter:
             chosen = np.arange(start, min(start + _CHUNK, rows))
             at = self.slopes.rows(guess, self.given, found, chosen)
             residuals[chosen], measured[chosen] = at.residuals, at.measured
-            r, slopes = self.whitened(at, guess, noise)
+            r, slopes, _ = self.whitened(at, guess, noise)
             r[lost[chosen]], slopes[lost[chosen]] = 0.0, 0.0
             squares = np.einsum("nk,nk->n", r, r)
             distances[chosen] = np.sqrt(squares)
@@ -283,17 +291,43 @@ class Fitter:
         values = guess, total, noise, kept
         return Fit(*values, found, residuals, measured, distances, matrix, right, self.prior, cost)
 
-    def whitened(self, at: Rows, guess: Guess, noise: dict[str, float]) -> tuple[Array, Array]:
-        """Return residuals and slopes in standard deviations, independent within a row."""
+    def whitened(
+        self, at: Rows, guess: Guess, noise: dict[str, float]
+    ) -> tuple[Array, Array, Array]:
+        """Return residuals and slopes in standard deviations, independent within a row.
+
+        And what a standard deviation of the readings, of two rows, makes of the residuals.
+        """
         sizes = np.array([noise[kind] for kind in self.kind_of])
+        pushed = at.by_reading * (self.readings_noise * np.tile(guess.scales, 2))
         if not self.readings_noise:
-            return at.residuals / sizes, at.slopes / sizes[:, None]
-        pushed = at.by_reading * (self.readings_noise * guess.scales)
+            return at.residuals / sizes, at.slopes / sizes[:, None], pushed
         covariance = pushed @ np.swapaxes(pushed, -1, -2) + np.diag(sizes**2)
         root = np.linalg.cholesky(covariance)
-        both = np.concatenate([at.residuals[..., None], at.slopes], axis=-1)
+        both = np.concatenate([at.residuals[..., None], at.slopes, pushed], axis=-1)
         white = np.linalg.solve(root, both)
-        return white[..., 0], white[..., 1:]
+        count = at.slopes.shape[-1]
+        return white[..., 0], white[..., 1 : 1 + count], white[..., 1 + count :]
+
+    def _shared(self, fit: Fit) -> Array | float:
+        """Return a fit's `shared`."""
+        origins = self.given.origins
+        ends = np.unique(origins[origins >= 0])
+        if not self.readings_noise or not len(ends):
+            return 0.0
+        at = self.slopes.rows(fit.guess, self.given, fit.poses, np.arange(len(origins)))
+        _, slopes, pushed = self.whitened(at, fit.guess, fit.noise)
+        pulls = np.einsum("nkp,nkj->njp", slopes * fit.kept[:, None, None], pushed)
+        pulls[~np.isfinite(pulls)] = 0.0  # of rows that are out of reach
+        legs = pulls.shape[1] // 2
+        place = np.full(len(origins) + 1, -1)  # the last is that of no row
+        place[ends] = np.arange(len(ends))
+        owners = place[np.concatenate([np.arange(len(origins)), origins])]
+        parts = np.concatenate([pulls[:, :legs], pulls[:, legs:]])[owners >= 0]
+        sums = np.zeros((len(ends), *parts.shape[1:]))
+        np.add.at(sums, owners[owners >= 0], parts)
+        both, each = (part.reshape(-1, pulls.shape[-1]) for part in (sums, parts))
+        return np.asarray(both.T @ both - each.T @ each)
 
     def _noise(self, fit: Fit, sought: list[str]) -> dict[str, float]:
         """Return the noise by kind that the residuals show, less what the unknowns took of it."""

@@ -78,7 +78,7 @@ def _shown(
     fitter = Fitter(given, whole, start, fit.poses)
     chosen = evenly(len(given), _ROWS)
     at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
-    r, slopes = fitter.whitened(at, fit.guess, fit.noise)
+    r, slopes, _ = fitter.whitened(at, fit.guess, fit.noise)
     off = np.sqrt(np.einsum("nk,nk->n", r, r) / np.maximum(at.measured.sum(axis=1), 1))
     weights = np.minimum(1.0, _HEAVIEST * np.median(off) / np.maximum(off, 1e-12))
     weights[~np.isfinite(slopes).all(axis=(1, 2))] = 0.0  # no pose
@@ -161,7 +161,7 @@ def _bad_leg(
     chosen = kept[evenly(len(kept), _ROWS)]
     at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
     sizes = np.array([fit.noise[kind] for kind in fitter.kind_of])
-    r, columns = at.residuals / sizes, at.by_reading / sizes[:, None]
+    r, columns = at.residuals / sizes, at.by_reading[..., : len(names)] / sizes[:, None]
     along = np.einsum("nki,nk->ni", columns, r)
     squares = along**2 / np.maximum(np.einsum("nki,nki->ni", columns, columns), 1e-300)
     mean = squares.mean(axis=0)

@@ -42,7 +42,7 @@ class Rows(NamedTuple):
     slopes: Array
     """(N, K, p), against all unknowns."""
     by_reading: Array
-    """(N, K, n), against the joint coordinates."""
+    """(N, K, 2 n), against the row's joint coordinates, and those of where its distance is from."""
     measured: NDArray[np.bool_]
     """(N, K)."""
 
@@ -115,8 +115,10 @@ class MachineSlopes:
         n, k = len(chosen), len(self._angular)
         residuals = np.zeros((n, 5 + k))
         measured = ~np.isnan(np.hstack([part[chosen] for part in given.parts.values()]))
-        # Against all unknowns, and behind them against the joint coordinates
-        slopes = np.zeros((n, 5 + k, self.count + len(guess.robot.legs)))
+        # Against all unknowns, and behind them against the joint coordinates, of two rows
+        legs = len(guess.robot.legs)
+        slopes = np.zeros((n, 5 + k, self.count + 2 * legs))
+        own = slopes[..., : self.count + legs]
         place, turned, moves = self._platform(guess, given, poses, chosen)
         point, moved = self._marks(guess, given, chosen, place, turned, moves)
 
@@ -129,15 +131,15 @@ class MachineSlopes:
             if (frame := self._frame) is not None:
                 local[:, :, frame.start : frame.start + 3] -= guess.turn.T
                 local[:, :, frame.start + 3 : frame.stop] += guess.turn.T @ _skew(arms)
-            slopes[:, :3] = self._axes @ local
+            own[:, :3] = self._axes @ local
         if measured[:, 3 : 3 + k].any():
-            slopes[:, 3 : 3 + k] = moves[:, 6:]
+            own[:, 3 : 3 + k] = moves[:, 6:]
             self._angles(guess, given, poses, chosen, residuals, slopes)
         if measured[:, -2].any():
             planes = np.stack([guess.planes[given.planes[i]] for i in chosen])
             normals = planes[:, :3]
             residuals[:, -2] = _dot(normals, point) - planes[:, 3] - given.heights[chosen]
-            slopes[:, -2] = np.einsum("ni,nik->nk", normals, moved)
+            own[:, -2] = np.einsum("ni,nik->nk", normals, moved)
             for block in self.blocks:
                 if block.kind == "plane":
                     here = np.array([given.planes[i] == block.name for i in chosen])
@@ -266,7 +268,8 @@ class MachineSlopes:
         moved: Array,
     ) -> tuple[Array, Array]:
         """Return marks less where their distances are from, anchors or other rows; with slopes."""
-        apart, drifted = point.copy(), moved.copy()
+        apart, legs = point.copy(), len(guess.robot.legs)
+        drifted = np.pad(moved, ((0, 0), (0, 0), (0, legs)))
         measured, origins = ~np.isnan(given.distances[chosen]), given.origins[chosen]
         between = measured & (origins >= 0)
         if between.any():
@@ -274,8 +277,8 @@ class MachineSlopes:
             place, turned, slopes = self._platform(guess, given, poses, others)
             end, shifted = self._marks(guess, given, others, place, turned, slopes)
             apart[between] -= end
-            # Of its readings' noise only this row's counts.
             drifted[between, :, : self.count] -= shifted[..., : self.count]
+            drifted[between, :, -legs:] -= shifted[..., -legs:]
         for i in np.flatnonzero(measured & ~between):
             name = given.anchors[chosen[i]]
             apart[i] -= guess.anchors[name]

@@ -149,11 +149,12 @@ def _rigid(
             part = found[block.where]
             if block.kind == "geometry":
                 for k, change in enumerate(block.changes):
-                    leg = start.robot.legs[change.leg]
                     if change.group in AXIAL:
                         continue
-                    if change.key == "guide_point":
-                        moved = np.cross(along, leg.guide_point) if turn else along
+                    if change.key in ("guide_point", "center"):
+                        owners = (*start.robot.legs, start.robot.platform)
+                        point = getattr(owners[change.leg], change.key)
+                        moved = np.cross(along, point) if turn else along
                         part[k] = moved[change.axis or 0]
                     elif change.group == "directions" and turn:
                         part[k] = np.array(start.robot.platform.frame)[change.axis or 0][axis]

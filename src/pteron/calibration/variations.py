@@ -7,7 +7,7 @@ allow, such as a tilt of a planar leg's axis, does not vary.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
@@ -39,12 +39,12 @@ _AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Variation:
-    """One way in which one leg's geometry may differ.
+    """One way in which the geometry of a leg, or of the platform, may differ.
 
     Attributes
     ----------
     leg : int
-        From 0; -1 for all legs.
+        From 0; -1 for all legs, or for the platform.
     key : str
         The key of the robot's file that changes.
     axis : int or None
@@ -63,9 +63,10 @@ class Variation:
     @property
     def name(self) -> str:
         """Its name: "legs[2].guide_point.x", "legs[2].direction about z"."""
-        if self.leg < 0:
+        if self.group == "radius":
             return self.group
-        place = f"legs[{self.leg + 1}].{'angle' if self.group == 'angles' else self.key}"
+        owner = "platform" if self.leg < 0 else f"legs[{self.leg + 1}]"
+        place = f"{owner}.{'angle' if self.group == 'angles' else self.key}"
         if self.axis is None:
             return place
         return f"{place}{' about ' if self.group == 'directions' else '.'}{_AXES[self.axis]}"
@@ -82,13 +83,13 @@ class Variation:
             return float(np.linalg.norm(np.cross(axis, point)))
         if self.unit == "rad":
             return 0.0
-        held = getattr(robot.legs[self.leg], self.key)
+        held = getattr(robot.platform if self.leg < 0 else robot.legs[self.leg], self.key)
         return float(held if self.axis is None else held[self.axis])
 
 
 @lru_cache(maxsize=32)
 def variations(robot: Manipulator) -> tuple[Variation, ...]:
-    """Return the ways in which a machine's geometry may differ, leg by leg."""
+    """Return the ways in which a machine's geometry may differ, leg by leg, then the platform."""
     found: list[Variation] = []
     for i, leg in enumerate(robot.legs):
         for quantity in leg.quantities:
@@ -98,13 +99,13 @@ def variations(robot: Manipulator) -> tuple[Variation, ...]:
             elif role == "point":
                 found += [Variation(i, key, axis, "points") for axis in range(3)]
             elif role == "direction" and getattr(leg, key, None) is not None:
-                # A turn about itself changes nothing.
-                along = np.abs(np.array(robot.platform.frame) @ quantity.value)
-                axes = [axis for axis in range(3) if _turns(robot, i, key, axis, along[axis])]
-                if len(axes) == 3:
-                    axes.remove(int(along.argmax()))
-                found += [Variation(i, key, axis, "directions") for axis in axes]
+                found += _turns(robot, i, key, quantity.value)
         found += [Variation(i, "platform_point", axis, "points") for axis in range(3)]
+    for key in robot.platform.turning_keys:
+        if key == "center":
+            found += [Variation(-1, key, axis, "points") for axis in range(3)]
+        else:
+            found += _turns(robot, -1, key, getattr(robot.platform, key))
     return tuple(v for v in found if v.group != "points" or _possible(robot, v))
 
 
@@ -114,8 +115,15 @@ def axial_variations(robot: Manipulator) -> tuple[Variation, ...]:
     return Variation(-1, "guide_point", None, "radius"), *angles
 
 
-def _turns(robot: Manipulator, leg: int, key: str, axis: int, along: float) -> bool:
-    return along < 1.0 - _ALONG and _possible(robot, Variation(leg, key, axis, "directions"))
+def _turns(robot: Manipulator, leg: int, key: str, value: Sequence[float]) -> list[Variation]:
+    """Return the turns of a direction; one about itself changes nothing."""
+    along = np.abs(np.array(robot.platform.frame) @ value)
+    about = [Variation(leg, key, axis, "directions") for axis in range(3)]
+    turns = [v for v, a in zip(about, along, strict=True) if a < 1.0 - _ALONG]
+    turns = [v for v in turns if _possible(robot, v)]
+    if len(turns) == 3:
+        del turns[int(along.argmax())]
+    return turns
 
 
 def _possible(robot: Manipulator, variation: Variation) -> bool:
@@ -135,7 +143,9 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
         If there is no such machine.
     """
     frame = np.array(robot.platform.frame)
-    new: list[dict[str, Any]] = [{} for _ in robot.legs]
+    # The platform's are the last, as its number is -1.
+    new: list[dict[str, Any]] = [{} for _ in (*robot.legs, robot.platform)]
+    owners = (*robot.legs, robot.platform)
     turns: dict[tuple[int, str], Array] = {}
     for change, amount in zip(changes, amounts.tolist(), strict=True):
         if change.group in AXIAL:
@@ -149,23 +159,26 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
                     moved = point + np.linalg.norm(around) * cos * outward + sin * around
                 new[i]["guide_point"] = tuple(moved.tolist())
             continue
-        leg, fields = robot.legs[change.leg], new[change.leg]
+        owner, fields = owners[change.leg], new[change.leg]
         if change.group == "directions":
             turn = turns.setdefault((change.leg, change.key), np.zeros(3))
             turn += amount * frame[change.axis or 0]
         elif change.axis is None:
-            fields[change.key] = getattr(leg, change.key) + amount
+            fields[change.key] = getattr(owner, change.key) + amount
         else:
-            moved_point = list(fields.get(change.key, getattr(leg, change.key)))
+            moved_point = list(fields.get(change.key, getattr(owner, change.key)))
             moved_point[change.axis] += amount
             fields[change.key] = tuple(moved_point)
     for (i, key), turn in turns.items():
         matrix = Rotation.from_rotvec(turn).as_matrix()
-        for name in turning_with(robot.legs[i], key):
-            vector = np.array(new[i].get(name, getattr(robot.legs[i], name)))
+        keys = turning_with(robot.legs[i], key) if i >= 0 else [key]
+        if i < 0 and robot.platform.x_axis is not None:
+            keys.append("x_axis")
+        for name in keys:
+            vector = np.array(new[i].get(name, getattr(owners[i], name)))
             new[i][name] = tuple((matrix @ vector).tolist())
-    legs = tuple(replace(leg, **fields) for leg, fields in zip(robot.legs, new, strict=True))
-    return replace(robot, legs=legs)
+    *legs, platform = (replace(owner, **fields) for owner, fields in zip(owners, new, strict=True))
+    return replace(robot, legs=tuple(legs), platform=platform)
 
 
 def turning_with(leg: LegKind, key: str) -> list[str]:
@@ -209,28 +222,39 @@ def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
     for k, change in enumerate(changes):
         if change.group in AXIAL:
             continue
-        leg, at = robot.legs[change.leg], places[change.leg]
+        at = places[change.leg]
         if change.group != "directions":
             found.append(Term(at[change.key] + (change.axis or 0), k, (), 1))
             continue
         axis = start + 3 * (change.axis or 0)
-        names = [key for key in turning_with(leg, change.key) if key in at]
-        if change.key == _first_direction(leg):  # so do axes that are derived from it
-            derived = ("direction", "normal")
-            names += [
-                q.name
-                for q in leg.quantities
-                if q.role in derived and q.name not in names and not getattr(leg, q.name, None)
-            ]
-        for name in names:
+        if change.leg < 0:
+            first = {"axis": "first_axis"}.get(change.key, change.key)
+            turned = [at[first]] if first in at else [start, start + 3, start + 6]
+        else:
+            turned = [at[name] for name in _turned(robot.legs[change.leg], change.key, at)]
+        for row in turned:
             for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-                found.append(Term(at[name] + a, k, (axis + b, at[name] + c), 1))
-                found.append(Term(at[name] + a, k, (axis + c, at[name] + b), -1))
+                found.append(Term(row + a, k, (axis + b, row + c), 1))
+                found.append(Term(row + a, k, (axis + c, row + b), -1))
     return found
 
 
+def _turned(leg: LegKind, key: str, known: Collection[str]) -> list[str]:
+    """Return a leg's quantities that turn with a direction: derived ones with its first."""
+    names = [name for name in turning_with(leg, key) if name in known]
+    if key == next(q.name for q in leg.quantities if q.role == "direction"):
+        names += [
+            q.name
+            for q in leg.quantities
+            if q.role in ("direction", "normal")
+            and q.name not in names
+            and not getattr(leg, q.name, None)
+        ]
+    return names
+
+
 def _places(robot: Manipulator) -> tuple[list[dict[str, int]], int]:
-    """Return where each leg's quantities stand in the geometry, and where the frame does."""
+    """Return where legs' and, last, the platform's quantities stand, and where the frame does."""
     places: list[dict[str, int]] = []
     start = 0
     for leg in robot.legs:
@@ -240,24 +264,34 @@ def _places(robot: Manipulator) -> tuple[list[dict[str, int]], int]:
             start += len(q.value)
         places[-1]["platform_point"] = start
         start += 6
+    places.append({})
+    at = start + 9
+    for name, value in robot.platform.quantities.items():
+        places[-1][name] = at
+        at += len(value)
     return places, start
 
 
-def _first_direction(leg: LegKind) -> str:
-    return next(q.name for q in leg.quantities if q.role == "direction")
-
-
 def slope_matrix(
-    robot: Manipulator, changes: Sequence[Variation], terms: Sequence[Term], geometry: Array
+    robot: Manipulator,
+    changes: Sequence[Variation],
+    terms: Sequence[Term],
+    geometry: Array,
+    radial: Sequence[tuple[Array, Array]] | None = None,
 ) -> Array:
-    """Return d(geometry)/d(variations) of a machine, in floats or in the numbers of a field."""
+    """Return d(geometry)/d(variations) of a machine, in floats or in the numbers of a field.
+
+    Of a field `radial` has for each leg the unit vector from the platform's axis to its guide
+    point, and a vector that turns it about the axis.
+    """
     matrix = np.zeros((len(geometry), len(changes)), dtype=geometry.dtype)
     places, _ = _places(robot)
     for k, change in enumerate(changes):
         if change.group in AXIAL:
             for i in range(len(robot.legs)) if change.leg < 0 else (change.leg,):
                 at = places[i]["guide_point"]
-                vectors = _about(np.array(robot.platform.axis), geometry[at : at + 3])
+                point = geometry[at : at + 3]
+                vectors = radial[i] if radial else _about(np.array(robot.platform.axis), point)
                 matrix[at : at + 3, k] = vectors[change.group == "angles"]
     for term in terms:
         matrix[term.row, term.variation] += term.sign * np.prod(geometry[list(term.factors)])

@@ -26,8 +26,8 @@ def slopes_program(robot: RobotLike) -> Program:
     Its outputs: `joints` (n,); `jacobian` (n, m), their slopes against the pose; `slopes` (n, k),
     each leg's against those numbers of the geometry that `slope_columns` names; `twists` (6, m),
     the platform's twist against the pose's rates; `place` (3,) of P and `axes` (3, 3), the columns
-    of its rotation. Where planes hold the platform also `shifts` (6, k): its twist, at a given
-    pose, against the geometry.
+    of its rotation. Where planes hold the platform, or it turns about a point or axes that are
+    part of the geometry, also `shifts` (6, k): its twist, at a given pose, against the geometry.
     """
     layout = bare(robot)
     return kept(_key(layout), lambda: _built(layout))
@@ -42,11 +42,14 @@ def slope_columns(robot: Manipulator) -> list[range]:
     """Return, for each leg, the numbers of the geometry that its slopes are against.
 
     All legs have as many: those of a shorter leg include some of its neighbour's, whose slopes are
-    zero. Where planes hold the platform every leg's coordinate hangs on all legs.
+    zero. Where planes hold the platform every leg's coordinate hangs on all legs; and on what the
+    platform turns about, where that is part of the geometry.
     """
     sizes = [sum(len(q.value) for q in leg.quantities) + 6 for leg in robot.legs]
     total, most = sum(sizes), max(sizes)
-    if robot.platform.planes:
+    if robot.platform.turning_keys:
+        total += 9 + sum(len(value) for value in robot.platform.quantities.values())
+    if robot.platform.planes or robot.platform.turning_keys:
         return [range(total)] * len(sizes)
     starts = (min(start, total - most) for start in accumulate(sizes[:-1], initial=0))
     return [range(start, start + most) for start in starts]
@@ -76,7 +79,7 @@ def _built(layout: Manipulator) -> Program:
         "place": state.platform.body.position,
         "axes": state.platform.axes,
     }
-    if layout.platform.planes:
+    if layout.platform.planes or layout.platform.turning_keys:
         axes = ca.horzsplit(state.platform.axes)
         count = slope_columns(layout)[0].stop
         moved = ca.jacobian(state.platform.body.position, geometry)[:, :count]

@@ -249,6 +249,16 @@ class Platform:
             "second_axis": self.second_axis,
         }
 
+    @property
+    def turning_keys(self) -> tuple[str, ...]:
+        """Keys of the points and directions about which it turns, where its legs leave them free.
+
+        Those of a platform in the plane follow from its legs.
+        """
+        if self.turns and not self.planar and not self.slides:
+            return ("axis",)
+        return {"3R": ("center",), "2R": ("center", "axis", "second_axis")}.get(self.motion, ())
+
     def expressions(self) -> dict[str, Any]:
         """Return its `quantities`, and the planes that hold its points, as expressions."""
         more: dict[str, Any] = {name: _column(v) for name, v in self.quantities.items()}

@@ -62,7 +62,7 @@ class Notes:
                 if exact.s != 1 or abs(float(exact) - float(value)) > _NOISE:
                     self._recognised(f"{name}.{axis}", float(value), exact)
             return (known[0], known[1], known[2])
-        vector = _stereographic(given)
+        vector = rational_unit(given)
         for axis, value, exact in zip("xyz", given, vector, strict=True):
             self._approximated(f"{name}.{axis}", float(value), exact)
         return vector
@@ -72,7 +72,7 @@ class Notes:
         simple = length(x), length(y)
         radius = length(float(np.hypot(x, y)))
         if None in simple and radius is not None and radius.q != 0:
-            ux, uy, _ = _stereographic(np.array([x, y, 0.0]) / np.hypot(x, y))
+            ux, uy, _ = rational_unit(np.array([x, y, 0.0]) / np.hypot(x, y))
             polar = Surd(ux.q * radius.q, radius.s), Surd(uy.q * radius.q, radius.s)
             for axis, value, exact in zip("xy", (x, y), polar, strict=True):
                 self._approximated(f"{name}.{axis}", value, exact)
@@ -111,7 +111,7 @@ def times(vector: ExactVector, factor: Fraction) -> ExactVector:
     return x.times(factor), y.times(factor), z.times(factor)
 
 
-def _stereographic(given: Array) -> ExactVector:
+def rational_unit(given: Array) -> ExactVector:
     """Return a rational unit vector near one given; components that are zero stay zero.
 
     It is projected from the pole opposite to its largest component, rounded, and projected back.
