@@ -9,6 +9,7 @@ from typer import Exit, echo
 from pteron.cli.arguments import load_robot
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import is_terminal, plain, show, show_json, table
+from pteron.json_values import picked
 
 if TYPE_CHECKING:
     from pteron.reduction import BaseParameters
@@ -134,8 +135,7 @@ def table1(
         found = computed()
     wrong = sum(not row.agrees for row in found)
     if json:
-        names = ("parameter", "kept", "printed", "computed", "agrees", "restored")
-        show_json([{name: getattr(row, name) for name in names} for row in found])
+        show_json([picked(r, "parameter kept printed computed agrees restored") for r in found])
     else:
         verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
         texts = ((r.parameter, plain(r.printed), plain(r.computed)) for r in found)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from pteron.cli.arguments import (
-    check_rate,
-    load_robot,
-    parsed_list,
-)
+from pteron.cli.arguments import check_rate, load_robot, parsed_list
 from pteron.cli.motion_argument import given_pose, loaded, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show, show_json, written
 from pteron.errors import DataError
+from pteron.json_values import picked
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
@@ -197,8 +194,6 @@ def _deliver(
         write_table(motion_frame(machine, motion), out)
     bound = getattr(motion, "polynomial", None)
     if as_json:
-        keys = ("quantity", "leg", "size", "unit", "limit", "share")
-        rows = ((p.name, p.leg or None, p.size, p.unit, p.limit, p.share) for p in found)
         data = {
             "robot": machine.name,
             "kind": way,
@@ -209,7 +204,10 @@ def _deliver(
             "end": motion.pose[-1].tolist(),
             "quintic_duration": bound,
             "scale": getattr(motion, "scale", None),
-            "peaks": [dict(zip(keys, row, strict=True)) for row in rows],
+            "peaks": [
+                picked(p, "quantity=name leg size unit limit share") | {"leg": p.leg or None}
+                for p in found
+            ],
             "file": out,
         }
         show_json(data)

@@ -7,12 +7,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from typer import Option
-
 from pteron.atomic import checked_file
 from pteron.cli.arguments import load_robot
 from pteron.cli.certify import Proofs
-from pteron.cli.completion import indices
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.progress import progress_bar, spinner
@@ -47,15 +44,6 @@ _FILM_POINTS = 120
 
 _DPI = 200.0
 """Pixels an inch of pictures."""
-
-_INDEX = Option(
-    "--index",
-    help="What to map: condition, kappa, pressure_angle, ...; may be given several times.",
-    metavar="INDEX",
-    autocompletion=indices,
-    show_default="the distance to the end of the reach",
-)
-"""The option `--index`."""
 
 
 def workspace(

@@ -15,7 +15,7 @@ from pteron.design.differences import (
     stroke_words,
 )
 from pteron.design.front import Front
-from pteron.design.proofs import ProvedCube, proved, workspace_share
+from pteron.design.proofs import Proved, proved, workspace_share
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.names import LONGEST_NAME
@@ -24,29 +24,18 @@ from pteron.manipulator.saving import text_of
 if TYPE_CHECKING:
     import polars as pl
 
-    from pteron.workspace import Proof
-
 
 @dataclass(frozen=True)
-class ReportedDesign:
+class ReportedDesign(Proved):
     """One machine of a search, with what is proved of it.
 
     Attributes
     ----------
     name : str
         "start", "best-cube", "compromise", ...
-    design : Design
-        The machine.
-    cube : ProvedCube or None
-        The largest cube, where the search seeks one and it is proved.
-    workspace : tuple of Proof
-        Proofs of the required workspace, one for each orientation; none where none is required.
     """
 
     name: str
-    design: Design
-    cube: ProvedCube | None
-    workspace: tuple[Proof, ...]
 
     @property
     def changes(self) -> list[Change]:
@@ -159,8 +148,7 @@ def _design(task: Task, robot: Manipulator, name: str) -> Design:
 
 
 def _told(name: str, design: Design) -> ReportedDesign:
-    found = proved(design)
-    return ReportedDesign(name, found.design, found.cube, found.workspace)
+    return ReportedDesign(**vars(proved(design)), name=name)
 
 
 def _strokes(one: ReportedDesign) -> list[str]:

@@ -15,6 +15,7 @@ from pteron.environments.world import World
 from pteron.kernels import Array
 from pteron.motion import Guide, joint_guides, joint_points
 from pteron.plots import robot_figure
+from pteron.plots.machine_figures import gravity_of
 
 _POSES = 32
 """Random poses that the sliders' guides must reach, which sets the length that is drawn."""
@@ -49,11 +50,11 @@ class EnvironmentPicture:
 
     def _drawn(self, pose: Array, target: Array) -> Figure:
         robot = self._world.robot
-        points, gravity = joint_points(robot, pose), np.array(robot.gravity)
+        points = joint_points(robot, pose)
         figure = robot_figure(
             points,
             self._guides,
-            gravity=gravity if gravity.any() else None,
+            gravity=gravity_of(robot),
             path=np.array([points.tool, joint_points(robot, target).tool]),
         )
         figure.patch.set(facecolor="white", alpha=1.0)

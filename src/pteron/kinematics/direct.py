@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pteron.equations.machine import closure_of
 from pteron.errors import UnreachablePose
 from pteron.kernels import Array
-from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
+from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
 from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
 from pteron.kinematics.unlikely_values import unlikely_values, warn_of_unlikely
@@ -86,8 +86,7 @@ def direct_kinematics(
            [0.01      , 0.02      , 0.03      , 3.14159265]])
     """
     robot = as_manipulator(robot)
-    if is_singular_everywhere(robot):
-        raise singular_everywhere(robot)
+    expect_regular(robot)
     given = checked(robot, joints, "joints", on_failure)
     poses = _rows(robot, given, all_branches=all_branches)
     lost = np.isnan(poses).all(axis=(-2, -1))
@@ -141,8 +140,7 @@ def assembly_mode(
     array([0, 1])
     """
     robot = as_manipulator(robot)
-    if is_singular_everywhere(robot):
-        raise singular_everywhere(robot)
+    expect_regular(robot)
     given = checked(robot, pose, "pose")
     joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", given)
     return nearest(robot, _rows(robot, joints, all_branches=all_branches), given)

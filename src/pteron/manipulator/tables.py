@@ -43,13 +43,6 @@ class ConeTable(Table):
     axis: Three = Field(description="from the joint along the rod, in the frame of what holds it")
     angle: Number = Field(description="the greatest angle between axis and rod, rad")
 
-    def cone_of(self, key: str) -> Cone:
-        """Build the cone; `key` goes before what an error names."""
-        try:
-            return Cone(self.axis, self.angle)
-        except ModelError as error:
-            raise ModelError(f"{key}.{error}") from None
-
 
 class StribeckTable(Table):
     """`{ force, speed }` of what dry friction has more at rest."""
@@ -92,22 +85,6 @@ class DriveTable(Table):
         description="of the motor's encoder in a turn of the motor: what logs in counts are in",
         examples=[131072.0],
     )
-
-    def drive_of(self, key: str) -> Drive:
-        """Build the drive; `key` goes before what an error names."""
-        more, faults = None, []
-        try:
-            more = self.stribeck and Stribeck(self.stribeck.force, self.stribeck.speed)
-        except ModelError as error:
-            faults += [f"{key}.stribeck.{fault}" for fault in error.faults]
-        given = {name: getattr(self, name) for name in type(self).model_fields}
-        try:
-            drive = Drive(**given | {"stribeck": more})
-        except ModelError as error:
-            faults += [f"{key}.{fault}" for fault in error.faults]
-        if faults:
-            raise ModelError(told(faults), faults=faults)
-        return drive
 
 
 class _Motion(Table):
@@ -187,13 +164,6 @@ class ReadingTable(Table):
 
     zero: Number = Field(0.0, description="the coordinate where it reads 0, m or rad")
     scale: Number = Field(1.0, description="coordinate per unit of the reading")
-
-    def reading_of(self, key: str) -> Reading:
-        """Build the reading; `key` goes before what an error names."""
-        try:
-            return Reading(self.zero, self.scale)
-        except ModelError as error:
-            raise ModelError(f"{key}.{error}") from None
 
 
 def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
@@ -352,13 +322,30 @@ def _held(given: Any, name: str, key: Key) -> Any:
         return given.mass
     if key.body:
         return given.inertia_of(name)
-    if given is None:
-        return None
-    if key.role == "drive":
-        return given.drive_of(name)
-    if key.role == "reading":
-        return given.reading_of(name)
-    return given.cone_of(name) if key.role == "cone" else given
+    return _built(_PARTS[type(given)], given, name) if type(given) in _PARTS else given
+
+
+_PARTS = {ConeTable: Cone, DriveTable: Drive, ReadingTable: Reading, StribeckTable: Stribeck}
+"""Parts of a leg by their tables."""
+
+
+def _built(kind: Any, table: Table, key: str) -> Any:
+    """Return a part of a leg from its table; `key` goes before what an error names."""
+    faults, given = list[str](), {name: getattr(table, name) for name in type(table).model_fields}
+    for name, value in given.items():
+        try:
+            if type(value) in _PARTS:
+                given[name] = None
+                given[name] = _built(_PARTS[type(value)], value, f"{key}.{name}")
+        except ModelError as error:
+            faults += error.faults
+    try:
+        made = kind(**given)
+    except ModelError as error:
+        faults += [f"{key}.{fault}" for fault in error.faults]
+    if faults:
+        raise ModelError(told(faults), faults=faults)
+    return made
 
 
 def _beyond_ends(leg: LegKind, letter: str, body: Any) -> str | None:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError
 from pteron.maps.archive import read_archive, write_archive
 from pteron.maps.map import Map
 from pteron.maps.stores import read_store, save_store
-from pteron.maps.surfaces import ENDINGS as SURFACES, checked_surfaces, surface_bytes
+from pteron.maps.surfaces import ENDINGS as SURFACES, checked_surfaces, save_surfaces
 from pteron.maps.table_file import read_map_table, write_map_table
 
 _TABLES = (".csv", ".parquet")
@@ -103,20 +102,11 @@ def checked_map_file(path: str | Path) -> Path:
     return target
 
 
-def _zarr(given: Map, target: Path) -> Path:
-    save_store(given, target)
-    return target
-
-
-def _surfaces(given: Map, target: Path) -> Path:
-    return write_bytes(target, surface_bytes(given, target.suffix.lower()))
-
-
 _WRITERS: dict[str, Callable[[Map, Path], Path]] = {
     **dict.fromkeys(_TABLES, write_map_table),
     ".npz": write_archive,
-    ".zarr": _zarr,
-    **dict.fromkeys(SURFACES, _surfaces),
+    ".zarr": save_store,
+    **dict.fromkeys(SURFACES, save_surfaces),
 }
 
 _READERS: dict[str, Callable[[Path], Map]] = {

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -113,9 +113,12 @@ def map_index(
     with ExitStack() as opened:
         store: MapStore | MemoryStore
         if streams or not here:
-            place = target if streams else Path(opened.enter_context(_folder()), "map.zarr")
-            assert place is not None
-            store = MapStore.of(place, robot.name, poses, names, _plan(robot, engine))
+            plan = {"robot": text_of(robot), "engine": engine, "pteron": RESULTS}
+            place = target
+            if place is None or not streams:
+                folder = opened.enter_context(TemporaryDirectory(prefix="pteron-map-"))
+                place = Path(folder, "map.zarr")
+            store = MapStore.of(place, robot.name, poses, names, plan)
         else:
             store = MemoryStore(poses, names)
         if engine == "auto":
@@ -142,14 +145,6 @@ def checked_indices(robot: Manipulator, index: str | Sequence[str]) -> tuple[str
         if name != MARGIN.name:
             expect_index(robot, name)
     return names or (MARGIN.name,)
-
-
-def _folder() -> TemporaryDirectory[str]:
-    return TemporaryDirectory(prefix="pteron-map-")
-
-
-def _plan(robot: Manipulator, engine: str) -> dict[str, Any]:
-    return {"robot": text_of(robot), "engine": engine, "pteron": RESULTS}
 
 
 def _computed(

@@ -190,7 +190,7 @@ def read_store(path: Path) -> Map:
     return store.map(name, "" if plan["robot"] == name else plan["robot"])
 
 
-def save_store(given: Map, path: Path) -> None:
+def save_store(given: Map, path: Path) -> Path:
     """Write a map to a Zarr store, whole or not at all.
 
     Raises
@@ -210,7 +210,7 @@ def save_store(given: Map, path: Path) -> None:
             store.write(number, found | {_STATUS: given.status[region]})
         if path.exists():
             path.rename(work / "former")
-        made.rename(path)
+        return made.rename(path)
 
 
 def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, Any]) -> None:

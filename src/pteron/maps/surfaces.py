@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates  # type: ignore[import-untyped]
 
+from pteron.atomic import write_bytes
 from pteron.errors import DataError, ModelError
 from pteron.extras import install_command
 from pteron.kernels import Array
@@ -112,13 +113,13 @@ def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tu
     return tuple(found)
 
 
-def surface_bytes(given: Map, ending: str) -> bytes:
-    """Return a file of the surfaces of a map's first index.
+def save_surfaces(given: Map, target: Path) -> Path:
+    """Write a file of the surfaces of a map's first index.
 
     Its points carry the index, under its name and unit. In VTK's files its triangles carry
     `surface`, 0 for the reach's, else the level's number from 1; STL holds no more than triangles.
     """
-    _, meshio = checked_surfaces()
+    (_, meshio), ending = checked_surfaces(), target.suffix.lower()
     index = given.indices[0]
     parts = surfaces(given, index.name)
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
@@ -140,7 +141,7 @@ def surface_bytes(given: Map, ending: str) -> bytes:
     with TemporaryDirectory(prefix="pteron-surface-") as folder:
         made = Path(folder, f"surface{ending}")
         meshio.write(made, mesh, binary=True)
-        return made.read_bytes()
+        return write_bytes(target, made.read_bytes())
 
 
 def checked_surfaces() -> tuple[Any, Any]:

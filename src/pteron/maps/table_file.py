@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from math import prod
+from itertools import product, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -141,17 +141,10 @@ def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDA
     return grid, order
 
 
-def _first_missing(shape: tuple[int, ...], ranks: NDArray[np.int64]) -> list[int]:
+def _first_missing(shape: tuple[int, ...], ranks: NDArray[np.int64]) -> tuple[int, ...]:
     """Return the place in a grid of the first pose that sorted places (axes, N) lack."""
-    count = ranks.shape[1]
-    strides = [prod(shape[k + 1 :]) for k in range(len(shape))]
-    # A stride beyond all rows is as good as any: it may have more digits than an integer here.
-    numbers = np.arange(count)
-    sides = list(zip(strides, shape, strict=True))
-    expected = [numbers // min(stride, count + 1) % side for stride, side in sides]
-    wrong = (ranks != np.array(expected)).any(axis=0)
-    first = int(np.argmax(wrong)) if wrong.any() else count
-    return [first // stride % side for stride, side in sides]
+    places, known = product(*map(range, shape)), map(tuple, ranks.T.tolist())
+    return next(place for place, one in zip_longest(places, known) if place != one)
 
 
 def _axis(table: Table, name: str, values: Array) -> Axis:

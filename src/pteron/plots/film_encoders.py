@@ -77,7 +77,7 @@ class Mp4:
 
 
 class Gif:
-    """Frames in the commonest colours of the first one, in a file that starts again at its end."""
+    """Frames in the first one's colours, in a file that starts again at its end."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         self._path, self._delay = path, round(1000.0 / fps)
@@ -85,13 +85,10 @@ class Gif:
 
     def add(self, picture: Pixels) -> None:
         """Write one more frame."""
-        coarse = _coarse(picture)
-        if not self._frames:
-            self._palette = _commonest(coarse)
-            self._nearest = _nearest(self._palette)
-        image = Image.fromarray(self._nearest[coarse])
-        image.putpalette(self._palette.ravel().tolist())
-        self._frames.append(image)
+        image = Image.fromarray(picture)
+        # The colours that cover the first frame's best: its white stays white.
+        first = self._frames or [image.quantize(_PALETTE, Image.Quantize.MAXCOVERAGE)]
+        self._frames.append(image.quantize(palette=first[0], dither=Image.Dither.NONE))
 
     def close(self) -> None:
         """Finish the file."""
@@ -100,31 +97,6 @@ class Gif:
             first.save(
                 self._path, save_all=True, append_images=others, duration=self._delay, loop=0
             )
-
-
-def _coarse(picture: Pixels) -> NDArray[np.uint16]:
-    """Return each colour's number among those of 5, 6 and 5 bits."""
-    red, green, blue = (picture[..., k] >> bits for k, bits in enumerate((3, 2, 3)))
-    return np.asarray(red.astype(np.uint16) << 11 | green.astype(np.uint16) << 5 | blue)
-
-
-def _colors(numbers: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
-    """Return red, green and blue (K, 3) of colours of 5, 6 and 5 bits: white is white."""
-    parts = (numbers >> 11, 31), ((numbers >> 5) & 63, 63), (numbers & 31, 31)
-    return np.stack([np.round(255.0 * part / most) for part, most in parts], -1).astype(np.uint8)
-
-
-def _commonest(coarse: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    numbers, counts = np.unique(coarse, return_counts=True)
-    return _colors(numbers[np.argsort(-counts, kind="stable")[:_PALETTE]])
-
-
-def _nearest(palette: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the place in a palette of what is nearest to each colour of 5, 6 and 5 bits."""
-    from scipy.spatial import KDTree  # type: ignore[import-untyped]
-
-    every = _colors(np.arange(1 << 16))
-    return np.asarray(KDTree(palette.astype(float)).query(every.astype(float))[1], dtype=np.uint8)
 
 
 def _hundredths(fps: float) -> float:

@@ -86,13 +86,10 @@ class Handle:
 
         A platform that cannot turn as they are follows as nearly as it can.
         """
-        w, x, y, z = self._turner.wxyz
+        axes = axes_of(self._turner.wxyz)
         if self._robot.platform.tilts:
-            return pose_nearest_frame(self._robot.platform, self._pose, axes_of(self._turner.wxyz))
-        first = np.array(
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
-        )
-        angle = float(np.arctan2(self._frame[1] @ first, self._frame[0] @ first))
+            return pose_nearest_frame(self._robot.platform, self._pose, axes)
+        angle = float(np.arctan2(self._frame[1] @ axes[0], self._frame[0] @ axes[0]))
         pose, angular = self._pose.copy(), self._robot.platform.angular
         pose[angular] += (angle - pose[angular] + np.pi) % (2.0 * np.pi) - np.pi
         return pose

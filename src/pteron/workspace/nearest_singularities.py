@@ -18,11 +18,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, singular_orientations
-from pteron.kinematics.architecture import (
-    architecture,
-    is_singular_everywhere,
-    singular_everywhere,
-)
+from pteron.kinematics.architecture import architecture, expect_regular
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -127,8 +123,7 @@ def nearest_singularities(
     at = checked_one(robot, pose, "pose")
     if most < 1:
         raise DataError(f"most: {most} given, 1 box at least expected")
-    if is_singular_everywhere(robot):
-        raise singular_everywhere(robot)
+    expect_regular(robot)
     inverse_kinematics(robot, at)
     found: list[NearestSingularity] = []
     kinds: dict[By, tuple[str, ...]] = {

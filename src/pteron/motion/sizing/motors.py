@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
-from pydantic import BaseModel, ConfigDict
+from pydantic import create_model
 
+from pteron.bodies.tables import Number, Table
 from pteron.errors import DataError, UnlikelyValue
 from pteron.renamed import former_attribute
 from pteron.tables import read_table
@@ -91,22 +92,6 @@ class Motor:
         return tuple(found)
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class _MotorTable(_Strict):
-    name: str
-    rotor_inertia: float
-    rated_torque: float
-    peak_torque: float
-    max_speed: float
-
-
-class _MotorsFile(_Strict):
-    motors: list[_MotorTable]
-
-
 def read_motors(path: str | Path) -> tuple[Motor, ...]:
     """Return the motors that a file lists.
 
@@ -150,12 +135,20 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     return tuple(found)
 
 
+_NAMED: dict[str, Any] = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
+
+
+class _MotorsFile(Table):
+    motors: list[create_model("Motor", __base__=Table, **_NAMED)]  # type: ignore[valid-type]
+
+
 _Rows = list[tuple[str, dict[str, Any]]]
 
 
 def _from_toml(path: str | Path) -> _Rows:
-    document = read_toml(path, DataError, "no such file")
-    listed = validated(_MotorsFile, document, str(path), DataError)
+    listed = validated(
+        _MotorsFile, read_toml(path, DataError, "no such file"), str(path), DataError
+    )
     return [(str(path), motor.model_dump()) for motor in listed.motors]
 
 
