@@ -119,10 +119,7 @@ def _closing(found: BaseParameters, symbols: Symbols) -> list[str]:
     return [*lines, *found.certificate.summary().splitlines()]
 
 
-def table1(
-    *,
-    json: bool = False,
-) -> None:
+def table1(*, json: bool = False) -> None:
     """Print the paper's Table 1, as printed and as computed; exit with 1 if they disagree.
 
     Examples

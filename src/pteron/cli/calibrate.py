@@ -9,15 +9,7 @@ from rich.table import Table
 
 from pteron.cli.arguments import load_robot
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import (
-    GRADE_COLORS,
-    ascii_number,
-    plain,
-    show,
-    show_json,
-    table,
-    written,
-)
+from pteron.cli.terminal import GRADE_COLORS, ascii_number, plain, show, show_json, table, written
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

@@ -131,7 +131,7 @@ def _show(summary: Summary) -> None:
     front = summary.front
     show(
         f"[bold]{plain(front.task.robot.name)}[/bold]: {front.evaluated} designs evaluated, "
-        f"{front.kept} keep all that is asked, {len(front)} on the front",
+        f"{front.kept} keep all that is asked, {len(front)} on the front"
     )
     show(*(f"To begin with: {plain(line)}" for line in summary.start.proofs))
     numbers = ("to begin with", "now", "change")

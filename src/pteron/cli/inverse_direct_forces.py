@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import (
-    MOTION,
-    Failure,
-    load_robot,
-    parsed_numbers,
-)
+from pteron.cli.arguments import MOTION, Failure, load_robot, parsed_numbers
 from pteron.cli.table_rows import (
     Rows,
     check_destination,

@@ -30,10 +30,7 @@ _FAULTY = 2
 """Exit code for a faulty file."""
 
 
-def catalog(
-    *,
-    json: bool = False,
-) -> None:
+def catalog(*, json: bool = False) -> None:
     """List the machines that come with Pteron.
 
     Examples
@@ -152,12 +149,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
     }
 
 
-def check(
-    file: str,
-    *,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+def check(file: str, *, elbows: str | None = None, json: bool = False) -> None:
     """Check a machine's file and say what the machine is.
 
     It fails if the file is not valid, telling all its faults, if the machine is singular at every

@@ -7,11 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from typer import Exit
 
-from pteron.cli.arguments import (
-    STANDARD,
-    check_rate,
-    load_robot,
-)
+from pteron.cli.arguments import STANDARD, check_rate, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import spinner

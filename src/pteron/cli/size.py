@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING, Any
 import rich.table
 from typer import Exit
 
-from pteron.cli.arguments import (
-    STANDARD,
-    load_robot,
-)
+from pteron.cli.arguments import STANDARD, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import spinner
@@ -163,10 +160,7 @@ def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
     from pteron.plots import svg_file
     from pteron.report.drive_figures import force_speed, power
 
-    texts = {
-        "power.svg": svg_file(power(found)),
-        "force-speed.svg": svg_file(force_speed(found)),
-    }
+    texts = {"power.svg": svg_file(power(found)), "force-speed.svg": svg_file(force_speed(found))}
     return texts | ({"motors.csv": _fits_table(found, fits).write_csv()} if fits else {})
 
 

@@ -67,10 +67,7 @@ class Rows:
         return np.concatenate(parts)
 
     def _chunks(
-        self,
-        serve: Callable[[NDArray[Any]], NDArray[Any]],
-        values: NDArray[Any],
-        unlikely: str,
+        self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], unlikely: str
     ) -> Iterator[NDArray[Any]]:
         for start in range(0, len(values), CHUNK):
             try:

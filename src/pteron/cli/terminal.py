@@ -29,11 +29,7 @@ _ANY_WIDTH = 10_000
 """Columns of a table for a file or a pipe: wider than any screen."""
 
 
-GRADE_COLORS = {
-    "trustworthy": "green",
-    "usable with care": "yellow",
-    "not trustworthy": "red",
-}
+GRADE_COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trustworthy": "red"}
 """Colours of the grades of a verdict."""
 
 

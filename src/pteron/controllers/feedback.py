@@ -77,19 +77,6 @@ def pole_gains(bandwidth: Array, damping: Array, period: float) -> tuple[Array, 
     With u = k_p e + k_d e' held for a period T, e'' = -u gives at the samples the poles z_1 and z_2
     if k_p = (1 - z_1) (1 - z_2) / T^2 and k_d = (3 - z_1 - z_2 - z_1 z_2) / (2 T); z = exp(s T).
 
-    Parameters
-    ----------
-    bandwidth : array
-        rad/s.
-    damping : array
-        Without unit.
-    period : float
-        s.
-
-    Returns
-    -------
-    proportional, derivative : array
-
     Examples
     --------
     >>> import numpy as np

@@ -103,12 +103,7 @@ class Front:
 class Proofs:
     """The rows of designs that were proved, in place of those that a look at points gave.
 
-    Parameters
-    ----------
-    task : Task
-        The task of the search.
-    prove : callable
-        Values of designs (N, V) to their rows, each as far as it is proved.
+    `prove` takes values of designs (N, V), and returns their rows, each as far as it is proved.
     """
 
     def __init__(self, task: Task, prove: Callable[[list[list[float]]], pl.DataFrame]) -> None:
@@ -127,11 +122,6 @@ class Proofs:
         """Return the front of designs that come in parts, each design of it proved.
 
         Where a proof takes something from one, the front is another, and that is proved.
-
-        Raises
-        ------
-        ModelError
-            As `front_of_parts`.
         """
         while True:
             front = front_of_parts(self._task, map(self.applied, parts()))
@@ -149,13 +139,7 @@ class Proofs:
 
 
 def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
-    """Return the front of designs that come in parts, of which only the front so far is held.
-
-    Raises
-    ------
-    ModelError
-        If none of them keeps all that is asked; the message says what is missed by least, and how.
-    """
+    """Return the front of designs that come in parts, of which only the front so far is held."""
     import polars as pl
 
     best: pl.DataFrame | None = None

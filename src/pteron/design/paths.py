@@ -58,13 +58,7 @@ class Place:
 
 
 def places(robot: Manipulator, path: str) -> list[Place]:
-    """Return the numbers that a path names.
-
-    Raises
-    ------
-    ModelError
-        If the machine has none of that name; the message names those it has.
-    """
+    """Return the numbers that a path names."""
     found = _WRITTEN.fullmatch(path.strip())
     if found is None:
         raise ModelError(f"{shown(path)} is not {_SHAPE}")

@@ -157,13 +157,7 @@ def _worst(index: Index) -> Quantity:
 
 
 def known(name: str) -> str:
-    """Return the name of a quantity.
-
-    Raises
-    ------
-    ValueError
-        If there is none of that name; the message names those there are.
-    """
+    """Return the name of a quantity."""
     names = quantities()
     if name in names:
         return name

@@ -33,15 +33,6 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     machine alone are held to first order, those of its poses are not: the caller evaluates the
     design again. Where a proof of the workspace or the cube fails, the design is sought once more,
     with the counterexample among its conditions.
-
-    Parameters
-    ----------
-    task : Task
-        The search.
-    values : sequence of float
-        The variables' values, of a design that keeps what is asked.
-    objective : int
-        Index of the objective.
     """
     spec, start = task.spec, np.array(values)
     asked = spec.objectives[objective]

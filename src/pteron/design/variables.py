@@ -61,13 +61,7 @@ class Variable:
 
 
 def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[Variable, ...]:
-    """Return the variables of a search that begins with a machine.
-
-    Raises
-    ------
-    ModelError
-        With all that is wrong with them.
-    """
+    """Return the variables of a search that begins with a machine."""
     found: list[Variable] = []
     faults: list[str] = []
     for i, table in enumerate(tables, start=1):
@@ -113,21 +107,7 @@ def moved(
 ) -> Manipulator:
     """Return a machine with its variables at other values.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine to begin with.
-    variables : sequence of Variable
-        Its variables.
-    values : sequence of float
-        Theirs.
-    stretch : bool
-        Whether links of another length have another inertia.
-
-    Raises
-    ------
-    ModelError
-        If there can be no such machine.
+    `stretch` says whether links of another length have another inertia.
     """
     legs = list(robot.legs)
     changed: dict[int, dict[str, list[float]]] = {}

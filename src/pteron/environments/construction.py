@@ -36,15 +36,7 @@ def world_of(
     spread: float | None = None,
     tolerance: float = 0.005,
 ) -> World:
-    """Return the world of a machine, after checks.
-
-    Raises
-    ------
-    DataError
-        If a number is not above 0, or the motion cannot be followed.
-    ModelError
-        If there is no such machine, or it reaches no pose.
-    """
+    """Return the world of a machine, after checks."""
     machine = as_manipulator(robot)
     sizes = {"period": period, "tolerance": tolerance, "spread": spread}
     for name, value in sizes.items():

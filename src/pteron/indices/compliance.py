@@ -103,11 +103,7 @@ class Stiffness:
 
 
 def stiffness(
-    robot: RobotLike,
-    pose: PoseLike,
-    elasticity: Elasticity,
-    *,
-    on_failure: OnFailure = "raise",
+    robot: RobotLike, pose: PoseLike, elasticity: Elasticity, *, on_failure: OnFailure = "raise"
 ) -> Stiffness:
     """Return the stiffness at the tool from actuators and links that give way.
 

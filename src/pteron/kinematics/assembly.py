@@ -83,11 +83,6 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
     """Return all poses (..., most, m) of joint coordinates (..., n), NaN last.
 
     They are ordered by phi, z, y and x: the coordinates from the last to the first.
-
-    Raises
-    ------
-    SingularPose
-        If a platform that tilts can move with the joints held, so that poses cannot be listed.
     """
     shape = joints.shape[:-1]
     flat = joints.reshape(-1, joints.shape[-1])
@@ -216,10 +211,7 @@ def _points(
     root = np.sqrt(np.maximum(b * b - a * c, 0.0))
     far = -(b + np.copysign(root, b))
     lines = np.stack(
-        [
-            far[:, None] * first + a[:, None] * second,
-            c[:, None] * first + far[:, None] * second,
-        ],
+        [far[:, None] * first + a[:, None] * second, c[:, None] * first + far[:, None] * second],
         axis=1,
     )
     with np.errstate(all="ignore"):

@@ -39,14 +39,7 @@ def evaluated(
     base: Selects | None = None,
     wrench: bool = False,
 ) -> _Outputs:  # type: ignore[type-var]
-    """Return the outputs of a function of the table `kernels.functions.TABLE`, or its only one.
-
-    Raises
-    ------
-    DataError, UnreachablePose, SingularPose
-        Under ``on_failure="raise"``, for the first state, in memory order, that does not serve;
-        under ``"nan"`` such states give NaN.
-    """
+    """Return the outputs of a function of the table `kernels.functions.TABLE`, or its only one."""
     *results, status = numeric(robot, what, base=base, wrench=wrench).call(*values)
     good = status.item() if status.ndim == 0 else status.all()
     if not good or on_failure != "raise":

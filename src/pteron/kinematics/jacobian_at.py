@@ -30,15 +30,7 @@ class JacobianAtPose:
 
 
 def jacobian_at(robot: Manipulator, pose: Array) -> JacobianAtPose:
-    """Return the Jacobian at a pose (m,), and its condition number.
-
-    Raises
-    ------
-    UnreachablePose
-        If a leg does not reach the pose.
-    SingularPose
-        If a leg is stretched or folded (type I).
-    """
+    """Return the Jacobian at a pose (m,), and its condition number."""
     matrix = jacobian(robot, pose)
     found: tuple[Array, Array] = evaluated(robot, "homogeneous_jacobian", "raise", pose)
     plain, length = found

@@ -29,13 +29,7 @@ _DIGITS = 12
 
 
 def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
-    """Return the numbers of `equations.machine.numbers` in a prime field, or None if not known.
-
-    Raises
-    ------
-    NoSquareRoot
-        If a root does not exist modulo this prime.
-    """
+    """Return the numbers of `equations.machine.numbers` in a prime field, or None if not known."""
     found: list[int] = []
     for leg in robot.legs:
         units: list[list[int]] = []

@@ -29,11 +29,7 @@ from pteron.shapes import Matrices, OnFailure, PerCoordinate, PoseLike, Vectors
 RotationForm = Literal["matrix", "quaternion", "tilt-torsion"]
 """The forms in which a rotation is written."""
 
-_SHAPES: dict[str, tuple[int, ...]] = {
-    "matrix": (3, 3),
-    "quaternion": (4,),
-    "tilt-torsion": (3,),
-}
+_SHAPES: dict[str, tuple[int, ...]] = {"matrix": (3, 3), "quaternion": (4,), "tilt-torsion": (3,)}
 
 _ROUNDING = 1e-7
 """Difference, m, rad or their rates, up to which a position, rotation or twist that the platform

@@ -53,13 +53,7 @@ def drawn_poses(
     *,
     limits: bool = True,
 ) -> Array:
-    """Return poses (count, m) in reach, as `random_poses` does, also if all of them are singular.
-
-    Raises
-    ------
-    ModelError
-        If the legs have next to no common reach.
-    """
+    """Return poses (count, m) in reach, as `random_poses` does, also if all are singular."""
     low, high = _widest_box(robot)
     wanted = _Wanted(type_i, type_ii, limits)
     coarse = _led(robot, low, high, rng, wanted)

@@ -27,18 +27,8 @@ def unlikely_length(robot: Manipulator) -> float:
 def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -> tuple[str, ...]:
     """Return a line on each value of poses or joint coordinates that is likely in another unit.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    columns : sequence of str
-        Names of the values: ``x``, ``phi``, ``rho1``, ...; others are not looked at.
-    values : array, shape (..., len(columns))
-        m and rad.
-
-    Returns
-    -------
-    tuple of str
+    Values (..., C), m and rad, are those of the columns, such as ``x``, ``phi`` or ``rho1``;
+    columns of other names are not looked at.
     """
     length, limits = unlikely_length(robot), robot.platform.angle_limits
     # Angles of a platform that tilts repeat beyond half a turn.

@@ -74,13 +74,7 @@ def _loaded(data: bytes, source: str, given: str) -> Manipulator:
 
 
 def document(name_or_path: str | Path) -> dict[str, Any]:
-    """Return what the file of a machine holds, unchecked.
-
-    Raises
-    ------
-    ModelError
-        If there is no such file, or it is not TOML.
-    """
+    """Return what the file of a machine holds, unchecked."""
     return parsed_toml(*_contents(name_or_path), ModelError)
 
 

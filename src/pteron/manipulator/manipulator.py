@@ -13,14 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.bodies.vectors import (
-    PARALLEL_TOLERANCE,
-    Vector,
-    complement,
-    dot,
-    parallel,
-    vector,
-)
+from pteron.bodies.vectors import PARALLEL_TOLERANCE, Vector, complement, dot, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.protocol import breaches

@@ -51,13 +51,7 @@ def without_readings(robot: Manipulator) -> Manipulator:
 
 
 def refuse_readings(robot: Manipulator, writer: str) -> None:
-    """Refuse a machine with readings where what is written counts joint coordinates.
-
-    Raises
-    ------
-    ModelError
-        If it has some; `writer` is what is written, as a message calls it.
-    """
+    """Refuse a machine with readings where what is written counts joint coordinates."""
     if has_readings(robot):
         legs = [str(i) for i, leg in enumerate(robot.legs, start=1) if leg.reading is not None]
         raise ModelError(

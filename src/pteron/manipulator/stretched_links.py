@@ -16,16 +16,7 @@ from pteron.legs import LegKind
 def with_stretched_bodies(before: LegKind, after: LegKind) -> LegKind:
     """Return a leg with the inertia that its links have at their new lengths.
 
-    Parameters
-    ----------
-    before : leg
-        With the inertia that its links have at their old lengths.
-    after : leg
-        The same with other lengths, and still the old inertia.
-
-    Returns
-    -------
-    leg
+    `after` has the new lengths, and still the inertia of `before`.
     """
     bodies = dict(after.bodies)
     for letter, (_, low, high, _) in after.extents.items():

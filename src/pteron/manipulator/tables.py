@@ -108,8 +108,7 @@ class PlatformTable(PlanarBody, _Motion):
     """`[platform]`: its body's origin is P, its frame turns with phi."""
 
     slides: bool = Field(
-        False,
-        description="whether phi slides the platform points, m/rad, as an I4's nacelle does",
+        False, description="whether phi slides the platform points, m/rad, as an I4's nacelle does"
     )
     limits: Two | None = Field(
         None,

@@ -32,15 +32,8 @@ def written(
 ) -> str:
     """Return the text of a machine's file.
 
-    Parameters
-    ----------
-    document : mapping
-        The contents of the file; each leg has its `type`.
-    explained : bool
-        Whether it says of every key what it is, and names those that it has not, as comments; of
-        legs of one kind at the first.
-    about : sequence of str
-        Comments at its head.
+    `explained` says of every key what it is, and names those that it has not, as comments; of legs
+    of one kind at the first. `about` are comments at its head.
     """
     head = [*about, *([*_CONVENTIONS, _bodies()] if explained else [f"For Pteron. {_UNITS}"])]
     lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]

@@ -24,13 +24,7 @@ from pteron.maps.map import MARGIN
 def accelerated(
     robot: Manipulator, names: tuple[str, ...], grid: Grid, region: Region
 ) -> dict[str, Array]:
-    """Return the indices of a part of a grid, and `status`, computed by JAX where it runs.
-
-    Raises
-    ------
-    ModelError
-        If JAX is not installed.
-    """
+    """Return the indices of a part of a grid, and `status`, computed by JAX where it runs."""
     places = tuple(grid.coordinates.index(axis.name) for axis in grid.axes)
     function = _function(robot, names, places, grid.chunk)
     # A chunk at the grid's rim is filled up: another shape would be compiled anew.

@@ -38,13 +38,7 @@ def write_archive(given: Map, target: Path) -> Path:
 
 
 def read_archive(source: Path) -> Map:
-    """Return the map of an .npz file.
-
-    Raises
-    ------
-    DataError
-        If it is none, or not as it was written.
-    """
+    """Return the map of an .npz file."""
     try:
         arrays = _arrays(source)
         about = json.loads(str(arrays.pop(_ABOUT)))

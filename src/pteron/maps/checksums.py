@@ -14,17 +14,7 @@ from numpy.typing import NDArray
 def checksum(about: Any, arrays: Mapping[str, NDArray[Any]]) -> str:
     """Return the SHA-256 of plain data and arrays, their names, types and shapes among it.
 
-    Parameters
-    ----------
-    about : object
-        Plain data, as JSON has them.
-    arrays : mapping of str to array
-        Their order does not count, and a NaN is a NaN, whatever its bits.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits.
+    The order of the arrays does not count, and a NaN is a NaN, whatever its bits.
     """
     total = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for name, values in sorted(arrays.items()):

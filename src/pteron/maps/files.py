@@ -78,15 +78,7 @@ def load_map(path: str | Path) -> Map:
 
 
 def checked_map_file(path: str | Path) -> Path:
-    """Return a path after a check, before the work begins, that a map can be written there.
-
-    Raises
-    ------
-    OutputError
-        If its ending is unknown or its folder is missing.
-    ModelError
-        If a library is missing: the message names the extra.
-    """
+    """Return a path after a check, before the work begins, that a map can be written there."""
     target = Path(path)
     ending = target.suffix.lower()
     if ending not in _WRITERS:

@@ -24,18 +24,8 @@ _MANY = 2
 def expect_same(path: str | Path, found: Any, wanted: Mapping[str, Any]) -> None:
     """Refuse to resume a store whose plan differs.
 
-    Parameters
-    ----------
-    path : str or Path
-        The store.
-    found, wanted : mapping
-        Plans as plain JSON data: the store's, and that of the run. Texts that are TOML, as a
-        robot's is, are compared by their keys.
-
-    Raises
-    ------
-    OutputError
-        If they differ; the message says in what.
+    Plans are plain JSON data: the store's, and that of the run. Texts that are TOML, as a robot's
+    is, are compared by their keys.
     """
     if not isinstance(found, Mapping):
         raise OutputError(f"{path}: holds no plan of results; name another place, or remove it")

@@ -85,21 +85,7 @@ class MapStore:
     ) -> MapStore:
         """Return the store of a map of a machine of that name, made if it is not there.
 
-        Parameters
-        ----------
-        path : Path
-            Where the same map was begun, it goes on.
-        robot, grid, names
-            The machine's name, the poses and the indices.
-        plan : mapping
-            All else that the numbers depend on, as JSON has them.
-
-        Raises
-        ------
-        OutputError
-            If it is the store of another map, is damaged, or cannot be written.
-        ModelError
-            If Zarr is not installed.
+        Where the same map was begun, it goes on. The plan is all else that the numbers depend on.
         """
         wanted = {**plan, "index": list(names), "grid": grid.plain()}
         if not path.exists():
@@ -129,13 +115,7 @@ class MapStore:
         group[_CHECKSUM][number] = self._checksum(number, held)
 
     def map(self, robot: str, machine: str) -> Map:
-        """Return the map, read into memory.
-
-        Raises
-        ------
-        DataError
-            If a chunk is not there, or not as it was written.
-        """
+        """Return the map, read into memory."""
         regions = self.grid.regions()
         values = {name: np.empty(self.grid.shape, _dtype(name)) for name in self._arrays}
         missing = 0
@@ -174,13 +154,7 @@ class MapStore:
 
 
 def read_store(path: Path) -> Map:
-    """Return the map of a Zarr store.
-
-    Raises
-    ------
-    DataError
-        If it is none, not finished, or not as it was written.
-    """
+    """Return the map of a Zarr store."""
     found = _attributes(path)
     if "plan" not in found:
         raise DataError(f"{path}: is no map's store")
@@ -191,13 +165,7 @@ def read_store(path: Path) -> Map:
 
 
 def save_store(given: Map, path: Path) -> Path:
-    """Write a map to a Zarr store, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the store of another map is there, or it cannot be written.
-    """
+    """Write a map to a Zarr store, whole or not at all."""
     plan = {"robot": given.machine or given.robot, "saved": True}
     names = tuple(given.values)
     if path.exists():
@@ -257,13 +225,7 @@ def _seal(path: Path, attributes: Mapping[str, Any]) -> str:
 
 
 def _checked_seal(path: Path, attributes: Mapping[str, Any]) -> str:
-    """Return a store's seal after a check that what it was made of is as it was.
-
-    Raises
-    ------
-    DataError
-        If not.
-    """
+    """Return a store's seal after a check that what it was made of is as it was."""
     try:
         seal = _seal(path, attributes)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):

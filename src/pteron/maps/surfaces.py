@@ -145,13 +145,7 @@ def save_surfaces(given: Map, target: Path) -> Path:
 
 
 def checked_surfaces() -> tuple[Any, Any]:
-    """Return the modules that find surfaces and write their files.
-
-    Raises
-    ------
-    ModelError
-        If one is not installed.
-    """
+    """Return the modules that find surfaces and write their files."""
     try:
         import meshio
         from skimage import measure

@@ -45,14 +45,7 @@ def write_map_table(given: Map, target: Path) -> Path:
 
 
 def read_map_table(source: Path) -> Map:
-    """Return the map of a table.
-
-    Raises
-    ------
-    DataError
-        If it is none, its rows are not each pose of a grid once, or a Parquet file's checksum is
-        another one.
-    """
+    """Return the map of a table."""
     table = read_table(source)
     coordinates = {name: f"{name} [{at.unit}]" for name, at in COORDINATES.items()}
     wanted = {**coordinates, **{index.name: headed(index) for index in ALL.values()}}
@@ -74,13 +67,7 @@ def read_map_table(source: Path) -> Map:
 
 
 def _column(table: Table, name: str, heading: str) -> str:
-    """Return the column of a coordinate or an index; empty where there is none.
-
-    Raises
-    ------
-    DataError
-        If it is there twice, or in another unit.
-    """
+    """Return the column of a coordinate or an index; empty where there is none."""
     found = [one for one in table.columns if one.partition(" [")[0] == name]
     if len(found) > 1:
         raise DataError(f"{table.source}: columns {listed(found)} are all {name}; keep one")
@@ -103,13 +90,7 @@ def _whole(table: Table, legs: int) -> NDArray[np.int8]:
 
 
 def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDArray[np.int64]]:
-    """Return the grid of a table's poses (N, m), and its rows in the order of the grid.
-
-    Raises
-    ------
-    DataError
-        If they are not each pose of a grid, once.
-    """
+    """Return the grid of a table's poses (N, m), and its rows in the order of the grid."""
     axes: list[Axis] = []
     held: list[float] = []
     ranks = []

@@ -108,11 +108,7 @@ def differences_figure(
 
 
 def tool_errors_figure(
-    robot: RobotLike,
-    places: Array,
-    errors: Array,
-    *,
-    enlarge: float | None = None,
+    robot: RobotLike, places: Array, errors: Array, *, enlarge: float | None = None
 ) -> Figure:
     """Return the machine in its home pose with the tool's errors as lines, enlarged.
 
@@ -196,13 +192,7 @@ def enlargement(difference: float, size: float) -> float:
 
 
 def expect_alike(one: Manipulator, other: Manipulator) -> None:
-    """Check that two machines differ in numbers only.
-
-    Raises
-    ------
-    DataError
-        If they do not.
-    """
+    """Check that two machines differ in numbers only."""
     if [leg.type for leg in one.legs] != [leg.type for leg in other.legs] or (
         one.coordinates != other.coordinates
     ):

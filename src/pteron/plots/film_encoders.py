@@ -108,13 +108,7 @@ ENCODERS = {".mp4": Encoder(Mp4, float, np.inf), ".gif": Encoder(Gif, _hundredth
 
 
 def checked_encoder(path: Path) -> None:
-    """Refuse a file whose encoder is not there.
-
-    Raises
-    ------
-    PteronError
-        If it is not.
-    """
+    """Refuse a file whose encoder is not there."""
     if path.suffix.lower() == ".mp4":
         _ffmpeg()
 

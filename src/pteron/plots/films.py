@@ -204,15 +204,7 @@ def write_film(
 
 
 def checked_film(path: str | Path) -> Path:
-    """Return a path after a check, before the work begins, that a film can be written there.
-
-    Raises
-    ------
-    OutputError
-        If its ending is unknown, its folder is missing, or it is a folder.
-    PteronError
-        If what writes such files is not there.
-    """
+    """Return a path after a check, before the work begins, that a film can be written there."""
     target = checked_file(path, ", such as cycle.mp4")
     if target.suffix.lower() not in ENCODERS:
         raise OutputError(f"{path}: {target.suffix or 'no'} ending, .mp4 or .gif expected")

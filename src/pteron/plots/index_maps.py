@@ -173,12 +173,7 @@ def _height(plane: Map) -> float:
 
 
 def _plane(
-    figure: Figure,
-    axes: Axes,
-    plane: Map,
-    name: str,
-    scale: Normalize,
-    causes: Mapping[str, Any],
+    figure: Figure, axes: Axes, plane: Map, name: str, scale: Normalize, causes: Mapping[str, Any]
 ) -> None:
     """Draw an index over two coordinates."""
     axes.grid(visible=False)

@@ -32,13 +32,7 @@ def named(robot: RobotLike | None, values: ArrayLike, what: str) -> ArrayLike:
 def rows(
     time: ArrayLike, values: ArrayLike, what: str, columns: int | None = None
 ) -> tuple[Array, Array]:
-    """Return times (T,) and a row of values (T, n) for each, as arrays.
-
-    Raises
-    ------
-    DataError
-        If they do not fit together, or there are not so many columns.
-    """
+    """Return times (T,) and a row of values (T, n) for each, as arrays."""
     t, found = as_array(time, "time", ()), as_array(values, what, ())
     expected = "n" if columns is None else columns
     if t.ndim != 1 or not len(t):

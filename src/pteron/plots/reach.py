@@ -74,11 +74,7 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
 
 
 def measure_figure(
-    cut: ReachSlice,
-    measure: Array,
-    *,
-    path: Array | None = None,
-    levels: Sequence[float] = _TENTHS,
+    cut: ReachSlice, measure: Array, *, path: Array | None = None, levels: Sequence[float] = _TENTHS
 ) -> Figure:
     """Return the map of a measure (B, A) on a slice, where it is in reach.
 

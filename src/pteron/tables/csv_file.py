@@ -67,12 +67,7 @@ class CsvFile:
     """
 
     def __init__(
-        self,
-        data: Path | bytes,
-        source: str,
-        dialect: Dialect | None = None,
-        *,
-        block: int = BLOCK,
+        self, data: Path | bytes, source: str, dialect: Dialect | None = None, *, block: int = BLOCK
     ) -> None:
         self.source, self._data, self._block = source, data, block
         self._found = dialect is not None

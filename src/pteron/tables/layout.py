@@ -72,13 +72,7 @@ class Layout:
 
 
 def find_encoding(head: bytes, declared: str | None, source: str) -> str:
-    """Return the encoding of a text: as declared, as its mark says, UTF-8, or else cp1252.
-
-    Raises
-    ------
-    DataError
-        If it is no text, or UTF-16 without a mark.
-    """
+    """Return the encoding of a text: as declared, as its mark says, UTF-8, or else cp1252."""
     if declared is not None:
         return declared
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -99,21 +93,7 @@ def find_encoding(head: bytes, declared: str | None, source: str) -> str:
 def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> Layout:
     """Return the layout of a CSV file.
 
-    Parameters
-    ----------
-    head : bytes
-        The beginning of its text, in UTF-8.
-    declared : Dialect
-        The parts that are known.
-    encoding : str
-        From `find_encoding`.
-    source : str
-        Its name in messages.
-
-    Raises
-    ------
-    DataError
-        If it is empty, if no line names its columns, or if it could be read in two ways.
+    `head` is the beginning of its text, in UTF-8; `declared` are the parts that are known.
     """
     lines = io.BytesIO(head).readlines()
     text = [line.decode() for line in lines[:_LINES]]

@@ -38,11 +38,6 @@ def side_by_side(file: Path, encoding: str | None, source: str) -> bytes | None:
     """Return a file whose variables stand one below another as plain CSV, with the time in t.
 
     `encoding` is what was declared. None for any other file.
-
-    Raises
-    ------
-    DataError
-        If its variables have different times, or a time is no number.
     """
     with file.open("rb") as opened:
         head = opened.read(_HEAD)

@@ -48,19 +48,7 @@ def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Ar
 
     A target that is allowed is always come to.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    start, target : array, shape (m,)
-        The poses, m and rad.
-
-    Returns
-    -------
-    last : array, shape (m,)
-        The last pose that is allowed.
-    beyond : array, shape (m,), or None
-        One next to it that is not; None where nothing stops the platform.
+    With it comes a pose next to it that is not allowed; None where nothing stops the platform.
     """
     if bool(allowed(robot, target)):
         return target, None
@@ -77,21 +65,8 @@ def followed(
 ) -> tuple[Array, Array | None]:
     """Return the last pose in which the platform follows its joints on their straight path.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    pose : array, shape (m,)
-        Where it is, m and rad.
-    joints, target : array, shape (n,)
-        Where the joints are, and where they are to go, m or rad.
-
-    Returns
-    -------
-    last : array, shape (m,)
-        The last pose that is allowed.
-    beyond : array, shape (m,), or None
-        One next to it that is not, NaN where the assembly mode ends; None where nothing stops it.
+    The joints go from `joints` to `target`, (n,) each. With the pose comes one next to it that is
+    not allowed, NaN where the assembly mode ends; None where nothing stops it.
     """
     rounds = np.array([leg.goes_round for leg in robot.legs])
     turn = 2.0 * np.pi

@@ -37,15 +37,9 @@ def is_here(host: str) -> bool:
 def refusal(host: str, here: bool, hosts: list[str], origins: list[str]) -> str | None:
     """Return why a request is refused, None if it is not.
 
-    Parameters
-    ----------
-    host : str
-        The address that is served at.
-    here : bool
-        Whether only this machine can reach it. Then it is asked for by a name of this machine; a
-        wider one may have names that nobody here knows.
-    hosts, origins : list of str
-        The request's headers `Host` and `Origin`; programs that are no browsers send no `Origin`.
+    `hosts` and `origins` are the request's headers; programs that are no browsers send no `Origin`.
+    If only this machine can reach the address, it is asked for by a name of this machine; a wider
+    one may have names that nobody here knows.
     """
     if len(hosts) != 1 or len(origins) > 1:
         return "one Host and at most one Origin expected"

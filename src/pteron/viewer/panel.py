@@ -100,9 +100,7 @@ class Panel:
         )
         self._on(self._mode, "mode", lambda value: session.set_working_mode(self._modes[value]))
         self._assembly: Any = gui.add_dropdown(
-            "assembly mode",
-            (_NO_MODE,),
-            hint="Poses with the same joint coordinates: choose one",
+            "assembly mode", (_NO_MODE,), hint="Poses with the same joint coordinates: choose one"
         )
         self._on(self._assembly, "assembly", self._to_assembly)
         self._payload: Any = gui.add_text(

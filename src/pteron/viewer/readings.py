@@ -75,14 +75,7 @@ def readings(state: ViewerState) -> Readings:
     shares = np.abs(forces) / np.array([np.nan if force is None else force for force in most])
     at = pose_margins(robot, state.pose)
     return Readings(
-        state.joints,
-        forces,
-        shares,
-        condition,
-        at.type_i,
-        float(at.type_ii),
-        at.joints,
-        fault,
+        state.joints, forces, shares, condition, at.type_i, float(at.type_ii), at.joints, fault
     )
 
 

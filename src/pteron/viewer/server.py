@@ -34,21 +34,7 @@ _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 def serve(host: str, port: int, label: str) -> viser.ViserServer:
     """Return a running server.
 
-    Parameters
-    ----------
-    host : str
-        The address, or name, that it listens at.
-    port : int
-        The first port tried; 0 takes any that is free.
-    label : str
-        The title of its page.
-
-    Raises
-    ------
-    DataError
-        If the host is no address of this machine, or no port from the given one on is free.
-    ModelError
-        If viser is not installed, or is a version that cannot be closed to foreign pages.
+    `port` is the first that is tried, and 0 takes any that is free; `label` is the page's title.
     """
     package = of_extra("viewer", "viser", "the viewer needs viser")
     free = free_port(host, port)
@@ -76,13 +62,7 @@ def stop(server: viser.ViserServer) -> None:
 
 
 def free_port(host: str, port: int) -> int:
-    """Return the first free port of a host from a given one on; 0 means any.
-
-    Raises
-    ------
-    DataError
-        If the host is no address of this machine, there is no such port, or none is free.
-    """
+    """Return the first free port of a host from a given one on; 0 means any."""
     if not 0 <= port <= _LAST_PORT:
         raise DataError(
             f"port: {shown(port)} given, a whole number from 0 to {_LAST_PORT} expected"

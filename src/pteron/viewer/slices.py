@@ -44,21 +44,8 @@ def slice_meshes(
 ) -> list[tuple[Mesh, str]]:
     """Return the parts of a slice through a pose, each with its colour.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    pose : array, shape (m,)
-        The pose it goes through, whose orientation holds for all of it.
-    plane : {"xy", "xz", "yz"}
-        The two coordinates that vary.
-    span : array, shape (2, m)
-        Least and greatest of each coordinate.
-
-    Returns
-    -------
-    list of (mesh, color)
-        Where poses serve, and where only a joint's limit forbids them.
+    They are where poses serve, and where only a joint's limit forbids them, within the least and
+    the greatest of each coordinate (2, m).
     """
     cut, found = _slice(robot, pose, plane, span), []
     for status, color in ((REACHABLE, SERVES), (BEYOND_LIMITS, BEYOND)):

@@ -59,15 +59,7 @@ class ViewerState:
 
 
 def at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
-    """Return a machine at rest in a pose, by default its home pose.
-
-    Raises
-    ------
-    ModelError
-        If it reaches no pose.
-    SingularPose
-        If it is singular at every pose.
-    """
+    """Return a machine at rest in a pose, by default its home pose."""
     found = home_pose(robot) if pose is None else pose
     return ViewerState(robot, found, np.zeros_like(found), np.zeros_like(found))
 
@@ -157,11 +149,6 @@ def carrying(state: ViewerState, text: str) -> ViewerState:
 
 def typed_pose(robot: Manipulator, text: str) -> Array:
     """Return a pose that is typed in the units of its coordinates, mm or degrees.
-
-    Raises
-    ------
-    DataError
-        If it has not as many numbers as the machine's poses, or what is no number.
 
     Examples
     --------

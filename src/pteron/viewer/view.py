@@ -371,13 +371,7 @@ def _compared(
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """Return the bytes of a file.
-
-    Raises
-    ------
-    DataError
-        If it cannot be read.
-    """
+    """Return the bytes of a file."""
     try:
         return Path(path).read_bytes()
     except OSError as error:

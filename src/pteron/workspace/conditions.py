@@ -153,17 +153,7 @@ def keeps(robot: Manipulator, given: Sequence[Condition], poses: Array) -> NDArr
 class IntervalTest:
     """Interval tests of boxes of poses, condition by condition.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    given : sequence of Condition
-        At most 64.
-
-    Raises
-    ------
-    DataError
-        If there are more, or none.
+    They are 64 at most.
     """
 
     def __init__(self, robot: Manipulator, given: Sequence[Condition]) -> None:
@@ -181,19 +171,9 @@ class IntervalTest:
     ) -> tuple[NDArray[np.bool_], NDArray[np.uint64]]:
         """Return which boxes lie outside, and which conditions are still open, as bits.
 
-        Parameters
-        ----------
-        low, high : array, shape (B, m)
-            The boxes' corners.
-        open_ : array of uint64, shape (B,)
-            Bit c says that condition c is not proved yet; of the others nothing is asked.
-
-        Returns
-        -------
-        outside : array of bool, shape (B,)
-            Whether a condition is proved to fail in all of the box.
-        open_ : array of uint64, shape (B,)
-            The conditions not proved in a box; 0: it lies inside. Not tested further where outside.
+        Boxes have corners (B, m); bit c of `open_` (B,) says that condition c is not proved in all
+        of a box, which lies inside where no bit is set. A condition that is proved is not asked,
+        and none is any more of a box that lies outside.
         """
         outside, open_ = np.zeros(len(low), bool), open_.copy()
         for c, condition in enumerate(self.given):

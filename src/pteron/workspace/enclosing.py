@@ -21,19 +21,8 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array, *, limits: bool =
     Each leg keeps its platform point within R_j of a point, or of its guide's line: |A_j (P - p_j)|
     <= R_j. So sum |A_j (P - p_j)|^2 <= sum R_j^2, an ellipsoid, whose box is known in closed form.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    low, high : array, shape (m,)
-        Two poses, of which the angles count.
-    limits : bool
-        Whether poses beyond the limits of a joint may be left out.
-
-    Raises
-    ------
-    ModelError
-        If the reach has no end.
+    Of the two poses (m,) the angles count. Without `limits` no pose beyond a joint's limits is left
+    out.
     """
     directions = robot.platform.directions
     size = len(directions)

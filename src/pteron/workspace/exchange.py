@@ -150,17 +150,8 @@ def improved(program: Program, samples: Samples, dense: Samples) -> Array:
     Each round goes towards the solution of a program with few conditions as far as all of them are
     kept, so that what it has reached can always be used.
 
-    Parameters
-    ----------
-    program : Program
-        The program.
-    samples, dense : Samples
-        Points at which conditions are asked at first, and at which the solution is tested.
-
-    Returns
-    -------
-    array, shape (V + k + 1,)
-        The start, where that does not keep the conditions itself.
+    Conditions are asked at `samples` at first, and the solution is tested at `dense`. It is the
+    start where that does not keep the conditions itself.
     """
     everywhere, good = samples.joined(dense), program.start
     if not program.keeps(everywhere, good):

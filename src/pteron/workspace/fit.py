@@ -133,19 +133,10 @@ def proved_fit(
 ) -> tuple[Fit, tuple[Proof, ...]] | None:
     """Return the largest fit that is found and proved, with its proofs; None where there is none.
 
-    Parameters
-    ----------
-    search : callable
-        Takes poses (F, m) that fail, returns the largest fit that holds none of them.
-    prove : callable
-        Takes a fit, returns its proofs: the last one does not hold, or all do.
-    shape : Shape
-        The shape.
-    shares : iterable of float
-        Shares of the edge that was found, the largest first: at all of it a condition is zero
-        somewhere, and undecided.
-    freedom : int
-        Size m of a pose.
+    `search` takes poses (F, m) that fail, and returns the largest fit that holds none of them;
+    `prove` takes a fit and returns its proofs, of which the last one does not hold, or all do.
+    Shares of the edge that was found are tried, the largest first: at all of it a condition is zero
+    somewhere, and undecided. `freedom` is the size of a pose.
     """
     failing = np.empty((0, freedom))
     fit = search(failing)

@@ -34,14 +34,9 @@ def failing_between(
 ) -> Array:
     """Return positions (H, k) between the points of a lattice where a condition's row is below 0.
 
-    Parameters
-    ----------
-    slopes : callable
-        Takes positions (N, k), returns rows (N, R) and their slopes (N, R, k).
-    axes : sequence of array
-        The lattice's coordinates along x, y, ..., evenly spaced.
-    rows : array, shape (n1, ..., nk, R)
-        The conditions at its points.
+    `slopes` takes positions (N, k) and returns rows (N, R) and their slopes (N, R, k); `axes` are
+    the lattice's coordinates, evenly spaced, and `rows` (n1, ..., nk, R) the conditions at its
+    points.
     """
     count = len(axes)
     size = (3,) * count + (1,)

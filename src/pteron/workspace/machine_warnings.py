@@ -42,15 +42,7 @@ _PULL = 30.0
 def machine_warnings(robot: Manipulator) -> tuple[str, ...]:
     """Return warnings about a machine's file, one line each.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-
-    Returns
-    -------
-    tuple of str
-        Each begins with the place: ``leg 2: lower: center_of_mass: ...``.
+    Each begins with the place: ``leg 2: lower: center_of_mass: ...``.
 
     Examples
     --------

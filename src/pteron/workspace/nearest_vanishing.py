@@ -82,16 +82,7 @@ class Nearest(NamedTuple):
 class Search:
     """A search about a pose, in some of its coordinates.
 
-    Parameters
-    ----------
-    vanishing : Vanishing
-        The function.
-    at : array, shape (m,)
-        The pose.
-    moving : array of int, shape (k,)
-        The coordinates that vary: metres, or one angle.
-    box : array, shape (2, k)
-        The region of the search.
+    Coordinates `moving` (k,) of the pose vary, metres or angles, within a box (2, k).
     """
 
     def __init__(

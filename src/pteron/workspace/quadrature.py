@@ -107,11 +107,7 @@ def _sum(
 
 
 def _lengths(
-    robot: Manipulator,
-    asked: tuple[Condition, ...],
-    at: Array,
-    ends: Array,
-    places: Array,
+    robot: Manipulator, asked: tuple[Condition, ...], at: Array, ends: Array, places: Array
 ) -> Array:
     """Return how much (L,) of lines along x between ends (2,), at places (L, k - 1), is inside."""
 

@@ -20,15 +20,7 @@ from pteron.workspace.conditions import Condition, conditions
 
 
 class SmoothConditions:
-    """The conditions as rows, for a topology: all machines that differ in their geometry alone.
-
-    Parameters
-    ----------
-    robot : Manipulator
-        One of the machines.
-    given : tuple of Condition
-        The conditions on a pose.
-    """
+    """The conditions as rows, for a topology: all machines that differ in their geometry alone."""
 
     def __init__(self, robot: Manipulator, given: tuple[Condition, ...]) -> None:
         self.sides = (1.0, -1.0) if any(condition.sized for condition in given) else (1.0,)

@@ -42,21 +42,7 @@ NONE = Span(math.inf, 0.0)
 def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tuple[float, float]:
     """Return the torque that a motor would have over the cycle: root mean square and peak.
 
-    Parameters
-    ----------
-    sizing : Sizing
-        What the cycle asks of the joints.
-    leg : int
-        From 1.
-    ratio : float
-        rad/m or rad/rad, above 0.
-    rotor_inertia : float
-        J, kg m^2.
-
-    Returns
-    -------
-    rms, peak : float
-        N m.
+    N m, at a ratio in rad/m or rad/rad, of a motor with this inertia of its rotor, kg m^2.
     """
     force, mixed, acceleration = sizing.squares(leg)
     square = force / ratio**2 + 2.0 * rotor_inertia * mixed

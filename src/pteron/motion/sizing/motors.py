@@ -135,20 +135,20 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     return tuple(found)
 
 
-_NAMED: dict[str, Any] = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
+_NAMED: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
+_MotorTable: Any = create_model("_MotorTable", __base__=Table, **_NAMED)
 
 
 class _MotorsFile(Table):
-    motors: list[create_model("Motor", __base__=Table, **_NAMED)]  # type: ignore[valid-type]
+    motors: list[_MotorTable]
 
 
 _Rows = list[tuple[str, dict[str, Any]]]
 
 
 def _from_toml(path: str | Path) -> _Rows:
-    listed = validated(
-        _MotorsFile, read_toml(path, DataError, "no such file"), str(path), DataError
-    )
+    document = read_toml(path, DataError, "no such file")
+    listed = validated(_MotorsFile, document, str(path), DataError)
     return [(str(path), motor.model_dump()) for motor in listed.motors]
 
 

@@ -39,17 +39,7 @@ def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
     s = 10 t^3 - 15 t^4 + 6 t^5 with t = (tau - begin) / (end - begin): velocity and acceleration
     are zero at both ends, so that it joins rest without a jump of either.
 
-    Parameters
-    ----------
-    tau : array
-        Time, in any unit.
-    begin, end : float
-        When the move starts and ends, in the same unit.
-
-    Returns
-    -------
-    s, ds, dds : array
-        With the shape of `tau`; per unit of time, and per unit squared.
+    Derivatives are by the unit of `tau`, `begin` and `end`.
 
     Examples
     --------

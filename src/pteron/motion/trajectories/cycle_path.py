@@ -19,10 +19,7 @@ _NODES = 2001
 class CyclePath:
     """The path of a pick-and-place cycle from one end to the other, as a function of its length.
 
-    Parameters
-    ----------
-    cycle : Cycle
-        The cycle in time, whose first half is the path out.
+    It is the first half of the cycle in time.
     """
 
     def __init__(self, cycle: Cycle) -> None:

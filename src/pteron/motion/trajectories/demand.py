@@ -144,11 +144,6 @@ def most_rate(
     """Return the largest constant p', `most` at most, at which a curve keeps the limits.
 
     Infinite where it meets none.
-
-    Raises
-    ------
-    ModelError
-        If the drives cannot even hold the machine, or creep, at one of the poses (K, m).
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = [

@@ -201,13 +201,7 @@ def _rounded(
 
 
 class BackPath:
-    """A path, and the same path back.
-
-    Parameters
-    ----------
-    out : Path
-        The path out.
-    """
+    """A path, and the same path back."""
 
     def __init__(self, out: Path) -> None:
         self._out = out

@@ -80,15 +80,7 @@ def in_time(
     limits: MotionLimits,
     step: float = STEP,
 ) -> Motion:
-    """Return a curve of poses, gone as it is, in a duration, s, or the shortest.
-
-    Raises
-    ------
-    DataError
-        If the duration is too short for the limits, or neither it nor a limit is given.
-    ModelError
-        If the drives cannot hold the machine somewhere on the curve.
-    """
+    """Return a curve of poses, gone as it is, in a duration, s, or the shortest."""
     if duration is None:
         return shortest(robot, curve, limits, step)
     course = Timed(curve, _expect_time("duration", duration))
@@ -233,21 +225,7 @@ def kept_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: f
 def sampled(states: Callable[[Array], Curve], duration: float, step: float = STEP) -> Motion:
     """Return a motion's samples from its beginning to its end, evenly and at most a step apart.
 
-    Parameters
-    ----------
-    states : callable
-        From times (T,), s, to pose, velocity and acceleration, (T, m) each.
-    duration, step : float
-        s.
-
-    Returns
-    -------
-    Motion
-
-    Raises
-    ------
-    DataError
-        If a time is not above 0, or the samples are too many.
+    `states` takes times (T,), s, and returns pose, velocity and acceleration, (T, m) each.
     """
     count = _expect_time("duration", duration) / _expect_time("step", step)
     if count > _MOST:

@@ -27,11 +27,6 @@ def polynomial(law: PolynomialLaw) -> Progress:
     The quintic, 10 t^3 - 15 t^4 + 6 t^5, has two such derivatives; the seventh degree's, 35 t^4 -
     84 t^5 + 70 t^6 - 20 t^7, has three: the jerk begins and ends at zero too.
 
-    Raises
-    ------
-    DataError
-        If there is no such law.
-
     Examples
     --------
     >>> import numpy as np
