@@ -5,18 +5,9 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pteron.design.spec import Spec, WorkspaceTable
+from pteron.design.spec import WorkspaceTable
 from pteron.kernels import Array
-
-
-def orientations_of(spec: Spec, angular: NDArray[np.bool_]) -> Array:
-    """Return poses (A, m) whose angles are those that the search asks for."""
-    pose = np.zeros(len(angular)) if spec.pose is None else np.array(spec.pose)
-    if spec.angles is None:
-        return pose[None]
-    return np.where(angular, np.array(spec.angles)[:, None], pose)
 
 
 def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | None = None) -> Array:

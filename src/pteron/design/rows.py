@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.design.design import Design
+from pteron.design.evolution import one_thread
 from pteron.design.proofs import proved
 from pteron.design.task import Task
 from pteron.errors import ModelError
-from pteron.kernels import Array
+
+if TYPE_CHECKING:
+    import polars as pl
 
 MISSES = "misses "
 """Prefix of the columns with the amounts by which requirements are missed."""
@@ -41,8 +48,12 @@ def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> d
     return found | misses
 
 
-def columns(task: Task, values: Array, *, proofs: bool = False) -> dict[str, list[float]]:
-    """Return the columns of a table of designs (N, V): variables, then quantities and misses."""
-    rows = [evaluated(task, row, proofs=proofs) for row in values.tolist()]
+def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.DataFrame:
+    """Return a table of designs (N, V), a row each: variables, then quantities and misses."""
+    import polars as pl
+
+    values = np.asarray(designs)
+    with one_thread():
+        rows = [evaluated(task, row, proofs=proofs) for row in values.tolist()]
     found = {v.name: values[:, k].tolist() for k, v in enumerate(task.variables)}
-    return found | {name: [row[name] for row in rows] for name in rows[0]}
+    return pl.DataFrame(found | {name: [row[name] for row in rows] for name in rows[0]})

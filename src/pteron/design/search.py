@@ -8,25 +8,25 @@ and goes on: it ends in the same front as a run that was not interrupted.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pteron.design.evolution import Evolution, one_thread
 from pteron.design.front import Front, Proofs
 from pteron.design.refine import refined
-from pteron.design.rows import FAILED, MISSES, columns
+from pteron.design.rows import FAILED, MISSES, design_table
 from pteron.design.spec import Spec
 from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
-from pteron.extras import of_extra
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
+from pteron.maps.sweep import local_workers
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -83,8 +83,14 @@ def search(
     if seed is not None:
         spec = spec.with_seed(seed)
     task = Task.of(spec)
-    with _place(folder) as kept, _workers(workers, scheduler) as address:
-        return _generations(task, kept, address, progress)
+    if workers is not None and scheduler is not None:
+        raise DataError("workers and scheduler given; a scheduler has its own workers: give one")
+    with ExitStack() as opened:
+        kept = folder or opened.enter_context(TemporaryDirectory(prefix="pteron-design-"))
+        if workers is not None:
+            # One cluster for all generations: a process compiles what it needs once.
+            scheduler = str(opened.enter_context(local_workers(workers)).scheduler_address)
+        return _generations(task, Path(kept), scheduler, progress)
 
 
 def _generations(
@@ -142,16 +148,9 @@ def swept_proofs(
     digest = _digest(np.array(designs))
     store = TableStore(folder / f"proofs-{digest}", {**task.plan, "designs": digest})
     chunks = [designs[k : k + _CHUNK] for k in range(0, len(designs), _CHUNK)]
-    sweep(partial(rows_with_proofs, task), chunks, store, scheduler=scheduler, workers=workers)
+    prove = partial(design_table, task, proofs=True)
+    sweep(prove, chunks, store, scheduler=scheduler, workers=workers)
     return store.scan().collect()
-
-
-def rows_with_proofs(task: Task, designs: list[list[float]]) -> pl.DataFrame:
-    """Return the rows of designs, as far as they are proved."""
-    import polars as pl
-
-    with one_thread():
-        return pl.DataFrame(columns(task, np.array(designs), proofs=True))
 
 
 def first_designs(task: Task, count: int, seed: int) -> Array:
@@ -166,11 +165,9 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
 
 def worked(task: Task, jobs: list[tuple[list[float], int]]) -> pl.DataFrame:
     """Return the rows of designs; one whose number is an objective is improved in it first."""
-    import polars as pl
-
     with one_thread():
         designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
-        return pl.DataFrame(columns(task, np.array(designs)))
+    return design_table(task, designs)
 
 
 def _promising(
@@ -202,27 +199,3 @@ def _costs(task: Task, found: pl.DataFrame) -> tuple[Array, Array]:
 
 def _digest(designs: Array) -> str:
     return hashlib.sha256(np.ascontiguousarray(designs).tobytes()).hexdigest()[:16]
-
-
-@contextmanager
-def _place(folder: str | Path | None) -> Iterator[Path]:
-    if folder is not None:
-        yield Path(folder)
-        return
-    with TemporaryDirectory(prefix="pteron-design-") as temporary:
-        yield Path(temporary)
-
-
-@contextmanager
-def _workers(count: int | None, scheduler: str | None) -> Iterator[str | None]:
-    """Yield the address of a scheduler; of one with workers of this computer where asked for."""
-    if count is not None and scheduler is not None:
-        raise DataError("workers and scheduler given; a scheduler has its own workers: give one")
-    if count is None:
-        yield scheduler
-        return
-    # One for all generations: a process compiles what it needs once.
-    options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
-    local = of_extra("cluster", "distributed", "other processes need dask.distributed")
-    with local.LocalCluster(n_workers=count, silence_logs=50, **options) as cluster:
-        yield str(cluster.scheduler_address)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import qmc  # type: ignore[import-untyped]
 
-from pteron.design.evolution import one_thread
 from pteron.design.front import Front, Proofs
-from pteron.design.rows import columns
+from pteron.design.rows import design_table
 from pteron.design.search import swept_proofs
 from pteron.design.spec import Spec
 from pteron.design.task import Task
@@ -74,9 +73,9 @@ def survey(
         raise DataError(f"count: {count} given, 1 or more expected")
     task = Task.of(spec)
     store = TableStore(folder, {**task.plan, "survey": _CHUNK})
-    chunks = _Chunks(count)
+    chunks = range(0, count, _CHUNK)
     sweep(
-        partial(surveyed, task),
+        partial(_surveyed, task),
         chunks,
         store,
         scheduler=scheduler,
@@ -84,31 +83,12 @@ def survey(
         progress=progress,
     )
     proofs = Proofs(task, partial(swept_proofs, task, Path(folder), scheduler, workers=workers))
-    return proofs.front(lambda: _parts(store, len(chunks)))
+    return proofs.front(lambda: _parts(store, chunks))
 
 
-class _Chunks(Sequence[tuple[int, int]]):
-    """First designs and numbers of designs of the chunks, worked out when they are asked for."""
-
-    def __init__(self, designs: int) -> None:
-        self._length = -(-designs // _CHUNK)
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __getitem__(self, k: object) -> tuple[int, int]:  # type: ignore[override]
-        assert isinstance(k, int)  # a sweep asks for one at a time
-        if not 0 <= k < len(self):
-            raise IndexError(k)
-        return k * _CHUNK, _CHUNK
-
-
-def surveyed(task: Task, chunk: tuple[int, int]) -> pl.DataFrame:
-    """Return the rows of one chunk of designs."""
-    import polars as pl
-
-    with one_thread():
-        return pl.DataFrame(columns(task, survey_designs(task, *chunk)))
+def _surveyed(task: Task, first: int) -> pl.DataFrame:
+    """Return the rows of the chunk of designs that begins with number `first`."""
+    return design_table(task, survey_designs(task, first, _CHUNK))
 
 
 def survey_designs(task: Task, first: int, count: int) -> Array:
@@ -121,7 +101,6 @@ def survey_designs(task: Task, first: int, count: int) -> Array:
     return np.asarray(low + (sequence.random(count) + shift) % 1.0 * (high - low))
 
 
-def _parts(store: TableStore, count: int) -> Iterable[pl.DataFrame]:
+def _parts(store: TableStore, chunks: range) -> Iterable[pl.DataFrame]:
     whole = store.scan()
-    for k in range(count):
-        yield whole.slice(k * _CHUNK, _CHUNK).collect()
+    return (whole.slice(first, _CHUNK).collect() for first in chunks)

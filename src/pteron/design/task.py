@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pteron.design.quantities import quantities
-from pteron.design.region import orientations_of, workspace_poses
+from pteron.design.region import workspace_poses
 from pteron.design.spec import Spec
 from pteron.design.variables import Variable, moved, variables_of
 from pteron.errors import DataError, ModelError
@@ -91,7 +91,11 @@ class Task:
     @cached_property
     def orientations(self) -> Array:
         """Poses (A, m) whose angles are those that the search asks for."""
-        return orientations_of(self.spec, self.robot.platform.angular)
+        spec, angular = self.spec, self.robot.platform.angular
+        pose = np.zeros(len(angular)) if spec.pose is None else np.array(spec.pose)
+        if spec.angles is None:
+            return pose[None]
+        return np.where(angular, np.array(spec.angles)[:, None], pose)
 
     @property
     def asked(self) -> tuple[str, ...]:

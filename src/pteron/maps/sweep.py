@@ -230,22 +230,23 @@ def _quiet() -> Iterator[None]:
             logger.setLevel(level)
 
 
+def local_workers(count: int | None) -> Any:
+    """Return a cluster of processes of this computer."""
+    # One thread each: its kernels then share no lock with another's.
+    return _distributed().LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        dashboard_address=None,
+        silence_logs=logging.CRITICAL,
+    )
+
+
 @contextmanager
 def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """Yield a client of a cluster that answers and has Pteron as it is here."""
     distributed = _distributed()
     with ExitStack() as opened:
-        if scheduler is None:
-            # One thread each: its kernels then share no lock with another's.
-            cluster = distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-            )
-            address = opened.enter_context(cluster)
-        else:
-            address = scheduler
+        address = scheduler or opened.enter_context(local_workers(workers))
         limit = _START if scheduler is None else _WAIT
         try:
             client = opened.enter_context(distributed.Client(address, timeout=limit))
