@@ -77,7 +77,11 @@ FONT_SIZE = 9.0
 SMALL = 0.6
 """Width of lines in small pictures of a machine, over that in large ones."""
 
-_NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+"""What an SVG file does not tell."""
+
+TEXT: Any = {"svg.fonttype": "none", "svg.hashsalt": "pteron", "pdf.fonttype": 42}
+"""Settings with which text stays text, and files are the same in each run."""
 
 _NOTEBOOK_DPI = 144
 """Dots an inch of a picture in a notebook, which shows it at 96."""
@@ -130,9 +134,9 @@ def blank(width: float, height: float) -> Figure:
     return figure
 
 
-def plain_axes(figure: Figure, xlabel: str, ylabel: str) -> Axes:
-    """Return axes with a light grid and no frame but the two scales."""
-    axes = figure.add_subplot()
+def plain_axes(figure: Figure, xlabel: str, ylabel: str, place: Any = None) -> Axes:
+    """Return axes with a light grid and no frame but the two scales, at a place of a grid."""
+    axes = figure.add_subplot(place or 111)
     axes.patch.set_alpha(0.0)
     axes.set_xlabel(xlabel, fontsize=FONT_SIZE, color=INK)
     axes.set_ylabel(ylabel, fontsize=FONT_SIZE, color=INK)
@@ -149,31 +153,25 @@ def stack(
     figure: Figure, xlabel: str, ylabels: list[str], ratios: list[float] | None = None
 ) -> list[Axes]:
     """Return axes one above the other, which share the lowest one's scale along x."""
-    grid = GridSpec(len(ylabels), 1, figure=figure, height_ratios=ratios)
-    found = [plain_axes(figure, "", ylabel) for ylabel in ylabels]
-    for i, axes in enumerate(found):
-        axes.set_subplotspec(grid[i])
-    found[-1].set_xlabel(xlabel)
-    for axes in found[:-1]:
-        axes.sharex(found[-1])
-        axes.tick_params(labelbottom=False)
-    return found
+    return [row[0] for row in panels(figure, xlabel, [[label] for label in ylabels], ratios)]
 
 
-def panels(figure: Figure, xlabel: str, ylabels: list[list[str]]) -> list[list[Axes]]:
+def panels(
+    figure: Figure, xlabel: str, ylabels: list[list[str]], ratios: list[float] | None = None
+) -> list[list[Axes]]:
     """Return rows of axes beside each other, all over one scale along x, named below the last."""
     rows, columns = len(ylabels), len(ylabels[0])
-    grid = GridSpec(rows, columns, figure=figure)
-    found = [[plain_axes(figure, "", label) for label in row] for row in ylabels]
-    for i, row in enumerate(found):
-        for j, axes in enumerate(row):
-            axes.set_subplotspec(grid[i, j])
-            axes.sharex(found[-1][j])
-            axes.tick_params(labelbottom=i == rows - 1)
+    grid = GridSpec(rows, columns, figure=figure, height_ratios=ratios)
+    found = [
+        [plain_axes(figure, "", label, grid[i, j]) for j, label in enumerate(row)]
+        for i, row in enumerate(ylabels)
+    ]
+    for row in found[:-1]:
+        for axes, lowest in zip(row, found[-1], strict=True):
+            axes.sharex(lowest)
+            axes.tick_params(labelbottom=False)
     for axes in found[-1]:
         axes.set_xlabel(xlabel)
-    for one in zip(*found, strict=True):
-        figure.align_ylabels(one)
     return found
 
 
@@ -311,6 +309,6 @@ def svg_file(figure: Figure) -> str:
 
 def _drawn(figure: Figure, **look: Any) -> str:
     buffer = StringIO()
-    with mpl.rc_context({"svg.hashsalt": "pteron", "svg.fonttype": "none"}):
-        figure.savefig(buffer, format="svg", metadata=_NO_METADATA, **look)
+    with mpl.rc_context(TEXT):
+        figure.savefig(buffer, format="svg", metadata=NO_METADATA, **look)
     return buffer.getvalue()

@@ -32,6 +32,7 @@ from pteron.plots.canvas import (
     spot,
     zero_line,
 )
+from pteron.plots.row_figures import row_axes
 
 _CERTAIN = 1.96
 """Standard deviations from zero beyond which a value is not zero, at 95 %."""
@@ -107,8 +108,7 @@ def certainty_figure(
     """
     p = len(names)
     figure = blank(5.4, 0.7 + 0.185 * p)
-    axes = plain_axes(figure, "size of the value over its standard deviation", "")
-    axes.grid(visible=False, axis="y")
+    axes = row_axes(figure, names, "size of the value over its standard deviation")
     finite = ratios[np.isfinite(ratios)]
     high = 10.0 ** np.ceil(np.log10(max(float(finite.max(initial=1.0)), 100.0)))
     axes.axvspan(0.1, _CERTAIN, color=GRID, alpha=0.6, linewidth=0.0, zorder=0.4)
@@ -120,12 +120,10 @@ def certainty_figure(
         spot(axes, ratio, y, color, PAPER, 5.5, marker=marker, markeredgewidth=0.6)
     axes.axvline(_CERTAIN, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
     axes.set_xscale("log")
-    axes.set_xlim(0.1, high)
-    axes.set_ylim(-0.8, p - 0.2)
+    axes.set(xlim=(0.1, high), ylim=(-0.8, p - 0.2))
     ticks = 10.0 ** np.arange(-1, int(np.log10(high)) + 1)
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
-    axes.set_yticks(range(p), list(reversed(names)), fontsize=FONT_SIZE - 1.0)
     return figure
 
 

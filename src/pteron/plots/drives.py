@@ -84,8 +84,8 @@ def force_speed_figure(
     figure = blank(5.4, 3.4 * len(groups))
     for k, ((rate, unit), own) in enumerate(groups.items()):
         word = "torque" if unit == "N m" else "force"
-        axes = plain_axes(figure, f"speed ({rate})", f"{word} ({unit})")
-        axes.set_subplotspec(figure.add_gridspec(len(groups), 1)[k])
+        place = figure.add_gridspec(len(groups), 1)[k]
+        axes = plain_axes(figure, f"speed ({rate})", f"{word} ({unit})", place)
         zero_line(axes)
         axes.axvline(0.0, color=MUTED, linewidth=0.8)
         sizes = []

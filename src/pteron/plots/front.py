@@ -83,8 +83,7 @@ def front_figure(
     figure = blank(_WIDE, _TALL + _PANEL * (others - 1))
     grid = GridSpec(others, 1, figure=figure)
     for k in range(1, others + 1):
-        axes = plain_axes(figure, labels[k], labels[0])
-        axes.set_subplotspec(grid[k - 1])
+        axes = plain_axes(figure, labels[k], labels[0], grid[k - 1])
         order = np.argsort(values[:, k])
         axes.plot(
             values[order, k],

@@ -151,8 +151,8 @@ def map_panels(
     grid = GridSpec(len(heights), columns, figure=figure, height_ratios=heights)
     for k, (plane, name) in enumerate(panels):
         labels = [axis_label(axis.name) for axis in plane.grid.axes]
-        axes = plain_axes(figure, labels[0], labels[1] if len(labels) > 1 else _named(name))
-        axes.set_subplotspec(grid[divmod(k, columns)])
+        upright = labels[1] if len(labels) > 1 else _named(name)
+        axes = plain_axes(figure, labels[0], upright, grid[divmod(k, columns)])
         axes.set_title(_title(plane), fontsize=FONT_SIZE, color=INK, loc="left")
         if len(labels) == 1:
             _curve(axes, plane, name)

@@ -15,7 +15,7 @@ from matplotlib.ticker import MultipleLocator
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError, shown
-from pteron.plots.canvas import FONT_SIZE, legend
+from pteron.plots.canvas import FONT_SIZE, NO_METADATA, TEXT, legend
 from pteron.plots.fonts import no_word_of_glyphs, take_fonts
 
 Width = Literal["column", "page"]
@@ -34,14 +34,11 @@ _NARROWEST, _WIDEST = 1.5, 40.0
 """Least and greatest width, inches."""
 
 _METADATA: dict[str, dict[str, Any]] = {
-    ".svg": dict.fromkeys(("Creator", "Date", "Format", "Type")),
+    ".svg": NO_METADATA,
     ".pdf": dict.fromkeys(("Creator", "Producer", "CreationDate")),
     ".png": {"Software": None},
 }
 """Metadata by the ending of the file: without a date a figure makes the same file on every run."""
-
-_TEXT: Any = {"svg.fonttype": "none", "svg.hashsalt": "pteron", "pdf.fonttype": 42}
-"""Text stays text, which a journal's printer and a search find."""
 
 
 def resized(figure: Figure, width: Width | float) -> Figure:
@@ -167,6 +164,6 @@ def save_figure(
     if width is not None:
         resized(figure, width)
     buffer = BytesIO()
-    with mpl.rc_context(_TEXT):
+    with mpl.rc_context(TEXT):
         figure.savefig(buffer, format=ending[1:], dpi=dpi, metadata=_METADATA[ending])
     return write_bytes(target, buffer.getvalue())

@@ -14,7 +14,6 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.plots.canvas import (
     FONT_SIZE,
-    GRID,
     INK,
     MUTED,
     PAPER,
@@ -91,8 +90,7 @@ def parameters_figure(
     figure = blank(_WIDE, _HEAD * len(groups) + _ROW * len(names))
     grid = figure.add_gridspec(len(groups), 1, height_ratios=[count + 1.0 for count in counts])
     for k, (unit, own) in enumerate(groups.items()):
-        axes = _rows(figure, [names[i] for i in own], unit)
-        axes.set_subplotspec(grid[k])
+        axes = row_axes(figure, [names[i] for i in own], unit, grid[k])
         axes.axvline(0.0, color=MUTED, linewidth=0.8)
         for y, i in enumerate(reversed(own)):
             if known is not None:
@@ -134,7 +132,7 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
     """
     numbers = _fitting(names, counts, "counts")
     figure = blank(_WIDE, 0.6 + 0.3 * len(names))
-    axes = _rows(figure, names, "operations")
+    axes = row_axes(figure, names, "operations")
     rows = np.arange(len(names))[::-1]
     axes.barh(rows, numbers, height=0.6, color=REACH)
     for row, number in zip(rows, numbers, strict=True):
@@ -146,10 +144,10 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
     return figure
 
 
-def _rows(figure: Figure, names: Sequence[str], xlabel: str) -> Axes:
-    axes = plain_axes(figure, xlabel, "")
+def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = None) -> Axes:
+    """Return axes with a row for each name, the first at the top."""
+    axes = plain_axes(figure, xlabel, "", place)
     axes.grid(visible=False, axis="y")
-    axes.grid(visible=True, axis="x", color=GRID, linewidth=0.6)
     axes.set_ylim(-0.7, len(names) - 0.3)
     axes.set_yticks(range(len(names)), list(reversed(names)), fontsize=FONT_SIZE - 1.0)
     return axes

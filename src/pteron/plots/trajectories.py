@@ -121,7 +121,10 @@ def _courses_figure(
         for word, order, _ in zip(words, _ORDERS, values, strict=False)
     ]
     figure = blank(_WIDE, _HEAD + _TALL * len(values))
-    for row, course in zip(panels(figure, "time (s)", labels), values, strict=True):
+    found = panels(figure, "time (s)", labels)
+    for column in zip(*found, strict=True):
+        figure.align_ylabels(column)
+    for row, course in zip(found, values, strict=True):
         for axes, own in zip(row, groups.values(), strict=True):
             zero_line(axes)
             leg_curves(axes, t, course, own, 1.6, names if course is values[0] else ())
