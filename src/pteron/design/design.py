@@ -15,11 +15,10 @@ from pteron.design.task import Task
 from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
 from pteron.kernels import Array
-from pteron.kinematics.sampling import search_ball
+from pteron.kinematics.sampling import joint_limits, search_ball
 from pteron.manipulator import Manipulator, parameters
 from pteron.renamed import former_attribute
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
-from pteron.workspace.margins import joint_limits
 from pteron.workspace.samples import cube, shape_samples
 
 _IN_CUBE = 5

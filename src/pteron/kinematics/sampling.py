@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -93,7 +94,7 @@ class _Wanted(NamedTuple):
         if self.limits:
             poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
         if self.limits and robot.platform.tilts:
-            low, high = _joint_limits(robot)
+            low, high = joint_limits(robot)
             joints = numeric(robot, "joint_coordinates")(poses)[0]
             poses = poses[((low <= joints) & (joints <= high)).all(axis=-1)]
         return poses
@@ -113,7 +114,9 @@ def _widest_box(robot: Manipulator) -> tuple[Array, Array]:
     return low, np.concatenate([center + radius, angles[:, 1]])
 
 
-def _joint_limits(robot: Manipulator) -> Array:
+@lru_cache(maxsize=64)
+def joint_limits(robot: Manipulator) -> Array:
+    """Return the joints' limits (2, n), m or rad; infinite where there are none."""
     return np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
 
 
@@ -128,7 +131,7 @@ def _led(
     if not (wanted.limits and robot.platform.tilts and all(leg.limits for leg in robot.legs)):
         return np.empty((0, robot.freedom))
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
-    least, most = _joint_limits(robot)
+    least, most = joint_limits(robot)
     joints = rng.uniform(least, most, (_BATCH, robot.joint_count))
     for _ in range(_LEADING):
         poses = numeric(robot, "newton_step")(joints, poses)[0]

@@ -172,51 +172,27 @@ class _Reading:
         given = table.mass, table.inertia, table.center_of_mass or table.first_moment
         if type(table) in (PlatformTable, TiltingTable) or None not in given:
             inertia = self.built("platform.", lambda: table.inertia_of("")) or inertia
+        given: dict[str, Any] = {"axis": table.axis, "x_axis": table.x_axis}
+        more = {"limits": table.limits, "tool": table.tool or (0.0, 0.0, 0.0)}
         if self.tilts:
-            return self._tilting(table, inertia)
-        bars = self.parts("bars", table.bars or [], Bar)
-        geared = self.parts("geared", table.geared or [], Geared)
-        if table.motion is None or table.axis is None:
-            return None
-        whole = self.built(
-            "platform.",
-            lambda: Platform(
-                table.motion,
-                inertia,
-                axis=table.axis,
-                x_axis=table.x_axis,
-                slides=bool(table.slides),
-                limits=table.limits,
-                tool=table.tool or (0.0, 0.0, 0.0),
-                bars=tuple(bars),
-                geared=tuple(geared),
-            ),
-        )
+            given |= {"axis": table.axis or (0.0, 0.0, 1.0), "angle_order": table.angles or "rpy"}
+            given |= {"center": table.center, "second_axis": table.second_axis}
+        else:
+            more["bars"] = tuple(self.parts("bars", table.bars or [], Bar))
+            more["geared"] = tuple(self.parts("geared", table.geared or [], Geared))
+            given["slides"] = bool(table.slides)
+            if table.motion is None or table.axis is None:
+                return None
+        whole = self.built("platform.", lambda: Platform(table.motion, inertia, **given, **more))
         if whole is not None:
             return whole
         with suppress(ModelError):
-            axis = unit_vector(table.axis, "axis")
-            slides = bool(table.slides) and table.motion == "3T1R"
-            return Platform(
-                table.motion, inertia, axis, vector(perpendicular_to(axis), "x_axis"), slides
-            )
+            if not self.tilts:
+                axis = unit_vector(table.axis, "axis")
+                given |= {"axis": axis, "x_axis": vector(perpendicular_to(axis), "x_axis")}
+                given["slides"] &= table.motion == "3T1R"
+            return Platform(table.motion, inertia, **given)
         return None
-
-    def _tilting(self, table: Any, inertia: Any) -> Platform | None:
-        """Return a platform that tilts; one with faults serves to check the legs, where it may."""
-        given = {
-            "axis": table.axis or (0.0, 0.0, 1.0),
-            "x_axis": table.x_axis,
-            "angle_order": table.angles or "rpy",
-            "center": table.center,
-            "second_axis": table.second_axis,
-        }
-        more = {"limits": table.limits, "tool": table.tool or (0.0, 0.0, 0.0)}
-        whole = self.built("platform.", lambda: Platform(table.motion, inertia, **given, **more))
-        if whole is None:
-            with suppress(ModelError):
-                return Platform(table.motion, inertia, **given)
-        return whole
 
     def leg(self, i: int, given: object) -> LegKind | None:
         """Return leg i, from 1, or None; one with faults serves to check the machine."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.sampling import joint_limits
 from pteron.kinematics.singularities import best_type_ii
 from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -85,12 +86,6 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
 @lru_cache(maxsize=64)
 def _leg_sizes(robot: Manipulator) -> Array:
     return np.array([leg.size for leg in robot.legs])
-
-
-@lru_cache(maxsize=64)
-def joint_limits(robot: Manipulator) -> Array:
-    """Return the joints' limits (2, n), m or rad; infinite where there are none."""
-    return np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
 
 
 def joint_distances(robot: Manipulator, joints: Array) -> Array:
