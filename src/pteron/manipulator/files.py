@@ -169,8 +169,8 @@ class _Reading:
         from pteron.manipulator.tables import PlatformTable, TiltingTable
 
         inertia = table.unit
-        given = table.mass, table.inertia, table.center_of_mass or table.first_moment
-        if type(table) in (PlatformTable, TiltingTable) or None not in given:
+        body = table.mass, table.inertia, table.center_of_mass or table.first_moment
+        if type(table) in (PlatformTable, TiltingTable) or None not in body:
             inertia = self.built("platform.", lambda: table.inertia_of("")) or inertia
         given: dict[str, Any] = {"axis": table.axis, "x_axis": table.x_axis}
         more = {"limits": table.limits, "tool": table.tool or (0.0, 0.0, 0.0)}

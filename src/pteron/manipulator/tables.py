@@ -324,7 +324,12 @@ def _held(given: Any, name: str, key: Key) -> Any:
     return _built(_PARTS[type(given)], given, name) if type(given) in _PARTS else given
 
 
-_PARTS = {ConeTable: Cone, DriveTable: Drive, ReadingTable: Reading, StribeckTable: Stribeck}
+_PARTS: dict[Any, Any] = {
+    ConeTable: Cone,
+    DriveTable: Drive,
+    ReadingTable: Reading,
+    StribeckTable: Stribeck,
+}
 """Parts of a leg by their tables."""
 
 
