@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -15,6 +13,7 @@ from pteron.environments.world import World
 from pteron.kernels import Array
 from pteron.motion import Guide, joint_guides, joint_points
 from pteron.plots import robot_figure
+from pteron.plots.canvas import pixels
 from pteron.plots.machine_figures import gravity_of
 
 _POSES = 32
@@ -39,9 +38,7 @@ class EnvironmentPicture:
         """
         figure = self._drawn(state.pose, self._world.target(state)[0])
         figure.set_size_inches(self._size)
-        canvas: Any = FigureCanvasAgg(figure)
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        return pixels(figure)
 
     @cached_property
     def _size(self) -> tuple[float, float]:

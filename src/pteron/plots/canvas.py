@@ -22,6 +22,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import NDArray
 
 from pteron.kernels import Array
 from pteron.platforms.coordinates import SHOWN, coordinate
@@ -132,6 +133,13 @@ def blank(width: float, height: float) -> Figure:
     figure = Picture(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
+
+
+def pixels(figure: Figure) -> NDArray[np.uint8]:
+    """Return a figure as an array (height, width, 3) of red, green and blue."""
+    canvas: Any = figure.canvas
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 def plain_axes(figure: Figure, xlabel: str, ylabel: str, place: Any = None) -> Axes:

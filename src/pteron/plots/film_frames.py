@@ -6,7 +6,7 @@ and the drives' forces are drawn below it, with a line at the time of the frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion import JointPoints, Motion, joint_guides, joint_points
+from pteron.motion import Motion, joint_guides, joint_points
 from pteron.plots.canvas import (
     FONT_SIZE,
     INK,
@@ -24,6 +24,7 @@ from pteron.plots.canvas import (
     blank,
     groups_of,
     leg_curves,
+    pixels,
     plain_axes,
     zero_line,
 )
@@ -89,7 +90,7 @@ def frames(
     style: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": FONT_SIZE, "color": MUTED}
     figure.text(0.985, 0.98, corner, **style)
     angles = 2.0 * np.pi * turns * np.linspace(0.0, 1.0, len(times))
-    now = None if forces is None else _strip(figure, robot, motion, forces, share)
+    now = [] if forces is None else _strip(figure, robot, motion, forces, share)
 
     probes = np.unique(np.linspace(0, len(times) - 1, _PROBES).astype(int)).tolist()
     _draw_still(sheet, scene, path)
@@ -97,33 +98,17 @@ def frames(
         draw_machine(sheet, scene, points.at(k))
     sheet.fill(angles[probes].tolist() if turns else (0.0,))
     sheet.clear(0)
-    yield from _drawn(figure, sheet, scene, points, path, angles, times, now)
-
-
-def _drawn(
-    figure: Figure,
-    sheet: MachineAxes,
-    scene: Scene,
-    points: JointPoints,
-    path: Array,
-    angles: Array,
-    times: Array,
-    now: Sequence[Line2D] | None,
-) -> Iterator[Pixels]:
-    canvas: Any = figure.canvas
-    turning = bool(angles[-1])
     kept = 0
     for k, time in enumerate(times):
-        if turning and isinstance(sheet, SpaceAxes):
+        if turns and isinstance(sheet, SpaceAxes):
             sheet.turn(float(angles[k]))
-        if turning or not kept:
+        if turns or not kept:
             _draw_still(sheet, scene, path)
-            kept = 0 if turning else len(sheet.things)
+            kept = 0 if turns else len(sheet.things)
         draw_machine(sheet, scene, points.at(k))
-        for line in now or ():
+        for line in now:
             line.set_xdata([time, time])
-        canvas.draw()
-        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        yield pixels(figure)
         sheet.clear(kept)
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from pteron.errors import DataError
 from pteron.maps import Map
+from pteron.plots.canvas import pixels
 from pteron.plots.film_encoders import ENCODERS, Pixels
 from pteron.plots.films import Film, checked_film, write_film
 from pteron.plots.index_maps import color_scale, map_panels
@@ -95,6 +94,4 @@ def _pixels(figure: Figure, size: tuple[int, int], places: Sequence[Bbox]) -> Pi
     figure.set_size_inches(size[0] / _DPI, size[1] / _DPI)
     for axes, place in zip(figure.axes, places, strict=True):
         axes.set_position(place)
-    canvas: Any = figure.canvas
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3]
+    return pixels(figure)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -74,14 +73,7 @@ def declaration(table: str, **entries: object) -> str:
     separator = ";"
     header_lines = 2
     """
-    lines = [f"{key} = {_toml(value)}" for key, value in entries.items()]
+    import tomlkit  # slow to load, and for messages alone
+
+    lines = [f"{key} = {tomlkit.item(value).as_string()}" for key, value in entries.items()]
     return "\n" + "\n".join([f"[{table}]", *lines])
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if not isinstance(value, str):
-        return str(value)
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t")
-    return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda c: f"\\u{ord(c[0]):04x}", escaped) + '"'

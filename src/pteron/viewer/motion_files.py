@@ -18,27 +18,8 @@ _LARGEST = 100 << 20
 def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> Motion:
     """Return the motion that a file holds.
 
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    name : str
-        The file's name: its ending says whether it is CSV or Parquet.
-    data : bytes
-        Its contents; see `pteron.playback.playback`.
-    start : array, shape (m,)
-        A pose of the assembly mode that is meant where the file gives joints alone, m and rad.
-
-    Returns
-    -------
-    Motion
-
-    Raises
-    ------
-    DataError
-        If it is no CSV or Parquet file, too large, or holds no motion.
-    UnreachablePose, SingularPose
-        If the machine cannot do the motion.
+    The ending of its name says whether it is CSV or Parquet; `start` is a pose of the assembly mode
+    that is meant where the file gives joints alone.
     """
     source = shown(PurePath(name).name, bare=True) or "the file"
     ending = PurePath(name).suffix.lower()
