@@ -234,10 +234,7 @@ def local_workers(count: int | None) -> Any:
     """Return a cluster of processes of this computer."""
     # One thread each: its kernels then share no lock with another's.
     return _distributed().LocalCluster(
-        n_workers=count,
-        threads_per_worker=1,
-        dashboard_address=None,
-        silence_logs=logging.CRITICAL,
+        n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
     )
 
 
