@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pteron.atomic import write_texts
 from pteron.calibration import Calibration
 from pteron.json_values import json_ready
 from pteron.manipulator.saving import text_of
 from pteron.report.calibration.values import notes
 from pteron.report.write import checked_apart, checked_folder, commented
-
-
-@dataclass(frozen=True)
-class Written:
-    """The files of a calibration."""
-
-    page: Path
-    numbers: Path
-    model: Path
-
-    @property
-    def paths(self) -> tuple[Path, ...]:
-        """The files."""
-        return self.page, self.numbers, self.model
+from pteron.report.written import Written as Written, write_found
 
 
 def write_calibration(
@@ -61,12 +45,8 @@ def write_calibration(
     target = checked_folder(folder)
     for file in ("calibration.html", "calibration.json", "robot.toml"):
         checked_apart(target / file, sources)
-    texts = {
-        "calibration.html": page(result),
-        "calibration.json": json.dumps(numbers(result), indent=1, allow_nan=False) + "\n",
-        "robot.toml": commented(_header(result)) + text_of(result.robot),
-    }
-    return Written(*write_texts(target, texts))
+    model = commented(_header(result)) + text_of(result.robot)
+    return write_found(target, "calibration", page(result), numbers(result), {"robot.toml": model})
 
 
 def numbers(result: Calibration) -> dict[str, Any]:

@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pteron.atomic import make_folder, write_text
 from pteron.identification import Identification
 from pteron.json_values import json_ready
 from pteron.manipulator.saving import text_of
 from pteron.report.identification.contents import short_sources, shortened
 from pteron.report.write import checked_apart, checked_folder, commented
+from pteron.report.written import Written as Written, write_found
 
 _SAFE = re.compile(r"[^\w.-]+")
 """Characters that names of files do without."""
-
-
-@dataclass(frozen=True)
-class Written:
-    """The files of an identification; `model` is None where there are no real bodies."""
-
-    page: Path
-    numbers: Path
-    model: Path | None
-
-    @property
-    def paths(self) -> tuple[Path, ...]:
-        """The files."""
-        return tuple(path for path in (self.page, self.numbers, self.model) if path is not None)
 
 
 def write_identification(
@@ -39,8 +23,7 @@ def write_identification(
 ) -> Written:
     """Write an identification: a page, `identification.json`, and the machine's model file.
 
-    The page, `identification.html`, needs no other file or network. Each file is written whole or
-    not at all.
+    The page, `identification.html`, needs no other file or network. All files are written, or none.
 
     Parameters
     ----------
@@ -65,17 +48,11 @@ def write_identification(
 
     path = model_path(folder, result.robot.name, sources)
     target = checked_folder(folder)
-    model = _model_text(result)
-    data = json.dumps(numbers(result), indent=1, allow_nan=False) + "\n"
-    html = page(result, None if model is None else path.name)
-    make_folder(target)
-    if model is not None:
-        write_text(path, model)
-    return Written(
-        numbers=write_text(target / "identification.json", data),
-        page=write_text(target / "identification.html", html),
-        model=None if model is None else path,
-    )
+    model = {}
+    if result.machine is not None:
+        model[path.name] = commented(_header(result)) + text_of(result.machine)
+    html = page(result, path.name if model else None)
+    return write_found(target, "identification", html, numbers(result), model)
 
 
 def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
@@ -83,13 +60,6 @@ def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
     return checked_apart(path, sources)
-
-
-def _model_text(result: Identification) -> str | None:
-    """Return the model file of an identification; None where there are no real bodies."""
-    if result.machine is None:
-        return None
-    return commented(_header(result)) + text_of(result.machine)
 
 
 def _header(result: Identification) -> list[str]:
@@ -119,4 +89,5 @@ def _header(result: Identification) -> list[str]:
 
 def numbers(result: Identification) -> dict[str, Any]:
     """Return the numbers of an identification as JSON has them, null where one is not finite."""
-    return {key: json_ready(value) for key, value in result.as_dict().items()}
+    found: dict[str, Any] = json_ready(result.as_dict())
+    return found

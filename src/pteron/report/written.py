@@ -1,0 +1,33 @@
+"""The files of what logs or measurements tell: a page, numbers, and the machine's file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pteron.atomic import write_texts
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files that were written; `model`, the machine's, is None where there is no machine."""
+
+    page: Path
+    numbers: Path
+    model: Path | None
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files."""
+        return tuple(path for path in (self.page, self.numbers, self.model) if path is not None)
+
+
+def write_found(
+    folder: Path, stem: str, page: str, numbers: dict[str, Any], model: dict[str, str]
+) -> Written:
+    """Write a page, numbers and perhaps a machine's file by its name: all of them, or none."""
+    data = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
+    paths = write_texts(folder, {f"{stem}.html": page, f"{stem}.json": data, **model})
+    return Written(paths[0], paths[1], paths[2] if model else None)
