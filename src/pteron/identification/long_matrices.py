@@ -18,7 +18,7 @@ def scaled(columns: Array) -> tuple[Array, Array]:
 
 def triangle(pieces: Iterable[Array], size: int) -> Array:
     """Return the QR decomposition's R (k, k) of rows (R, k) in pieces, k being `size`."""
-    factor: Array = np.zeros((0, size))
+    factor: Array = np.zeros((size, size))
     for piece in pieces:
         factor = np.asarray(np.linalg.qr(np.vstack([factor, piece]), mode="r"))
-    return np.vstack([factor, np.zeros((size - len(factor), size))])
+    return factor
