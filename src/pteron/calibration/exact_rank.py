@@ -127,7 +127,8 @@ class _Drawn:
         changes = next((b.changes for b in blocks if b.kind == "geometry"), ())
         terms, vector = slope_terms(layout, changes), np.array(self.vector, dtype=object)
         radial = [self._radial(leg.guide_point) for leg in robot.legs]
-        self.steps: Residues = slope_matrix(layout, changes, terms, vector, radial) % prime
+        steps = slope_matrix(layout, changes, terms, vector, radial) % prime
+        self.steps: Residues = np.asarray(steps, dtype=object)
         self.frame: Residues = np.array(
             [[n.within(self.field) for n in axis] for axis in self.geometry.axes], dtype=object
         )
