@@ -15,6 +15,7 @@ from pteron.calibration.exact_rank import RowKind, exact_rank
 from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess, tolerances_of
 from pteron.calibration.residuals import MachineSlopes
+from pteron.calibration.start import starting_poses
 from pteron.calibration.unknowns import blocks_of
 from pteron.errors import DataError
 
@@ -32,13 +33,14 @@ COUNTS = {
     "3-rrr": 21,
     "hexaglide": 54,
     "hexa": 66,
+    "wrist": 21,
 }
 """What whole poses in known frames show of the legs."""
 
 TURNING = {"quadrupteron-oblique": 24, "ankle": 24, "wrist": 24, "par4": 42}
 """And with the centre and the axes about which the platform turns."""
 
-GATE = ("quadrupteron-oblique", "delta", "five-bar", "par4")
+GATE = ("quadrupteron-oblique", "delta", "five-bar", "par4", "wrist")
 
 
 def poses_seen(robot, poses):
@@ -354,6 +356,22 @@ def test_swapped_marks_are_told():
     other = replace(given, marks=tuple("ba"["ab".index(name)] for name in names))
     with pytest.raises(DataError, match="marks a and b are swapped"):
         calibrate(robot, other, free=GEOMETRY)
+
+
+def test_a_mark_far_from_the_tool_leads_to_the_pose():
+    robot, at = pteron.load("five-bar"), (0.08, 0.0, 0.0)
+    poses = pteron.random_poses(robot, 40)
+    given = replace(
+        Measurements.of(
+            robot,
+            pteron.inverse_kinematics(robot, poses),
+            positions=tool_places(robot, poses, np.array(at)),
+            setup=Setup(marks={"a": Place(at)}),
+        ),
+        marks=("a",) * 40,
+    )
+    found = starting_poses(Guess.drawn(robot, given), given)
+    np.testing.assert_allclose(found, poses, rtol=0.0, atol=1e-9)
 
 
 def test_an_unknown_frame_and_distances_find_the_same_machine():

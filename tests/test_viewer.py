@@ -16,10 +16,13 @@ from urllib.parse import urlsplit
 import numpy as np
 import polars as pl
 import pytest
-from mechanisms import CLIENTS, MECHANISMS, gated
+from measured import built
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated
 
 import pteron
+from pteron.errors import DataError
 from pteron.kinematics.jacobian_at import jacobian_at
+from pteron.legs import Reading
 from pteron.motion import joint_guides, joint_points
 from pteron.plots.canvas import LEG_COLORS
 from pteron.report.quantities import readable
@@ -739,3 +742,31 @@ def test_the_command_prints_where_the_page_is_and_ends_with_ctrl_c(tmp_path):
     assert str(port) not in line
     assert f"Note: port {port} is in use" in notes
     assert (rest, process.returncode) == ("", 0)
+
+
+def test_a_drives_readings_stand_beside_its_joint_coordinates():
+    robot = pteron.load("five-bar")
+    legs = (robot.legs[0], replace(robot.legs[1], reading=Reading(0.02, 2.0)))
+    state = Session(replace(robot, legs=legs)).state
+    found = readings(state)
+    shown = np.degrees([found.joints[0], (found.joints[1] - 0.02) / 2.0])
+    table = readout(state, found).replace("</td><td>", " ")
+    for joint, reads in zip(np.degrees(found.joints), shown, strict=True):
+        assert f"{fixed(joint, 1)}° {fixed(reads, 1)}° " in table
+    assert "<th>reads</th>" in table
+
+
+@CLIENTS
+def test_a_compared_machine_stands_in_the_picture_and_moves_along(browser):
+    robot, pictures = CATALOG["linear-delta"], []
+    with pytest.raises(DataError, match="no machine to compare with"):
+        view(robot, port=0, compare="delta")
+    for compared in (None, built(robot)):
+        with view(robot, port=0, compare=compared) as viewer, opened(browser, viewer.url) as tab:
+            for step in (0.0, 0.03):
+                viewer.move_to(viewer.state.pose + np.array([step, 0.0, 0.0]))
+                assert viewer.wait(10.0)
+                tab.wait_for_timeout(1000)
+                pictures.append(tab.locator("canvas").first.screenshot())
+            assert viewer.faults == ()
+    assert len(set(pictures)) == 4

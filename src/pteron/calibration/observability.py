@@ -112,7 +112,9 @@ def observability_of(
     parts = given.positions, given.angles, given.heights, given.distances
     seen = np.isnan(np.column_stack(parts))
     ends = [given.marks[row] if row >= 0 else None for row in given.origins]
-    alike = zip(map(bytes, seen), given.marks, given.planes, given.anchors, ends, strict=True)
+    alike = zip(
+        (row.tobytes() for row in seen), given.marks, given.planes, given.anchors, ends, strict=True
+    )
     some = dict(zip(alike, range(len(given)), strict=True)).values()
     kinds = tuple(sorted({_kind(given, i, levels) for i in some}, key=repr))
     rank, primes, rows = exact_rank(start, blocks, kinds, seed)

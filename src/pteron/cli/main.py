@@ -89,7 +89,7 @@ class CommandGroup(TyperGroup):
         sys.exit(status if isinstance(status, int) else 0)
 
 
-def _noted(message: Warning | str, category: type[Warning], *place: Any) -> None:
+def _noted(message: Warning | str, category: type[Warning], *place: Any, **_: Any) -> None:
     """Show a warning of unlikely values as a note; others are a programmer's."""
     if issubclass(category, UnlikelyValue):
         note(f"Note: {message}")

@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -242,11 +242,10 @@ def _crank(leg: LegKind, turn: float, base: list[float], lengths: list[float]) -
     bend = math.acos((away**2 + upper**2 - lower**2) / (2.0 * away * upper))
     top = math.atan2(end - height, -radius) + bend
     out = np.array([*moved.guide_point[:2], 0.0])
-    return replace(
-        moved,
-        zero_direction=vector((out / np.linalg.norm(out)).tolist(), "zero_direction"),
-        limits=(-0.5 * math.pi, top),
-    )
+    level: dict[str, Any] = {
+        "zero_direction": vector((out / np.linalg.norm(out)).tolist(), "zero_direction")
+    }
+    return replace(moved, limits=(-0.5 * math.pi, top), **level)
 
 
 def _placed(
@@ -261,7 +260,8 @@ def _placed(
     moved = leg.turned(turned)
     out = np.array([*moved.guide_point[:2], 0.0]) / math.hypot(*moved.guide_point[:2])
     names = [quantity.name for quantity in leg.quantities if quantity.role == "length"]
-    bodies, changes = dict(moved.bodies), {}
+    bodies = dict(moved.bodies)
+    changes: dict[str, Any] = {}
     for name, (link, length) in zip(names, lengths.items(), strict=True):
         body, size = leg.bodies[link], length / getattr(leg, name)
         kinds = zip(body.kinds, body.values, strict=True)
