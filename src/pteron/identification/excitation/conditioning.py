@@ -111,7 +111,7 @@ def information_root(
     if not np.isfinite(matrix).all():
         return np.full((base.rank, base.rank), np.nan)
     pieces = (matrix[start : start + _ROWS] for start in range(0, len(matrix), _ROWS))
-    return triangle(pieces, base.rank) / np.sqrt(count)
+    return np.asarray(triangle(pieces, base.rank) / np.sqrt(count))
 
 
 def conditioning_of(root: Array, values: Array) -> Conditioning:
