@@ -177,8 +177,8 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
         for name in keys:
             vector = np.array(new[i].get(name, getattr(owners[i], name)))
             new[i][name] = tuple((matrix @ vector).tolist())
-    *legs, platform = (replace(owner, **fields) for owner, fields in zip(owners, new, strict=True))
-    return replace(robot, legs=tuple(legs), platform=platform)
+    legs = tuple(replace(leg, **fields) for leg, fields in zip(robot.legs, new[:-1], strict=True))
+    return replace(robot, legs=legs, platform=replace(robot.platform, **new[-1]))
 
 
 def turning_with(leg: LegKind, key: str) -> list[str]:
@@ -276,9 +276,9 @@ def slope_matrix(
     robot: Manipulator,
     changes: Sequence[Variation],
     terms: Sequence[Term],
-    geometry: Array,
-    radial: Sequence[tuple[Array, Array]] | None = None,
-) -> Array:
+    geometry: NDArray[Any],
+    radial: Sequence[tuple[NDArray[Any], NDArray[Any]]] | None = None,
+) -> NDArray[Any]:
     """Return d(geometry)/d(variations) of a machine, in floats or in the numbers of a field.
 
     Of a field `radial` has for each leg the unit vector from the platform's axis to its guide
