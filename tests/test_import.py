@@ -149,6 +149,7 @@ ALLOWED = {
     ("manipulator/variants.py", "an elbow"): "working modes",
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
     ("export/printers/", "an elbow"): "where Klipper has it, in the message that refuses",
+    ("export/printers/", "data of one kind"): "Klipper's cranks count from the level",
     ("report/", "an elbow"): "the working mode",
     ("viewer/", "an elbow"): "the working mode",
     ("workspace/machine_warnings.py", "an elbow"): "whether another working mode is meant",
