@@ -40,7 +40,7 @@ _CLEAR = 1e-4
 _SMALLER, _SLOWER = 0.9, 1.05
 """Factors on size and duration of a cycle, until it keeps the limits."""
 
-_SMALLEST = 1e-3
+_SMALLEST = 5e-3
 """Least scale of a cycle; where not even that keeps the limits there is none."""
 
 _AT_REST = 1e4
