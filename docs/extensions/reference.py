@@ -107,12 +107,19 @@ def parts(package: str) -> list[str]:
     return sorted(f"{whole.__name__}.{part.name}" for part in iter_modules(whole.__path__))
 
 
-def _documented(owner: ModuleType, names: Iterable[str]) -> list[str]:
-    """Return the lines that list names of a module, and then tell about each."""
+def _documented(owner: ModuleType, names: Iterable[str], told: set[str]) -> list[str]:
+    """Return the lines that list names of a module, and then tell about each.
+
+    What two modules hand on is indexed once; `told` are the places of what is.
+    """
     lines = [f".. currentmodule:: {owner.__name__}", "", ".. autosummary::", ""]
     lines += [f"   {name}" for name in names] + [""]
     for name in names:
-        lines += [f".. {directive_for(getattr(owner, name))}:: {name}", ""]
+        value = getattr(owner, name)
+        place = f"{value.__module__}.{name}" if inspect.isclass(value) else f"{owner}.{name}"
+        again = ["   :no-index:"] if place in told else []
+        told.add(place)
+        lines += [f".. {directive_for(value)}:: {name}", *again, ""]
     return lines
 
 
@@ -122,12 +129,13 @@ def _page(title: str, lines: list[str]) -> str:
 
 def pages() -> dict[str, str]:
     """Return the pages in Markdown by where they stand in reference/."""
-    found = {}
+    found: dict[str, str] = {}
+    told: set[str] = set()
     for topic, names in by_topic().items():
-        found[f"functions/{topic.lower()}.md"] = _page(topic, _documented(pteron, names))
+        found[f"functions/{topic.lower()}.md"] = _page(topic, _documented(pteron, names, set()))
     for module in public_modules():
         lines = [f".. automodule:: {module.__name__}", "   :no-members:", ""]
-        lines += _documented(module, sorted(module.__all__, key=str.lower))
+        lines += _documented(module, sorted(module.__all__, key=str.lower), told)
         path = f"modules/{module.__name__.removeprefix('pteron.')}.md"
         found[path] = _page(f"`{module.__name__}`", lines)
     for package, intro in INSIDE.items():

@@ -17,6 +17,7 @@ from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, Pl
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
 from pteron.errors import DataError, ModelError
+from pteron.kernels import numeric
 from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace import Box, home_pose, prove
@@ -35,9 +36,9 @@ _CANDIDATES = 1500
 _TO_THE_EDGE = 1.0 / 3.0
 """Exponent of random numbers in [0, 1] that crowds candidates towards the box's faces."""
 
-_TYPE_I = 0.1
-_TYPE_II = 0.05
-"""Least measures that are proved in the box, above 0 as the machine is not quite as drawn."""
+_SHARE = 0.3
+"""Least measures that are proved in the box, over those at its centre: nearer to a singularity the
+tolerances of a machine that is not quite as drawn lead far away, or across."""
 
 _MOST = 20_000
 """Undecided boxes at which a proof is given up."""
@@ -203,6 +204,7 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
     ModelError
         If there is none.
     """
+    floors = _floors(robot, center)
     drawn = random_poses(robot, 400)
     sides = np.maximum(np.abs(drawn - center).max(axis=0), 1e-9)
     thin = np.zeros(robot.freedom)
@@ -215,7 +217,7 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
     for _ in range(_HALVINGS):
         share = 0.5 * (least + most)
         box = Box(tuple(center - share * sides), tuple(center + share * sides + thin))
-        if prove(robot, box, type_i=_TYPE_I, type_ii=_TYPE_II, most=_MOST).holds:
+        if prove(robot, box, **floors, most=_MOST).holds:
             least, found = share, box
         else:
             most = share
@@ -225,10 +227,15 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
             "within limits and away from singularities; move the plane, or the machine's limits",
             subject=robot.name,
         )
-    return _widened(robot, found, sides)
+    return _widened(robot, found, sides, floors)
 
 
-def _widened(robot: Manipulator, box: Box, sides: Array) -> Box:
+def _floors(robot: Manipulator, center: Array) -> dict[str, float]:
+    type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
+    return {"type_i": _SHARE * float(type_i.min()), "type_ii": _SHARE * abs(float(type_ii))}
+
+
+def _widened(robot: Manipulator, box: Box, sides: Array, floors: Mapping[str, float]) -> Box:
     """Return a proved box whose sides grew one after the other, as far as they may."""
     for k in np.flatnonzero(sides):
         for _ in range(_WIDENINGS):
@@ -238,7 +245,7 @@ def _widened(robot: Manipulator, box: Box, sides: Array) -> Box:
                 break
             low[k], high[k] = low[k] - 0.5 * more, high[k] + 0.5 * more
             wider = Box(tuple(low), tuple(high))
-            if not prove(robot, wider, type_i=_TYPE_I, type_ii=_TYPE_II, most=_MOST // 4).holds:
+            if not prove(robot, wider, **floors, most=_MOST // 4).holds:
                 break
             box = wider
     return box

@@ -70,7 +70,11 @@ def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
     start = placed(guess, rows, poses)
     slopes = MachineSlopes(guess.robot, blocks)
     at = slopes.rows(start, rows, poses, np.arange(len(rows)))
-    scaled = at.slopes * np.minimum(tolerances_of(blocks), 1.0)
+    tolerances = np.minimum(tolerances_of(blocks), 1.0)
+    for block in blocks:
+        if block.kind == "frame" and start.turn is not guess.turn:
+            tolerances[block.where] = 0.0  # all rows together have fixed it
+    scaled = at.slopes * tolerances
     width = at.residuals.shape[1]
     covariance = scaled @ np.swapaxes(scaled, -1, -2) + _NOISE**2 * np.eye(width)
     whitened = np.linalg.solve(covariance, at.residuals[..., None])[..., 0]
