@@ -358,6 +358,38 @@ def test_swapped_marks_are_told():
         calibrate(robot, other, free=GEOMETRY)
 
 
+def test_swapped_marks_are_told_in_an_unknown_frame_too():
+    robot = pteron.load("delta")
+    truth, _, poses, readings = off_drawing(robot)
+    marks = {"a": (0.08, 0.0, 0.05), "b": (-0.06, 0.05, 0.02)}
+    names = tuple("ab"[i % 2] for i in range(60))
+    places = [
+        tool_places(truth.robot, poses[i : i + 1], np.array(marks[n]))[0]
+        for i, n in enumerate(names)
+    ]
+    seen = Rotation.from_rotvec([0.4, 1.2, -2.0]).apply(places) + np.array([3.0, -1.0, 0.5])
+    seen += NOISE * np.random.default_rng(0).standard_normal(seen.shape)
+    setup = Setup(marks={name: Place(at) for name, at in marks.items()}, frame_known=False)
+    given = Measurements.of(robot, readings, positions=seen, setup=setup)
+    right, swapped = (replace(given, marks=tuple(m)) for m in ("ab" * 30, "ba" * 30))
+    assert not calibrate(robot, right, free=GEOMETRY).findings
+    with pytest.raises(DataError, match="marks a and b are swapped"):
+        calibrate(robot, swapped, free=GEOMETRY)
+
+
+def test_what_is_measured_at_planned_places_is_trusted():
+    """Near phi = 90 degrees, where J is singular, tolerances lead far away."""
+    robot = pteron.load("quadrupteron")
+    planned = plan(robot, 40, "positions")
+    truth, *_ = off_drawing(robot, 5, 20)
+    machine = MachineSlopes(robot, ())
+    poses = machine.poses(truth, truth.joints(planned.readings), planned.poses)
+    places = tool_places(truth.robot, poses, truth.marks[""])
+    places += NOISE * np.random.default_rng(1).standard_normal(places.shape)
+    given = Measurements.of(robot, planned.readings, positions=places)
+    assert calibrate(robot, given).verdict.grade == "trustworthy"
+
+
 def test_a_mark_far_from_the_tool_leads_to_the_pose():
     robot, at = pteron.load("five-bar"), (0.08, 0.0, 0.0)
     poses = pteron.random_poses(robot, 40)

@@ -40,7 +40,7 @@ _DOUBTED = 0.99
 _LOST = 30.0
 """Cost of a row whose readings lead to no pose, in variances, as if it hardly fitted."""
 
-_BEYOND = 1e3
+BEYOND = 1e3
 """Standard deviations at which such a row counts, so that it is left out in the end."""
 
 _STRAY = 30.0
@@ -287,7 +287,7 @@ class Fitter:
         cost += float(self.prior @ total**2)
         if not np.isfinite(cost):
             raise ValueError
-        distances[lost] = _BEYOND
+        distances[lost] = BEYOND
         values = guess, total, noise, kept
         return Fit(*values, found, residuals, measured, distances, matrix, right, self.prior, cost)
 
@@ -334,7 +334,7 @@ class Fitter:
         if not sought:
             return {}
         kept = fit.kept
-        rows = np.flatnonzero(kept & (fit.distances < _BEYOND))
+        rows = np.flatnonzero(kept & (fit.distances < BEYOND))
         some = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _CHUNK)).astype(int))]
         at = self.slopes.rows(fit.guess, self.given, fit.poses, some)
         found = {}

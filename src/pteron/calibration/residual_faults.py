@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.calibration.fit import Fit, Fitter
+from pteron.calibration.fit import BEYOND, Fit, Fitter
 from pteron.calibration.guess import Block, Guess, Unknown
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.result import Finding
@@ -62,6 +62,8 @@ def _outliers(fit: Fit, given: Measurements) -> tuple[Finding, ...]:
 
 
 def _size(fit: Fit, row: int) -> str:
+    if fit.distances[row] >= BEYOND:
+        return "its readings lead to no pose"
     left = fit.residuals[row]
     k = int(np.abs(left).argmax())
     angle = 3 <= k < len(left) - 2
