@@ -204,7 +204,8 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
     ModelError
         If there is none.
     """
-    floors = _floors(robot, center)
+    type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
+    floors = _SHARE * float(type_i.min()), _SHARE * abs(float(type_ii))
     drawn = random_poses(robot, 400)
     sides = np.maximum(np.abs(drawn - center).max(axis=0), 1e-9)
     thin = np.zeros(robot.freedom)
@@ -217,7 +218,7 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
     for _ in range(_HALVINGS):
         share = 0.5 * (least + most)
         box = Box(tuple(center - share * sides), tuple(center + share * sides + thin))
-        if prove(robot, box, **floors, most=_MOST).holds:
+        if prove(robot, box, type_i=floors[0], type_ii=floors[1], most=_MOST).holds:
             least, found = share, box
         else:
             most = share
@@ -230,12 +231,7 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
     return _widened(robot, found, sides, floors)
 
 
-def _floors(robot: Manipulator, center: Array) -> dict[str, float]:
-    type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
-    return {"type_i": _SHARE * float(type_i.min()), "type_ii": _SHARE * abs(float(type_ii))}
-
-
-def _widened(robot: Manipulator, box: Box, sides: Array, floors: Mapping[str, float]) -> Box:
+def _widened(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, float]) -> Box:
     """Return a proved box whose sides grew one after the other, as far as they may."""
     for k in np.flatnonzero(sides):
         for _ in range(_WIDENINGS):
@@ -245,7 +241,8 @@ def _widened(robot: Manipulator, box: Box, sides: Array, floors: Mapping[str, fl
                 break
             low[k], high[k] = low[k] - 0.5 * more, high[k] + 0.5 * more
             wider = Box(tuple(low), tuple(high))
-            if not prove(robot, wider, **floors, most=_MOST // 4).holds:
+            type_i, type_ii = floors
+            if not prove(robot, wider, type_i=type_i, type_ii=type_ii, most=_MOST // 4).holds:
                 break
             box = wider
     return box
