@@ -88,24 +88,7 @@ _EquationsClass = type[LegEquations]
 class LegKind(ABC):
     """The data of one leg: a kind of leg is a frozen dataclass with these fields and its own.
 
-    Parameters
-    ----------
-    guide_point : vector
-        r, where the leg is fixed in the base frame: a point of the slider's guide, where its
-        coordinate is zero, or the centre of the crank's circle; m.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    fixed_offset : vector
-        t0, what is added to it in the base frame: the part that does not turn with phi, as on the
-        articulated platform of an H4 or a Par4; m.
-    elbow : {1, -1}
-        sigma, the side of the elbow: the leg's branch.
-    limits : (float, float), optional
-        Least and greatest joint coordinate, m or rad.
-    drive : Drive, optional
-        What drives its joint.
-    reading : Reading, optional
-        How the drive counts the joint coordinate, where that is not as the geometry has it.
+    `pteron.legs.keys.COMMON` says what they hold; a kind's own `keys` may say it more closely.
     """
 
     guide_point: Vector
