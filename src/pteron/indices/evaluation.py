@@ -13,7 +13,7 @@ def evaluate(
 ) -> Numbers:
     """Return an index of performance at poses; `INDICES` says what each one means.
 
-    It is one compiled kernel: a map of eight million poses takes about a second.
+    All poses go through one compiled kernel: a map of eight million poses takes about a second.
 
     Parameters
     ----------

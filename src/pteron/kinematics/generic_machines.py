@@ -1,4 +1,4 @@
-"""Script that makes the start machines of `pose_paths`: random complex numbers, all poses known.
+"""Script that makes the start machines of `pose_paths`: random complex ones, all poses known.
 
 `python -m pteron.kinematics.generic_machines` writes `generic_machines.npz`; the library only reads
 it. From a machine with one random pose, paths lead by way of other random machines back to it, to

@@ -1,4 +1,4 @@
-"""The radii of the capsules round the centre lines of a machine's bodies."""
+"""The radii of the capsules that stand for a machine's bodies where legs may meet (clearances)."""
 
 from __future__ import annotations
 

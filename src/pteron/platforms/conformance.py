@@ -1,6 +1,6 @@
 """A test that a kind of platform keeps the protocol of `platforms.motion`: run `faults` on one.
 
-It differentiates along one random motion of the pose.
+It compares derivatives, and power with energy, along one random motion of the pose.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pteron.platforms.coordinates import COORDINATES
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _POINTS = 3
-"""Number of platform points of the random platform."""
+"""Number of platform points, drawn at random; frame, planes and parameters are the given ones."""
 
 _SMALL = 0.3
 """Size of the motion, SI units: a tripod does not tilt by much."""

@@ -1,7 +1,7 @@
 """Exact numbers q sqrt(s), such as sqrt(3)/2, and their recognition in floats.
 
 A file holds sqrt(3)/2 as sixteen digits. The rank of a regressor, for one, depends on exact
-relations between such numbers, and so on the number that was meant.
+relations between such numbers, hence on the number that was meant.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Motion of the joints from pose to pose with limited jerk, by Ruckig.
 
-Each joint has limits of speed, acceleration and jerk, and all of them start and arrive together
-(Berscheid and Kroeger, 2021, Robotics: Science and Systems). The platform follows.
+Each joint has limits of speed, acceleration and jerk, and all joints start and arrive together
+(Berscheid and Kroeger, 2021, Robotics: Science and Systems). The tool's path is what results.
 """
 
 from __future__ import annotations
