@@ -25,7 +25,7 @@ _STOCK = re.compile(r"(\w+)-(?:tube:([\d.]+)x([\d.]+)|rod:([\d.]+))")
 
 @dataclass(frozen=True)
 class Stock:
-    """What links are cut from: a round tube, or a rod.
+    """The stock that links are cut from: a round tube, or a rod.
 
     Parameters
     ----------

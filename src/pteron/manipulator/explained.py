@@ -21,7 +21,7 @@ _FOLLOWS = {
     "limits": "Joint coordinates from {}.",
     "stock": "Masses and inertias of links from {}: a first guess, without their ends and joints.",
 }
-"""What the file says of each argument of `with_dimensions`."""
+"""The sentence of the file for each argument of `with_dimensions`."""
 
 
 def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:

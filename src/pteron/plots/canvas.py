@@ -79,7 +79,7 @@ SMALL = 0.6
 """Width of lines in small pictures of a machine, over that in large ones."""
 
 NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-"""What an SVG file does not tell."""
+"""Metadata left out of an SVG file, so that the same figure gives the same file."""
 
 TEXT: Any = {"svg.fonttype": "none", "svg.hashsalt": "pteron", "pdf.fonttype": 42}
 """Settings with which text stays text, and files are the same in each run."""
