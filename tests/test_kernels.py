@@ -15,9 +15,11 @@ from mechanisms import CATALOG, MACHINES, MECHANISMS, NEAREST, gated, states
 import pteron
 from pteron import atomic
 from pteron.controllers import CONTROLLERS
+from pteron.dynamics import drive_forces
 from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
+from pteron.indices import Tolerances, pose_error
 from pteron.kernels import (
     FUNCTIONS,
     LOADED,
@@ -25,12 +27,16 @@ from pteron.kernels import (
     NoSquareRoot,
     PrimeField,
     RationalField,
+    alike,
     columns_of,
     count_operations,
     evaluate,
     general_program,
+    numeric,
     program,
 )
+from pteron.manipulator import load, with_dimensions
+from pteron.workspace import pose_margins
 
 ROBOT = CATALOG["quadrupteron"]
 PRIME = 2**61 - 1
@@ -396,6 +402,27 @@ def test_the_general_program_is_the_machines_own(name):
 
 
 # Files written whole or not at all.
+
+
+def test_machines_that_are_alike_share_general_programs():
+    robot = load("delta")
+    other = with_dimensions(robot, base_radius=0.3, crank=0.45, limits=(-1.6, 1.0))
+    poses = np.array([0.0, 0.0, -0.9]) + 0.1 * np.random.default_rng(3).uniform(-1, 1, (9, 3))
+    tolerances = Tolerances(joints=1e-5, length=1e-5)
+
+    def results():
+        return (
+            drive_forces(other, poses, poses, poses),
+            pose_error(other, poses, tolerances).worst,
+            pose_margins(other, poses).joints,
+        )
+
+    own = results()
+    with alike(robot):
+        for found, expected in zip(results(), own, strict=True):
+            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
+        assert "geometry" in numeric(other, "jacobian").fixed
+    assert "geometry" not in numeric(other, "jacobian").fixed
 
 
 def test_text_is_written_whole(tmp_path):

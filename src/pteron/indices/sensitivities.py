@@ -11,7 +11,7 @@ import numpy as np
 
 from pteron.bodies.vectors import Vector, cross, dot
 from pteron.equations.machine import numbers
-from pteron.kernels import Array, bare, general_program
+from pteron.kernels import Array, general_program, layout_of
 from pteron.kinematics import twist
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.legs.kind import LegKind
@@ -99,7 +99,7 @@ def geometric_sensitivities(
     good = np.isfinite(np.reshape(held, -1))
     found = np.full((len(flat), robot.freedom, len(names)), np.nan)
     if good.any():
-        slopes = _slopes(bare(robot))
+        slopes = _slopes(layout_of(robot))
         geometry = np.tile(np.array(numbers(robot))[:, None], (1, int(good.sum())))
         values = np.array(slopes.map(geometry.shape[1])(geometry, flat[good].T))
         by_geometry = values.reshape(robot.joint_count, -1, len(geometry)).swapaxes(0, 1)

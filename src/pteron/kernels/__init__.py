@@ -28,8 +28,10 @@ from pteron.kernels.programs import (
     REDUCIBLE as REDUCIBLE,
     SELECTED as SELECTED,
     Columns as Columns,
+    alike as alike,
     bare as bare,
     general_program as general_program,
+    layout_of as layout_of,
     program as program,
     specialised as specialised,
 )

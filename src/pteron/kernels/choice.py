@@ -17,7 +17,7 @@ from pteron.kernels.c import Code, compiler
 from pteron.kernels.compilers import end_all
 from pteron.kernels.kept import Program, kept
 from pteron.kernels.kernel import Array, Kernel, sliced
-from pteron.kernels.programs import Columns, bare, program
+from pteron.kernels.programs import ALIKE, Columns, layout_of, program
 from pteron.kernels.targets import FIXED, Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -48,22 +48,26 @@ def numeric(
     asked.
     """
     columns = None if base is None else columns_of(base)
+    like = ALIKE.get()
     try:
-        return _known(robot, what, columns, wrench)
+        return _known(robot, what, columns, wrench, like)
     except TypeError:
         if isinstance(robot, Manipulator):
             raise
-        return _known(as_manipulator(robot), what, columns, wrench)
+        return _known(as_manipulator(robot), what, columns, wrench, like)
 
 
 @lru_cache(maxsize=512)
-def _known(robot: RobotLike, what: str, columns: Columns | None, wrench: bool) -> Adaptive:
+def _known(
+    robot: RobotLike, what: str, columns: Columns | None, wrench: bool, like: Manipulator | None
+) -> Adaptive:
     if not isinstance(robot, Manipulator):
         # Nothing is kept under a name: what its file says may change. A call with a machine, whose
         # kernel is known, never comes here, so that it pays nothing for this.
         raise TypeError
     kernel = guarded(robot, what, VirtualMachine, columns, wrench=wrench)
-    return Adaptive(kernel, _tier(bare(robot), what, columns, wrench))
+    tier = _tier(layout_of(robot), what, columns, wrench, like is not None)
+    return Adaptive(kernel, tier)
 
 
 def guarded(
@@ -88,8 +92,10 @@ def adaptive(key: tuple[Any, ...], build: Callable[[], Program]) -> Adaptive:
 
 
 @lru_cache(maxsize=512)
-def _tier(layout: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Tier:
-    """Return the code that machines of one layout share, whatever their inertial parameters."""
+def _tier(
+    layout: Manipulator, what: str, columns: Columns | None, wrench: bool, general: bool
+) -> Tier:
+    """Return the code that machines of one layout share, or if it is general of one topology."""
     built = program(layout, what, columns, wrench=wrench, guarded=True)
     return _tier_of(Code(built.name, built.function, built.inputs, built.outputs))
 

@@ -8,6 +8,9 @@ not; in exported code it is the other way round, 0 where all is well.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -64,6 +67,9 @@ SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
 _SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives")
 """Inputs of which one value serves a whole batch."""
 
+ALIKE: ContextVar[Manipulator | None] = ContextVar("alike", default=None)
+"""The machine whose general programs serve others of its topology for the moment."""
+
 Columns = tuple[tuple[int, ...], ...]
 """For each column of a base regressor, the inertial parameters whose columns it adds up."""
 
@@ -100,7 +106,41 @@ def program(
         raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
+    like = ALIKE.get()
+    if like is not None and columns is None:
+        return _general(like, what, wrench, guarded)
     return _known(bare(robot), what, columns, wrench, guarded, plain, named)
+
+
+@contextmanager
+def alike(robot: RobotLike) -> Iterator[None]:
+    """Within it the public functions take many machines of one topology, each only a few times.
+
+    They evaluate programs whose geometry is an input, so that nothing is built for a machine that
+    differs from `robot` in its numbers alone. Results are the same but for rounding.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.kernels import alike
+    >>> from pteron.manipulator import with_dimensions
+    >>> with alike("delta"):
+    ...     for crank in (0.3, 0.4):
+    ...         robot = with_dimensions("delta", crank=crank)
+    ...         print(pteron.inverse_kinematics(robot, [0.0, 0.0, -0.9]).round(3))
+    [0.183 0.183 0.183]
+    [0.006 0.006 0.006]
+    """
+    given = ALIKE.set(bare(robot))
+    try:
+        yield
+    finally:
+        ALIKE.reset(given)
+
+
+def layout_of(robot: RobotLike) -> Manipulator:
+    """Return the machine whose geometry programs have: the machine itself, or that of `alike`."""
+    return ALIKE.get() or bare(robot)
 
 
 def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
@@ -195,18 +235,19 @@ def general_program(robot: RobotLike, what: str) -> Program:
 
     The vector's order is that of `equations.machine.numbers`.
     """
-    return _general(bare(robot), what)
+    return _general(layout_of(robot), what)
 
 
-@lru_cache(maxsize=64)
-def _general(robot: Manipulator, what: str) -> Program:
-    return kept(("general", robot, what), partial(_generally_built, robot, what))
+@lru_cache(maxsize=256)
+def _general(robot: Manipulator, what: str, wrench: bool = False, guarded: bool = False) -> Program:
+    key = "general", robot, what, wrench, guarded
+    return kept(key, partial(_generally_built, robot, what, wrench, guarded))
 
 
-def _generally_built(robot: Manipulator, what: str) -> Program:
+def _generally_built(robot: Manipulator, what: str, wrench: bool, guarded: bool) -> Program:
     machine, vector = Machine.symbols(robot)
     # Exact arithmetic wants the equations as they stand.
-    return _program(machine, what, vector, plain=True)
+    return _program(machine, what, vector, wrench=wrench, guarded=guarded, plain=True)
 
 
 def _program(

@@ -41,6 +41,7 @@ Grade = Literal["specialised", "parametric", "general"]
 FIXED: dict[str, Callable[[Manipulator], Array]] = {
     "parameters": parameters,
     "drives": drive_numbers,
+    "geometry": lambda robot: np.array(numbers(robot)),
 }
 """The inputs that have a machine's own values unless a call gives others."""
 
