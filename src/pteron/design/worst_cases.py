@@ -1,0 +1,139 @@
+"""Worst values over all directions at poses: drives' forces and speeds, and errors of the tool.
+
+Each is exact, or bounded from above, over every direction; over places it is that of the poses that
+are given. A pose that the machine does not reach gives NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations, product
+from math import sqrt
+
+import numpy as np
+
+from pteron.dynamics import drive_forces
+from pteron.equations.drives import drives_of
+from pteron.indices import Tolerances, pose_error
+from pteron.kernels import Array
+from pteron.kinematics import jacobian
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+
+_BISECTIONS = 60
+"""Halvings for a multiplier: as exact as floats are."""
+
+_CELLS = 16
+"""Directions along each edge of a cube's face, over which an error of the tool is largest: they
+overstate it by less than 0.4 % in space, and by less than 0.2 % in a plane."""
+
+
+def worst_speeds(robot: Manipulator, poses: Array, speed: float) -> Array:
+    """Return the greatest speed of each joint (N, n) as P moves at a speed in any direction.
+
+    The platform does not turn meanwhile; m/s or rad/s. Exact: the norm of a row of J.
+    """
+    moving = len(robot.platform.lengths)
+    rows = jacobian(robot, poses, on_failure="nan")[..., :moving]
+    return np.asarray(speed * np.linalg.norm(rows, axis=-1))
+
+
+def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: float) -> Array:
+    """Return the greatest size of each drive's force (N, n), N or N m, over all motions of P.
+
+    Velocities up to a speed, m/s, and accelerations, m/s^2, in any direction, each by itself; the
+    platform does not turn. A force is affine in the acceleration, so that the worst is a row's
+    norm, and quadratic in the velocity: its extreme in a ball is that of the dual problem, which
+    has no gap (the S-lemma; I. Polik and T. Terlaky, SIAM Review 49(3), 2007). Dry friction takes
+    the side that adds to it, with all of Stribeck's part.
+    """
+    legs = (replace(leg, drive=_frictionless(leg.drive)) for leg in robot.legs)
+    rest, rows, squares = _expanded(replace(robot, legs=tuple(legs)), poses)
+    known = np.isfinite(rest).all(axis=-1)
+    found = np.full(rest.shape, np.nan)
+    if not known.all():
+        if known.any():
+            found[known] = worst_forces(robot, poses[known], speed, acceleration)
+        return found
+    drives = drives_of(robot)
+    lines = drives.viscous[:, None] * jacobian(robot, poses)[..., : squares.shape[-1]]
+    values, vectors = np.linalg.eigh(squares)
+    parts = np.einsum("...ij,...i->...j", vectors, lines) ** 2
+    still = acceleration * np.linalg.norm(rows, axis=-1) + drives.coulomb + drives.stribeck
+    rest = rest + drives.offset
+    above = rest + _most(values, parts, speed) + still
+    below = -rest + _most(-values, parts, speed) + still
+    return np.asarray(np.maximum(above, below))
+
+
+def _frictionless(drive: Drive | None) -> Drive | None:
+    return drive and Drive(rotor_inertia=drive.rotor_inertia, ratio=drive.ratio)
+
+
+def _expanded(robot: Manipulator, poses: Array) -> tuple[Array, Array, Array]:
+    """Return forces at rest (N, n), by acceleration (N, n, k), and as a form in v (N, n, k, k)."""
+    k = len(robot.platform.lengths)
+    axes = np.eye(robot.freedom)[:k]
+    pairs = list(combinations(range(k), 2))
+    still = np.zeros((1, robot.freedom))
+    crossed = (axes[[i]] + axes[[j]] for i, j in pairs)
+    velocities = np.concatenate([still, *([still] * k), axes, *crossed])
+    accelerations = np.zeros_like(velocities)
+    accelerations[1 : 1 + k] = axes
+    found = drive_forces(robot, poses[:, None], velocities, accelerations, on_failure="nan")
+    rest = found[:, 0]
+    rows, diagonal, mixed = np.split(found[:, 1:] - rest[:, None], [k, 2 * k], axis=1)
+    squares = np.zeros((*rest.shape, k, k))
+    squares[..., range(k), range(k)] = diagonal.swapaxes(1, 2)
+    for at, (i, j) in enumerate(pairs):
+        half = 0.5 * (mixed[:, at] - diagonal[:, i] - diagonal[:, j])
+        squares[..., i, j] = squares[..., j, i] = half
+    return rest, rows.swapaxes(1, 2), squares
+
+
+def _most(values: Array, parts: Array, size: float) -> Array:
+    """Return the maximum over |v| <= size of v^T C v + b^T v, by its dual.
+
+    `values` are the eigenvalues of C (..., k), `parts` the squares of b along its axes. The dual is
+    the least over mu >= max(0, values) of mu size^2 + sum(parts / (mu - values)) / 4.
+    """
+    floor = np.maximum(values.max(axis=-1), 0.0)
+    low, high = floor, floor + np.sqrt(parts.sum(axis=-1)) / (2.0 * size)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(_BISECTIONS if parts.any() else 0):
+            mu = 0.5 * (low + high)
+            terms = np.where(parts > 0.0, parts / (mu[..., None] - values) ** 2, 0.0)
+            falls = 0.25 * terms.sum(axis=-1) > size**2
+            low, high = np.where(falls, mu, low), np.where(falls, high, mu)
+        terms = np.where(parts > 0.0, parts / (high[..., None] - values), 0.0)
+    return np.asarray(high * size**2 + 0.25 * terms.sum(axis=-1))
+
+
+def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Tolerances) -> Array:
+    """Return how far the tool may be off at each pose (N,), m, if all errors are at their limits.
+
+    An upper bound, to first order in the errors: for every unit vector u the sum of |u . error| of
+    all sources; the greatest of these, over directions so dense that no other is larger by more
+    than is added.
+    """
+    lengths = len(robot.platform.lengths)
+    parts = pose_error(robot, poses, tolerances, on_failure="nan").parts[:, :lengths]
+    units, cosine = _directions(lengths)
+    return np.array([float(np.abs(units @ part).sum(axis=1).max()) for part in parts]) / cosine
+
+
+def _directions(count: int) -> tuple[Array, float]:
+    """Return unit vectors (D, count), and the cosine of the angle within which each other has one.
+
+    They lead through the middles of cells on a cube's faces; opposite ones count as one.
+    """
+    middles = (np.arange(_CELLS) + 0.5) * 2.0 / _CELLS - 1.0
+    found = [
+        np.insert(at, face, 1.0)
+        for face in range(count)
+        for at in product(middles, repeat=count - 1)
+    ]
+    vectors = np.array(found)
+    # An angle from the cube's centre is no more than the distance on a face.
+    farthest = sqrt(count - 1.0) / _CELLS
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True), float(np.cos(farthest))
