@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 from mechanisms import CATALOG
-from test_cli import done, refused
+from test_cli import done, refused, run
 
 import pteron
 from pteron.design import (
@@ -255,7 +255,7 @@ def test_what_changed_is_told_in_words(found):
     best = summary.chosen[0]
     lengths = [c for c in best.changes if c.what.startswith("upper length")]
     assert lengths
-    assert all(" mm, now " in change.words for change in lengths)
+    assert all(" mm -> " in change.words for change in lengths)
 
 
 def workspace_spec(**given):
@@ -359,5 +359,7 @@ def test_the_command_writes_what_it_finds(tmp_path):
     chosen = next(one for name, one in data["chosen"].items() if "best-links" in name)
     assert chosen["workspace_proved"] == [True]
     assert chosen["links"] == pytest.approx(rows["links (m)"].min())
-    assert json.loads(done(line)) == data
+    again = run(line)
+    assert json.loads(again.stdout) == data
+    assert "going on; an earlier run has begun 2 generations" in again.stderr
     assert "--sweep: needs --out" in refused(f"design {spec} --sweep 10")

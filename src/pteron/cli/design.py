@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.progress import progress_bar
-from pteron.cli.terminal import plain, show, show_json, table, written
+from pteron.cli.terminal import note, plain, show, show_json, table, written
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -70,6 +70,7 @@ def design(
         from pteron.report.write import checked_folder
 
         checked_folder(out)
+        _tell_resumed(Path(out))
     front = _found(asked, out, sweep, workers, scheduler)
     summary = Summary(front)
     files = [] if out is None else _write(summary, Path(out))
@@ -78,6 +79,14 @@ def design(
         return
     _show(summary)
     show(*written(*files))
+
+
+def _tell_resumed(folder: Path) -> None:
+    """Say whether the search goes on from what is there."""
+    for name, word in ((_GENERATIONS, "generations"), (_SURVEY, "blocks")):
+        count = len([*(folder / name).glob("[0-9]*")])
+        if count:
+            note(f"Note: {folder / name}: going on; an earlier run has begun {count} {word}")
 
 
 def _found(
@@ -128,18 +137,21 @@ def _figure(summary: Summary) -> Figure:
 
 
 def _show(summary: Summary) -> None:
+    from pteron.design.spec import asked_words
+
     front = summary.front
     show(
         f"[bold]{plain(front.task.robot.name)}[/bold]: {front.evaluated} designs evaluated, "
         f"{front.kept} keep all that is asked, {len(front)} on the front"
     )
+    show(*(f"Asked for: {plain(line)}" for line in asked_words(front.task.spec)))
     show(*(f"To begin with: {plain(line)}" for line in summary.start.proofs))
     numbers = ("to begin with", "now", "change")
     for told in summary.chosen:
-        rows = ((plain(c.what), c.told(c.before), c.told(c.after), c.by) for c in told.changes)
+        rows = ((plain(c.what), c.shown(c.before), c.shown(c.after), c.by) for c in told.changes)
         show(
             "",
             f"[bold]{plain(told.name.replace('-', ' '))}[/bold]",
             table("what", *numbers, rows=rows, numbers=numbers),
-            *(plain(line) for line in told.proofs),
+            *(plain(line) for line in (*told.proofs, *told.covers)),
         )

@@ -4,32 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
-from pteron.design.quantities import quantities
+from pteron.design.quantities import COVERS, quantities
 from pteron.design.region import workspace_poses
+from pteron.design.spec import ROUNDING, WorkspaceTable
 from pteron.design.task import Task
-from pteron.equations.drives import drive_numbers
+from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.equations.machine import numbers
-from pteron.kernels import Array
+from pteron.errors import ModelError, SingularPose, UnreachablePose
+from pteron.kernels import Array, alike
 from pteron.kinematics.sampling import joint_limits, search_ball
 from pteron.manipulator import Manipulator, parameters
+from pteron.motion import Motion, Sizing, size
 from pteron.renamed import former_attribute
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.samples import cube, shape_samples
 
 _IN_CUBE = 5
 """Sample poses along each edge of the largest cube, where that stands for the workspace."""
-
-
-class DriveMotion(NamedTuple):
-    """Joint rates and drives' forces at the workspace's corners."""
-
-    rates: Array
-    forces: Array
 
 
 @dataclass(frozen=True)
@@ -43,7 +37,7 @@ class Design:
     robot : Manipulator
         The machine.
     known : Fit, optional
-        Its largest cube, where that is proved.
+        Its largest cube, or the place of its workspace, where that is proved.
     least : float
         The least row of the conditions over the required workspace that a proof has shown.
     """
@@ -68,28 +62,30 @@ class Design:
 
     @cached_property
     def cube(self) -> Fit:
-        """The largest cube: found, and proved where it is known."""
+        """The largest cube, or copy of a floating workspace: found, proved where it is known."""
         if self.known is not None:
             return self.known
         return self.cube_without(np.empty((0, self.robot.freedom)))
 
     def cube_without(self, failing: Array) -> Fit:
-        """Return the largest cube that holds none of the poses (F, m), which are known to fail."""
+        """Return the same that holds none of the poses (F, m), which are known to fail."""
         task, ball = self.task, search_ball(self.robot)
-        shape = cube(len(ball[0]))
+        shape, _ = task.shape
         return largest_fit(task.conditions, self.geometry, task.orientations, ball, failing, shape)
+
+    @cached_property
+    def workspace(self) -> WorkspaceTable | None:
+        """The required workspace, where it is in this design."""
+        asked = self.task.spec.workspace
+        return asked.placed(self.cube.center) if asked is not None and asked.floats else asked
 
     @cached_property
     def poses(self) -> Array:
         """Poses of the required workspace, or of the cube where none is required, (N, m)."""
-        return self._region(None)
-
-    def _region(self, samples: int | None) -> Array:
-        spec = self.task.spec
-        if spec.workspace is not None:
-            return workspace_poses(spec.workspace, self.task.orientations, samples)
+        if self.workspace is not None:
+            return workspace_poses(self.workspace, self.task.orientations)
         shape = cube(len(self.cube.center))
-        lattice = shape_samples(shape, self.task.orientations, samples or _IN_CUBE)
+        lattice = shape_samples(shape, self.task.orientations, _IN_CUBE)
         return lattice.at(self.cube.center, self.cube.edge)
 
     @cached_property
@@ -98,31 +94,41 @@ class Design:
         return self.values("joint_coordinates")
 
     @cached_property
-    def drive_motion(self) -> DriveMotion:
-        """Joint rates (K, n) and drives' forces at the corners, in both directions of each axis."""
+    def carrying(self) -> Manipulator:
+        """The machine with the payload."""
+        payload = self.task.spec.payload
+        return self.robot if payload is None else payload.on(self.robot)
+
+    @cached_property
+    def forces(self) -> Array:
+        """The greatest force of each drive (N, n) at these poses, over all directions, N or N m."""
         motion = self.task.spec.motion
-        corners = self._region(2)
+        return worst_forces(self.carrying, self.poses, motion.speed, motion.acceleration)
+
+    @cached_property
+    def speeds(self) -> Array:
+        """The greatest speed of each joint (N, n) at these poses, over all directions."""
+        return worst_speeds(self.robot, self.poses, self.task.spec.motion.speed)
+
+    @cached_property
+    def cycles(self) -> tuple[Motion, ...]:
+        """The motions of the cycles, about the workspace's middle; as they stand without one."""
+        spec, middle = self.task.spec, self.task.orientations[0].copy()
         lengths = len(self.robot.platform.lengths)
-        axes = np.eye(self.robot.freedom)[:lengths]
-        ways = [
-            (motion.speed * way, side * motion.acceleration * axis)
-            for way, axis, side in product((*axes, *-axes), axes, (1.0, -1.0))
-        ]
-        velocity, acceleration = (np.array(part) for part in zip(*ways, strict=True))
-        poses = np.repeat(corners, len(ways), axis=0)
-        states = [np.tile(part, (len(corners), 1)) for part in (velocity, acceleration)]
-        jacobians = self.task.function("jacobian")(corners, geometry=self.geometry)
-        forces = self.task.function("drive_forces")(
-            poses,
-            *states,
-            geometry=self.geometry,
-            parameters=parameters(self.robot),
-            drives=drive_numbers(self.robot),
+        ends = None if self.workspace is None else np.array(self.workspace.ends)
+        if ends is not None:
+            middle[:lengths] = ends.mean(axis=0)
+        elif any(cycle.scale for cycle in spec.cycles):
+            middle[:lengths] = self.cube.center
+        return tuple(
+            one.motion(self.robot, middle, spec.motion.acceleration) for one in spec.cycles
         )
-        return DriveMotion(
-            np.einsum("kij,lj->kli", jacobians, velocity).reshape(-1, self.robot.joint_count),
-            forces,
-        )
+
+    @cached_property
+    def sizings(self) -> tuple[Sizing, ...]:
+        """The loads on the drives over each cycle, with the payload."""
+        pairs = zip(self.cycles, self.task.spec.cycles, strict=True)
+        return tuple(size(self.carrying, motion, dwell=one.dwell) for motion, one in pairs)
 
     @cached_property
     def _sides(self) -> dict[float, float]:
@@ -138,26 +144,79 @@ class Design:
     @property
     def side(self) -> float:
         """The sign of the type-II measure in the workspace."""
-        if self.task.spec.workspace is None:
+        if self.workspace is None or self.task.floats:
             return self.cube.side
         return max(self._sides, key=self._sides.__getitem__)
 
     @property
+    def scale(self) -> float:
+        """The largest factor at which the floating workspace is found to fit."""
+        return self.cube.edge / self.task.shape[1]
+
+    @property
     def margin(self) -> float:
-        """The least row of the conditions over the workspace; below 0 where one fails."""
-        if self.task.spec.workspace is None:
+        """The least row of the conditions over the workspace; below 0 where one fails.
+
+        Of a workspace that floats and does not fit, how much of it is left out.
+        """
+        if self.workspace is None:
             return self.cube.margin
-        return min(max(self._sides.values()), self.least)
+        if self.task.floats and self.scale < 1.0 - ROUNDING:
+            return self.scale - 1.0 + (min(self.cube.margin, 0.0) if self.scale == 0.0 else 0.0)
+        return min(self._sides[self.side], self.least)
 
     reserve = former_attribute("reserve", "margin")
     start_strokes = former_attribute("start_strokes", "reference_strokes")
 
     def quantity(self, name: str) -> float:
-        """Return one of its quantities; NaN where it has none."""
-        if self.task.spec.workspace is None and self.cube.edge <= 0.0 and name != "cube":
-            own = quantities()[name].of_machine
-            return own(self.robot) if own is not None else float("nan")
-        return float(quantities()[name].of(self))
+        """Return one of its quantities; NaN where it has none, see `lack`."""
+        return self._quantities(name)[0]
+
+    def lack(self, name: str) -> str:
+        """Return why it has no such quantity; empty where it has it."""
+        return self._quantities(name)[1]
+
+    def cover(self, name: str) -> str:
+        """Return over what one of its quantities is known, in words."""
+        times = sum(2 * len(motion.time) - 1 for motion in self.cycles) if self.cycles else 0
+        words = COVERS[quantities()[name].cover].format(places=len(self.poses), times=times)
+        floor = dict(self.task.floors).get(name)
+        return f"{words}; the proof is of at least {floor:.12g}" if floor else words
+
+    @property
+    def reached(self) -> bool:
+        """Whether all poses of the workspace, or the cube, are in reach."""
+        return bool(np.isfinite(self.joints).all())
+
+    @cached_property
+    def _found(self) -> dict[str, tuple[float, str]]:
+        return {}
+
+    def _quantities(self, name: str) -> tuple[float, str]:
+        if name not in self._found:
+            self._found[name] = self._evaluated(name)
+        return self._found[name]
+
+    def _evaluated(self, name: str) -> tuple[float, str]:
+        """Return a quantity and, where there is none, why."""
+        quantity = quantities()[name]
+        if quantity.of_machine is not None:
+            return float(quantity.of_machine(self.robot)), ""
+        if name in ("cube", "scale"):
+            return float(quantity.of(self)), ""
+        nowhere = self.cube.edge <= 0.0 if self.task.seeks_place else False
+        if nowhere and (self.workspace is None or self.task.floats):
+            return np.nan, "there is no cube" if self.workspace is None else "it fits nowhere"
+        try:
+            with alike(self.task.robot):
+                found = float(quantity.of(self))
+        except (UnreachablePose, SingularPose, ModelError) as error:
+            return np.nan, str(error)
+        if not np.isnan(found):
+            return found, ""
+        out = int((~np.isfinite(self.joints).all(axis=-1)).sum())
+        where = f"{out} of {len(self.poses)} sampled poses are out of reach"
+        return np.nan, where if out else "it has none at some sampled pose: a singularity"
 
     @cached_property
     def strokes(self) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pteron.design.design import Design
@@ -13,6 +14,9 @@ from pteron.renamed import former_attribute
 
 _NONE = 1e-9
 """Smaller changes, in m or without unit, count as none."""
+
+_SMALL = 1e-2
+"""Length from which on a tenth of a millimetre is fine enough, m."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +40,19 @@ class Change:
 
     @property
     def words(self) -> str:
-        """The change as a clause: "upper length of legs 2 and 4: 154 mm, now 246 mm (+60 %)"."""
-        return f"{self.what}: {self.shown(self.before)}, now {self.shown(self.after)} ({self.by})"
+        """The change as a clause: "upper length of legs 2 and 4 154.0 mm -> 246.0 mm (+59.7 %)"."""
+        return f"{self.what} {self.shown(self.before)} -> {self.shown(self.after)} ({self.by})"
 
     @property
     def by(self) -> str:
-        """The change as a share, or as a difference where a share says nothing."""
-        if self.before > _NONE and self.after > 0.0:
+        """By how much the size grows, in %; what is new or turns its sign, as a difference."""
+        if math.isnan(self.before) or math.isnan(self.after):
+            return ""
+        if abs(self.before) > _NONE and self.before * self.after > 0.0:
             text = f"{100.0 * (self.after / self.before - 1.0):+.1f} %"
             return "none" if float(text[:-2]) == 0.0 else text
+        if abs(self.after - self.before) <= _NONE:
+            return "none"
         return (
             f"{'+' if self.after > self.before else '-'}{self.shown(abs(self.after - self.before))}"
         )
@@ -53,8 +61,10 @@ class Change:
 
     def shown(self, value: float) -> str:
         """Return a value with its unit; lengths in millimetres."""
+        if math.isnan(value):
+            return "none"
         if self.unit == "m":
-            return f"{1000.0 * value:.1f} mm"
+            return f"{1000.0 * value:{'.1f' if abs(value) >= _SMALL else '.3g'}} mm"
         return f"{value:.4g} {self.unit}".rstrip()
 
 
@@ -111,6 +121,6 @@ def stroke_words(design: Design) -> list[str]:
             else f" of its limits {scale * leg.limits[0]:.4g} to {scale * leg.limits[1]:.4g} {unit}"
         )
         lines.append(
-            f"{leg.joint.noun} of leg {i}: {scale * a:.1f} to {scale * b:.1f} {unit}{limits}"
+            f"{leg.joint.noun} of leg {i}: {scale * a:.4g} to {scale * b:.4g} {unit}{limits}"
         )
     return lines

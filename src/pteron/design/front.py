@@ -11,7 +11,7 @@ import numpy as np
 
 from pteron.design.design import Design
 from pteron.design.proofs import counterexamples
-from pteron.design.rows import MISSES
+from pteron.design.rows import FAILED, MISSES, places
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -97,7 +97,7 @@ class Front:
         for name in self.task.asked:
             unit = self.task.unit(name)
             found[name] = f"{name} ({unit})" if unit else name
-        return found
+        return found | {name: f"{name} (m)" for name in places(self.task)}
 
 
 class Proofs:
@@ -146,7 +146,7 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
     nearest: pl.DataFrame | None = None
     evaluated = kept = 0
     for part in parts:
-        missed = _missed(part)
+        missed = _missed(task, part)
         good = part.filter(missed == 0.0)
         evaluated, kept = evaluated + len(part), kept + len(good)
         if len(good):
@@ -154,17 +154,19 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
         elif best is None:
             near = part[[int(missed.argmin())]]
             both = near if nearest is None else pl.concat([nearest, near])
-            nearest = both[[int(_missed(both).argmin())]]
+            nearest = both[[int(_missed(task, both).argmin())]]
     if best is None:
         assert nearest is not None  # there is at least one design
         raise _impossible(task, nearest, evaluated)
     return Front(task, best, evaluated, kept)
 
 
-def _missed(designs: pl.DataFrame) -> Array:
-    """Return how much each design misses, all in all."""
+def _missed(task: Task, designs: pl.DataFrame) -> Array:
+    """Return how much each design misses, all in all; one without an objective misses it."""
     names = [name for name in designs.columns if name.startswith(MISSES)]
-    return np.asarray(designs.select(names).to_numpy().sum(axis=1))
+    objectives = designs.select([o.quantity for o in task.spec.objectives]).to_numpy()
+    missed = designs.select(names).to_numpy().sum(axis=1)
+    return np.asarray(missed + FAILED * (~np.isfinite(objectives)).sum(axis=1))
 
 
 def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
@@ -173,7 +175,6 @@ def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
 
     signs = np.array([o.sign for o in task.spec.objectives])
     costs = good.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
-    costs = np.where(np.isfinite(costs), costs, np.inf)
     best = non_dominated(costs)
     best = best[np.lexsort(costs[best].T[::-1])]
     apart = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
@@ -184,15 +185,18 @@ def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
     """Return what is said where no design keeps all that is asked."""
     row = nearest.row(0, named=True)
+    design = Design(task, task.machine([row[v.name] for v in task.variables]))
     told = []
     for name in (name for name in nearest.columns if name.startswith(MISSES) and row[name] > 0.0):
         if name == f"{MISSES}workspace":
-            machine = task.machine([row[v.name] for v in task.variables])
             what = "the workspace" if task.spec.workspace else "a cube"
-            told.append(f"{what} is not kept ({_worst_condition(Design(task, machine))})")
+            told.append(f"{what} is not kept ({_worst_condition(design)})")
         else:
             asked = task.spec.requirements[int(name.split()[1]) - 1]
-            told.append(f"{asked.words} is missed, with {row[asked.quantity]:.4g}")
+            told.append(f"{asked.words} is missed, {_value(design, asked.quantity, row)}")
+    for one in task.spec.objectives:
+        if not np.isfinite(row[one.quantity]):
+            told.append(f"{one.quantity}: {_value(design, one.quantity, row)}")
     at = ", ".join(f"{v.name} = {row[v.name]:.4g}" for v in task.variables)
     return ModelError(
         f"none of {evaluated} designs keeps all that is asked; the nearest, {at}: "
@@ -201,10 +205,17 @@ def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError
     )
 
 
+def _value(design: Design, name: str, row: dict[str, Any]) -> str:
+    """Return the value of a quantity in words, or why there is none."""
+    if np.isfinite(row[name]):
+        return f"with {row[name]:.4g} {design.task.unit(name)}".rstrip()
+    return f"for there is none: {design.lack(name)}"
+
+
 def _worst_condition(design: Design) -> str:
     """Return which condition a machine misses most in the workspace, and where."""
     task = design.task
-    if task.spec.workspace is None:
+    if task.spec.workspace is None or task.floats:
         center = design.cube.center
         poses = task.orientations.copy()
         poses[:, : len(center)] = center

@@ -13,15 +13,19 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.design.design import Design
+from pteron.design.spec import ROUNDING, WorkspaceTable
 from pteron.design.task import Task
 from pteron.kernels import Array
 from pteron.workspace import Box, Cylinder, Proof, Region, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
-from pteron.workspace.samples import Samples, cube, fixed_samples
+from pteron.workspace.samples import Samples, fixed_samples
 
 _SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
 """Shares of the cube's edge that are tried in turn: at the whole edge some condition is zero, which
 cannot be decided."""
+
+_PLACED = (1.0, 0.9999)
+"""Shares of a workspace that floats, at the place that is found for it."""
 
 _MOST = 200_000
 """Boxes after which a proof is given up."""
@@ -55,12 +59,17 @@ class ProvedCube:
     @property
     def words(self) -> str:
         """The statement that is proved, in a sentence."""
-        center = ", ".join(f"{round(1000.0 * x, 1) + 0.0:g}" for x in self.center)
         boxes = sum(proof.boxes for proof in self.proofs)
         return (
             f"proved: every position of the cube with edge {1000.0 * self.edge:.1f} mm about "
-            f"({center}) mm keeps reach, limits and floors, by intervals over {boxes} boxes"
+            f"{place_words(self.center)} keeps reach, limits and floors, by intervals over {boxes} "
+            "boxes"
         )
+
+
+def place_words(center: Array) -> str:
+    """Return a place in words: "(0, 0, -812.4) mm"."""
+    return f"({', '.join(f'{round(1000.0 * x, 1) + 0.0:g}' for x in center)}) mm"
 
 
 @dataclass(frozen=True)
@@ -84,16 +93,25 @@ class Proved:
 
 def proved(design: Design) -> Proved:
     """Return a design with its proofs, and with the cube that they leave it."""
-    known, found = None, None
-    if design.task.seeks_cube:
+    task, found = design.task, None
+    workspace: tuple[Proof, ...] = ()
+    if task.seeks_place:
         known, found = design.cube, proved_cube(design)
         if found is not None:
             known = Fit(found.center, found.edge, found.side, 0.0)
-        elif known.edge > 0.0:
+        elif known.edge > task.shape[1] * _SHARES[0]:
             known = replace(known, edge=0.0, margin=UNKNOWN)
+        design = replace(design, known=known)
+    if task.floats:
+        if found is not None and found.edge >= task.shape[1] * _SHARES[0] * (1.0 - ROUNDING):
+            workspace = found.proofs
+            design = replace(
+                design, known=replace(design.cube, edge=max(found.edge, task.shape[1]))
+            )
+        return Proved(design, None, workspace)
     workspace = workspace_proofs(design)
     least = min((_least(design, one) for one in workspace if not one.holds), default=np.inf)
-    return Proved(replace(design, known=known, least=least), found, workspace)
+    return Proved(replace(design, least=least), found, workspace)
 
 
 @lru_cache(maxsize=8)
@@ -103,16 +121,27 @@ def start_design(task: Task) -> Design:
 
 
 def proved_cube(design: Design) -> ProvedCube | None:
-    """Return the largest cube of a design that is found and proved; None where none is."""
+    """Return the largest cube of a design that is found and proved; None where none is.
+
+    Of a workspace that floats the place that is found, at the size that is required or, where its
+    `scale` is asked for, the largest.
+    """
+    task = design.task
+    shape, least = task.shape
+    capped = task.floats and "scale" not in task.asked
 
     def search(failing: Array) -> Fit:
-        return design.cube_without(failing) if len(failing) else design.cube
+        fit = design.cube_without(failing) if len(failing) else design.cube
+        if not capped:
+            return fit
+        fits = fit.edge >= least * (1.0 - ROUNDING)
+        return replace(fit, edge=min(fit.edge, least) if fits else 0.0)
 
     def proofs(fit: Fit) -> tuple[Proof, ...]:
         return cube_proofs(design, fit.center, fit.edge)
 
-    shape = cube(len(design.robot.platform.lengths))
-    found = proved_fit(search, proofs, shape, _SHARES, design.robot.freedom)
+    shares = _PLACED if capped else _SHARES
+    found = proved_fit(search, proofs, shape, shares, design.robot.freedom)
     if found is None:
         return None
     fit, proved = found
@@ -120,11 +149,20 @@ def proved_cube(design: Design) -> ProvedCube | None:
 
 
 def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]:
-    """Return the proofs of a cube, one for each orientation up to the first that does not hold."""
+    """Return the proofs of a cube, one for each orientation up to the first that does not hold.
+
+    Of a workspace that floats, at this place, its greatest side being `edge`.
+    """
     found = []
+    floating = design.task.spec.workspace if design.task.floats else None
     for pose in design.task.orientations:
-        ends = (_whole(pose, center + side * edge) for side in (-0.5, 0.5))
-        found.append(_proof(design, Box(*ends)))
+        if floating is None:
+            ends = (_whole(pose, center + side * edge) for side in (-0.5, 0.5))
+            region: Region = Box(*ends)
+        else:
+            share = edge / design.task.shape[1]
+            region = workspace_region(floating.placed(center), pose, share)
+        found.append(_proof(design, region))
         if not found[-1].holds:
             break
     return tuple(found)
@@ -136,19 +174,20 @@ def workspace_proofs(design: Design) -> tuple[Proof, ...]:
     Where it touches the boundary it is undecided; the proof is then of 0.9999 of it, about its
     middle, if that can be proved: its region tells, and `workspace_share`.
     """
-    found = []
-    for pose in design.task.orientations if design.task.spec.workspace is not None else ():
-        whole = _proof(design, workspace_region(design, pose))
-        smaller = None if whole.holds is not None else workspace_region(design, pose, _SHARES[0])
+    found: list[Proof] = []
+    asked = design.workspace
+    if asked is None:
+        return ()
+    for pose in design.task.orientations:
+        whole = _proof(design, workspace_region(asked, pose))
+        smaller = None if whole.holds is not None else workspace_region(asked, pose, _SHARES[0])
         nearly = whole if smaller is None else _proof(design, smaller)
         found.append(nearly if nearly.holds else whole)
     return tuple(found)
 
 
-def workspace_region(design: Design, pose: Array, share: float = 1.0) -> Region:
-    """Return the required workspace at the orientation of a pose, or a share of it."""
-    asked = design.task.spec.workspace
-    assert asked is not None  # who asks has one
+def workspace_region(asked: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
+    """Return a workspace that has its place, at the orientation of a pose, or a share of it."""
     if asked.shape == "cylinder":
         assert asked.radius is not None  # the shape says so
         assert asked.height is not None
@@ -162,10 +201,11 @@ def workspace_region(design: Design, pose: Array, share: float = 1.0) -> Region:
 
 def counterexamples(design: Design, center: Array, edge: float) -> Samples:
     """Return points of a cube, and of the required workspace, that proofs have shown to fail."""
-    cube = cube_proofs(design, center, _SHARES[0] * edge) if edge > 0.0 else ()
+    edge = min(edge, design.task.shape[1]) if design.task.floats else _SHARES[0] * edge
+    cube = cube_proofs(design, center, edge) if edge > 0.0 else ()
     inside, fixed = (
         np.array([p.counterexample for p in part if p.counterexample is not None])
-        for part in (cube, workspace_proofs(design))
+        for part in (cube, () if design.task.floats else workspace_proofs(design))
     )
     size, lengths = design.robot.freedom, len(center)
     inside, fixed = inside.reshape(-1, size), fixed.reshape(-1, size)
@@ -176,12 +216,17 @@ def counterexamples(design: Design, center: Array, edge: float) -> Samples:
 
 def workspace_share(design: Design, proof: Proof) -> float:
     """Return which share of the required workspace a proof is of."""
-    whole = (workspace_region(design, pose) for pose in design.task.orientations)
+    asked = design.workspace
+    assert asked is not None  # who asks has one
+    if design.task.floats:
+        sides = np.ptp(proof.region.box, axis=0)[: len(design.cube.center)]
+        return min(1.0, round(float(sides.max()) / design.task.shape[1], 6))
+    whole = (workspace_region(asked, pose) for pose in design.task.orientations)
     return 1.0 if proof.region in whole else _SHARES[0]
 
 
 def _proof(design: Design, region: Region) -> Proof:
-    floors = design.task.spec.floors
+    floors = design.task.floors
     return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
 
 

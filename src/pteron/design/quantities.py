@@ -6,14 +6,29 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from pteron.design.cycle_loads import best_motors, shortest_time
+from pteron.design.worst_cases import worst_position_errors
 from pteron.errors import shown
-from pteron.indices import INDICES, Index
+from pteron.indices import INDICES, Index, stiffness
 from pteron.manipulator import Manipulator
 from pteron.workspace import clearance
+
+Cover = Literal["machine", "proved", "places", "directions", "bound", "cycles"]
+"""How far a quantity is known: see `COVERS`."""
+
+COVERS: dict[Cover, str] = {
+    "machine": "of the machine alone, exact",
+    "proved": "found, and proved",
+    "places": "at {places} sampled poses",
+    "directions": "exact over all directions, at {places} sampled poses",
+    "bound": "bounded from above over all directions, to first order, at {places} sampled poses",
+    "cycles": "at {times} times of the cycles",
+}
+"""How far a quantity is known, in words."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +45,19 @@ class Quantity:
         Takes a `Design`; NaN where there is none.
     of_machine : callable or None
         The same from the machine alone, where its poses do not matter: then gradients are known.
+    cover : str
+        How far it is known, a key of `COVERS`.
     """
 
     unit: str
     about: str
     of: Callable[[Any], float]
     of_machine: Callable[[Manipulator], float] | None = None
+    cover: Cover = "places"
 
 
 def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> Quantity:
-    return Quantity(unit, about, lambda design: of(design.robot), of)
+    return Quantity(unit, about, lambda design: of(design.robot), of, "machine")
 
 
 def _links(robot: Manipulator) -> float:
@@ -84,29 +102,45 @@ def _stroke(design: Any) -> float:
     return float((design.strokes / design.reference_strokes).max())
 
 
-def _speed(design: Any) -> float:
-    return float(np.abs(design.drive_motion.rates).max())
-
-
-def _force(design: Any) -> float:
-    return float(np.abs(design.drive_motion.forces).max())
-
-
 def _drive_load(design: Any) -> float:
     """Return the greatest share of what drives can do, force or speed."""
-    found, shares = design.drive_motion, [0.0]
+    shares = [0.0]
     for i, leg in enumerate(design.robot.legs):
         drive = leg.drive
         if drive is not None and drive.max_force is not None:
-            shares.append(float(np.abs(found.forces[:, i]).max()) / drive.max_force)
+            shares.append(float(design.forces[:, i].max()) / drive.max_force)
         if drive is not None and drive.max_speed is not None:
-            shares.append(float(np.abs(found.rates[:, i]).max()) / drive.max_speed)
-    return max(shares)
+            shares.append(float(design.speeds[:, i].max()) / drive.max_speed)
+    return float(np.max(shares))
+
+
+def _stiffness(design: Any) -> float:
+    elastic = design.task.spec.elasticity.elasticity
+    return float(stiffness(design.robot, design.poses, elastic, on_failure="nan").least.min())
+
+
+def _accuracy(design: Any) -> float:
+    tolerances = design.task.spec.errors.tolerances
+    return float(worst_position_errors(design.robot, design.poses, tolerances).max())
+
+
+def _cycle_time(design: Any) -> float:
+    rests = sum(cycle.dwell for cycle in design.task.spec.cycles)
+    return float(rests) + sum(shortest_time(design.carrying, motion) for motion in design.cycles)
 
 
 _OWN = {
     "cube": Quantity(
-        "m", "edge of the largest cube that keeps the floors and limits", lambda d: d.cube.edge
+        "m",
+        "edge of the largest cube that keeps the floors and limits",
+        lambda d: d.cube.edge,
+        cover="proved",
+    ),
+    "scale": Quantity(
+        "",
+        "factor by which a workspace that floats can grow, 1 as it is asked for",
+        lambda d: d.scale,
+        cover="proved",
     ),
     "links": _simple("m", "sum of the links' lengths", _links),
     "moving_mass": _simple("kg", "mass of all that moves", _moving_mass),
@@ -125,17 +159,64 @@ _OWN = {
         _stroke,
     ),
     "speed": Quantity(
-        "m/s or rad/s", "greatest speed of a joint, at [motion] speed along each axis", _speed
+        "m/s or rad/s",
+        "greatest speed of a joint, at [motion] speed in any direction",
+        lambda d: d.speeds.max(),
+        cover="directions",
     ),
     "force": Quantity(
         "N or N m",
-        "greatest force of a drive at the workspace's corners, at [motion] speed and acceleration",
-        _force,
+        "greatest force of a drive, at [motion] speed and acceleration in any directions",
+        lambda d: d.forces.max(),
+        cover="directions",
     ),
     "drive_load": Quantity(
         "",
         "greatest of these forces and speeds over what the file says a drive can do",
         _drive_load,
+        cover="directions",
+    ),
+    "stiffness": Quantity(
+        "N/m", "least stiffness at the tool, in its worst direction", _stiffness, cover="directions"
+    ),
+    "deflection": Quantity(
+        "m",
+        "most that the tool gives way under [elasticity] force",
+        lambda d: d.task.spec.elasticity.force / _stiffness(d),
+        cover="directions",
+    ),
+    "accuracy": Quantity(
+        "m", "most that the tool may be off by all [errors] together", _accuracy, cover="bound"
+    ),
+    "cycle_time": Quantity(
+        "s",
+        "shortest time of all cycles, each evenly faster or slower, by the drives of the file",
+        _cycle_time,
+        cover="cycles",
+    ),
+    "cycle_force": Quantity(
+        "N or N m",
+        "greatest force of a drive over the cycles, in the time that they are given",
+        lambda d: max(one.peak_forces.max() for one in d.sizings),
+        cover="cycles",
+    ),
+    "cycle_speed": Quantity(
+        "m/s or rad/s",
+        "greatest speed of a joint over the cycles",
+        lambda d: max(one.peak_speeds.max() for one in d.sizings),
+        cover="cycles",
+    ),
+    "cycle_energy": Quantity(
+        "J",
+        "energy that the drives give while they drive, all cycles once",
+        lambda d: sum(one.given_energy.sum() for one in d.sizings),
+        cover="cycles",
+    ),
+    "motor_margin": Quantity(
+        "",
+        "least over joints and cycles of what the best motor of the list can do over what it must",
+        lambda d: min(fit.margin for fit in best_motors(d.sizings, d.task.motors)),
+        cover="cycles",
     ),
 }
 

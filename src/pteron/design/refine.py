@@ -10,17 +10,21 @@ import numpy as np
 from pteron.design.design import Design
 from pteron.design.proofs import counterexamples, proved
 from pteron.design.quantities import quantities
-from pteron.design.rows import ROUNDING
+from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.design.variables import geometry_slopes, slopes_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.workspace.exchange import POINTS, Program, improved
-from pteron.workspace.samples import Samples, cube, fixed_samples, shape_samples
+from pteron.workspace.samples import Samples, fixed_samples, shape_samples
 
 _EXCHANGES = 8
 """Most times that counterexamples of the result's proof join its conditions."""
+
+_SPARE = 1e-4
+"""Share by which a workspace that floats is kept larger than it must be: then all of it is proved,
+and not all but its rim."""
 
 _FIRST = 5
 """Points along a cube's edge at which its conditions are evaluated at first."""
@@ -47,11 +51,13 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         return list(values)
     center, radius = search_ball(design.robot)
     lengths = len(center)
-    seeks = task.seeks_cube
+    seeks = task.seeks_place
+    shape, least = task.shape
     fit, reach = np.zeros(lengths + 1), np.zeros((lengths + 1, 2))
     if seeks:
         fit = np.append(design.cube.center, design.cube.edge)
         reach = np.append(center, radius)[:, None] + [-radius, radius]
+        reach[-1, 0] = min((1.0 + _SPARE) * least, fit[-1])
     z0 = np.append(start, fit)
     program = Program(
         task.conditions,
@@ -61,7 +67,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         geometry,
         asked.sign * wanted,
         np.vstack([task.ranges.T, reach]),
-        cube(lengths),
+        shape,
         task.orientations if seeks else task.orientations[:0],
         tuple(slopes.bounds(objective, z0)),
     )
@@ -79,8 +85,8 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
 def _asked_at(design: Design, lengths: int, count: int) -> Samples:
     """Return poses of the workspace, of the cube, or of both, as the search asks for them."""
     task = design.task
-    moving = shape_samples(cube(lengths), task.orientations, count)
-    if task.spec.workspace is None:
+    moving = shape_samples(task.shape[0], task.orientations, count)
+    if task.spec.workspace is None or task.floats:
         return moving
     fixed = fixed_samples(design.poses, lengths)
     return fixed.joined(moving) if task.seeks_cube else fixed
@@ -97,8 +103,9 @@ class _Slopes:
     def of(self, name: str) -> Array | None:
         """Return a quantity's slopes (V + k + 1,), or None where it has none."""
         task, tail = self.task, len(self.task.robot.platform.lengths) + 1
-        if name == "cube":
-            return np.append(np.zeros(len(self.start) + tail - 1), 1.0)
+        if name in ("cube", "scale"):
+            edge = task.shape[1] if name == "scale" else 1.0
+            return np.append(np.zeros(len(self.start) + tail - 1), 1.0 / edge)
         alone = quantities()[name].of_machine
         if alone is None:
             return None

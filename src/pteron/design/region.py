@@ -1,4 +1,4 @@
-"""Sample poses of a required workspace: a box, a cube or a cylinder at some orientations."""
+"""Sample poses and shape of a required workspace: a box, cube or cylinder at some orientations."""
 
 from __future__ import annotations
 
@@ -8,6 +8,32 @@ import numpy as np
 
 from pteron.design.spec import WorkspaceTable
 from pteron.kernels import Array
+from pteron.workspace.samples import Shape
+
+_RING = 24
+"""Points round a cylinder's rim."""
+
+
+def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float]:
+    """Return the shape of a workspace in `count` coordinates, and its edge: the greatest side."""
+    sides = np.array(workspace.dimensions(count))
+    edge = float(sides.max())
+    half = sides / edge
+    if workspace.shape != "cylinder":
+        return Shape(half, lambda v: np.abs(v / half).max(axis=-1), np.empty((0, count))), edge
+    along = "xyz".index(workspace.axis)
+    across = [k for k in range(3) if k != along]
+    turns = 2.0 * np.pi * np.arange(_RING) / _RING
+    rim = np.zeros((5, _RING, 3))
+    rim[..., across] = half[across] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    rim[..., along] = half[along] * np.linspace(-1.0, 1.0, 5)[:, None]
+
+    def gauge(vectors: Array) -> Array:
+        scaled = vectors / half
+        away = np.linalg.norm(scaled[..., across], axis=-1)
+        return np.asarray(np.maximum(away, np.abs(scaled[..., along])))
+
+    return Shape(half, gauge, rim.reshape(-1, 3)), edge
 
 
 def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | None = None) -> Array:

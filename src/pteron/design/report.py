@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from pteron.design.cycle_loads import best_motors
 from pteron.design.design import Design
 from pteron.design.differences import (
     Change,
@@ -15,11 +16,13 @@ from pteron.design.differences import (
     stroke_words,
 )
 from pteron.design.front import Front
-from pteron.design.proofs import Proved, proved, workspace_share
+from pteron.design.proofs import Proved, place_words, proved, workspace_share
+from pteron.design.spec import asked_words
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
+from pteron.motion import Fit
 
 if TYPE_CHECKING:
     import polars as pl
@@ -53,6 +56,8 @@ class ReportedDesign(Proved):
         lines = []
         if self.design.task.seeks_cube:
             lines.append("cube: not proved" if self.cube is None else f"cube {self.cube.words}")
+        if self.design.task.floats:
+            lines.append(self._place)
         shares = (workspace_share(self.design, proof) for proof in self.workspace)
         return [
             *lines,
@@ -61,6 +66,38 @@ class ReportedDesign(Proved):
                 for share, proof in zip(shares, self.workspace, strict=True)
             ),
         ]
+
+    @property
+    def _place(self) -> str:
+        """Where the workspace is that floats."""
+        design = self.design
+        if not self.workspace:
+            largest = f", at most at {design.scale:.3g} times its size" if design.scale else ""
+            return f"workspace: it fits nowhere{largest}"
+        return f"workspace placed about {place_words(design.cube.center)}"
+
+    @property
+    def covers(self) -> list[str]:
+        """Each quantity that was asked for, how far it is known, and which motors serve."""
+        design, task = self.design, self.design.task
+        lines = []
+        for name in task.asked:
+            value = design.quantity(name)
+            told = Change(name, value, value, task.unit(name)).shown(value)
+            if lack := design.lack(name):
+                lines.append(f"{name}: none, because {lack}")
+            else:
+                lines.append(f"{name} {told}: {design.cover(name)}")
+        if task.motors and "motor_margin" in task.asked and not design.lack("motor_margin"):
+            lines += map(_motor_words, best_motors(design.sizings, task.motors))
+        return lines
+
+
+def _motor_words(fit: Fit) -> str:
+    return (
+        f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.4g} can do "
+        f"{fit.margin:.3g} times what it must, least in {fit.scarcest}"
+    )
 
 
 @dataclass(frozen=True)
@@ -119,17 +156,21 @@ class Summary:
         lines = [
             f"# Designs of {front.task.robot.name}",
             "",
-            f"{front.evaluated} designs were evaluated; {front.kept} keep all that is asked, and "
-            f"{len(front)} of these are bettered by no other in every objective. A link of another "
+            f"{front.evaluated} designs were evaluated; {front.kept} keep all that is asked; "
+            f"bettered by no other in every objective: {len(front)}. A link of another "
             + (
                 "length is drawn out along itself: its mass grows with the length."
                 if front.task.spec.masses == "per length"
                 else "length keeps its inertia."
             ),
             "",
+            "## Asked for",
+            "",
+            *(f"- {line}" for line in asked_words(front.task.spec)),
+            "",
             "## To begin with",
             "",
-            *(f"- {line}" for line in [*self.start.proofs, *_strokes(self.start)]),
+            *(f"- {line}" for line in _lines(self.start)),
         ]
         for one in self.chosen:
             lines += ["", f"## {one.name.replace('-', ' ').capitalize()}", ""]
@@ -138,7 +179,7 @@ class Summary:
                 f"| {c.what} | {c.shown(c.before)} | {c.shown(c.after)} | {c.by} |"
                 for c in one.changes
             ]
-            lines += ["", *(f"- {line}" for line in [*one.proofs, *_strokes(one)])]
+            lines += ["", *(f"- {line}" for line in _lines(one))]
         return "\n".join(lines) + "\n"
 
 
@@ -151,16 +192,21 @@ def _told(name: str, design: Design) -> ReportedDesign:
     return ReportedDesign(**vars(proved(design)), name=name)
 
 
-def _strokes(one: ReportedDesign) -> list[str]:
-    region = "the workspace" if one.design.task.spec.workspace is not None else "the cube"
-    if region == "the cube" and one.design.cube.edge <= 0.0:
-        return []
-    return [f"{line}, over {region}" for line in stroke_words(one.design)]
+def _lines(one: ReportedDesign) -> list[str]:
+    """Return what is proved, what each quantity is over, and the strokes used."""
+    task, lines = one.design.task, [*one.proofs, *one.covers]
+    region = "the workspace" if task.spec.workspace is not None else "the cube"
+    if (task.seeks_place and one.design.cube.edge <= 0.0) or not one.design.reached:
+        return lines
+    return [*lines, *(f"{line}, over {region}" for line in stroke_words(one.design))]
 
 
 def _data(one: ReportedDesign) -> dict[str, Any]:
     task = one.design.task
     found: dict[str, Any] = {name: one.design.quantity(name) for name in task.asked}
+    found["known"] = {name: one.design.lack(name) or one.design.cover(name) for name in task.asked}
+    if task.floats:
+        found["workspace_center"] = one.design.cube.center.tolist() if one.workspace else None
     found["changes"] = [vars(change) for change in one.changes] if one.name != "start" else []
     if one.cube is not None:
         found["proved_cube"] = {

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pteron.design.design import Design
 from pteron.design.evolution import one_thread
 from pteron.design.proofs import proved
+from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.errors import ModelError
 
@@ -22,9 +23,6 @@ MISSES = "misses "
 
 FAILED = 1e6
 """Amount for a design that is no possible machine, or has no such quantity."""
-
-ROUNDING = 1e-9
-"""Amount that counts as none."""
 
 
 def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:
@@ -39,13 +37,19 @@ def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> d
         if proofs:
             design = proved(design).design
         found = {name: design.quantity(name) for name in task.asked}
+        found |= zip(places(task), design.cube.center.tolist() if task.floats else (), strict=True)
         margin = design.margin
     except ModelError:
-        found, margin = dict.fromkeys(task.asked, float("nan")), -FAILED
+        found, margin = dict.fromkeys((*task.asked, *places(task)), float("nan")), -FAILED
     misses = {f"{MISSES}workspace": 0.0 if margin >= -ROUNDING else -margin}
     for k, one in enumerate(task.spec.requirements, start=1):
         misses[f"{MISSES}{k} {one.quantity}"] = one.missed_by(found[one.quantity], FAILED)
     return found | misses
+
+
+def places(task: Task) -> list[str]:
+    """Return the columns with the place of a workspace that floats."""
+    return [f"center {name}" for name in task.robot.platform.lengths] if task.floats else []
 
 
 def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.DataFrame:

@@ -64,7 +64,7 @@ def search(
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work; they must reach the folder.
     progress : callable, optional
-        Takes the share of the generations that are done.
+        Takes the share of the work that is done, at first and after every few designs.
 
     Returns
     -------
@@ -117,15 +117,19 @@ def _generations(
         plan = {**task.plan, "generation": number, "designs": _digest(designs)}
         store = TableStore(folder / f"{number:04d}", plan)
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
-        sweep(partial(worked, task), chunks, store, scheduler=scheduler)
+        tell = None if progress is None else partial(_tell, progress, number, settings.generations)
+        sweep(partial(worked, task), chunks, store, scheduler=scheduler, progress=tell)
         tables.append(store.scan().collect())
         front = _proved_front(proofs, tables)
         found = proofs.applied(tables[-1])
         values = np.asarray(found.select([v.name for v in task.variables]).to_numpy())
         evolution.tell((values - low) / (high - low), *_costs(task, found))
-        if progress is not None:
-            progress(number / settings.generations)
     return proofs.front(lambda: tables)
+
+
+def _tell(progress: Callable[[float], None], number: int, count: int, share: float) -> None:
+    """Tell how much of all generations is done, from the share of one of them."""
+    progress((number - 1 + share) / count)
 
 
 def _proved_front(proofs: Proofs, tables: list[pl.DataFrame]) -> Front | None:

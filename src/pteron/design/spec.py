@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, Table, Two
+from pteron.design.loads import (
+    CycleTable,
+    ElasticityTable,
+    ErrorsTable,
+    MotorsTable,
+    PayloadTable,
+    Positive,
+)
 from pteron.design.quantities import known
 from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
@@ -16,11 +26,8 @@ from pteron.toml import read_toml, validated
 _ABSENT = "no such file; it should describe a search for a design"
 """The message where the file is missing."""
 
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 """Share of a bound by which it may be missed."""
-
-Positive = Annotated[Number, Field(gt=0.0)]
-"""A number above 0."""
 
 Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
 """Least value of a measure that is 1 at best."""
@@ -56,11 +63,18 @@ class VariableTable(Table):
 
 
 class WorkspaceTable(Table):
-    """`[workspace]`: the region in which the machine must work."""
+    """`[workspace]`: the region in which the machine must work.
+
+    A box of sides, a cube or a cylinder without a center floats: each design has it where the
+    machine has most to spare.
+    """
 
     low: tuple[Number, ...] | None = Field(None, description="a box's least x, y, z, m")
     high: tuple[Number, ...] | None = Field(None, description="a box's greatest x, y, z, m")
-    center: tuple[Number, ...] | None = Field(None, description="of a cube or cylinder, m")
+    sides: tuple[Positive, ...] | None = Field(None, description="of a box, in place of these, m")
+    center: tuple[Number, ...] | None = Field(
+        None, description="of a box of sides, a cube or a cylinder, m; left out, it floats"
+    )
     edge: Positive | None = Field(None, description="of a cube, m")
     radius: Positive | None = Field(None, description="of a cylinder, m")
     height: Positive | None = Field(None, description="of a cylinder, m")
@@ -71,26 +85,17 @@ class WorkspaceTable(Table):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
-        shapes = {
-            "box": (self.low, self.high),
-            "cube": (self.center, self.edge),
-            "cylinder": (self.center, self.radius, self.height),
-        }
-        given = {
-            key
-            for key in ("low", "high", "center", "edge", "radius", "height")
-            if getattr(self, key) is not None
-        }
-        wanted = {"box": {"low", "high"}, "cube": {"center", "edge"}}
-        wanted["cylinder"] = {"center", "radius", "height"}
-        if given not in wanted.values():
+        keys = ("low", "high", "sides", "center", "edge", "radius", "height")
+        given = {key for key in keys if getattr(self, key) is not None}
+        wanted = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
+        if given not in wanted and given - {"center"} not in wanted[1:]:
             raise ValueError(
-                f"{', '.join(sorted(given)) or 'nothing'} given; a box has low and high, a cube "
-                "center and edge, a cylinder center, radius and height"
+                f"{', '.join(sorted(given)) or 'nothing'} given; a box has low and high, or sides, "
+                "a cube edge, a cylinder radius and height; these three have a center, or float"
             )
-        first, *others = (part for part in shapes[self.shape] if isinstance(part, tuple))
-        if any(len(part) != len(first) for part in others):
-            raise ValueError("low and high have unlike numbers of coordinates")
+        pairs = ((self.low, self.high), (self.sides, self.center))
+        if any(a is not None and b is not None and len(a) != len(b) for a, b in pairs):
+            raise ValueError("unlike numbers of coordinates given")
         if self.low is not None and not all(
             a < b for a, b in zip(self.low, self.high or (), strict=True)
         ):
@@ -100,23 +105,45 @@ class WorkspaceTable(Table):
     @property
     def shape(self) -> Literal["box", "cube", "cylinder"]:
         """The kind of workspace."""
-        if self.low is not None:
-            return "box"
-        return "cube" if self.edge is not None else "cylinder"
+        if self.radius is not None:
+            return "cylinder"
+        return "cube" if self.edge is not None else "box"
+
+    @property
+    def floats(self) -> bool:
+        """Whether it has no place of its own."""
+        return self.low is None and self.center is None
+
+    def placed(self, center: Iterable[float]) -> Self:
+        """Return the same at a place of its own."""
+        return self.model_copy(update={"center": tuple(map(float, center))})
+
+    def dimensions(self, count: int) -> tuple[float, ...]:
+        """Return the sides (count,) of the box that holds it, m."""
+        if self.low is not None and self.high is not None:
+            return tuple(b - a for a, b in zip(self.low, self.high, strict=True))
+        if self.radius is not None and self.height is not None:
+            return tuple(
+                self.height if letter == self.axis else 2.0 * self.radius for letter in "xyz"
+            )
+        return self.sides or (self.edge or 0.0,) * count
 
     @property
     def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and greatest coordinates of a box or a cube, m."""
+        """Least and greatest coordinates of the box that holds it, once it has a place, m."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
-        half = (self.edge or 0.0) / 2.0
         center = self.center or ()
-        return tuple(x - half for x in center), tuple(x + half for x in center)
+        halves = [side / 2.0 for side in self.dimensions(len(center))]
+        ends = tuple(
+            zip(*((x - h, x + h) for x, h in zip(center, halves, strict=True)), strict=True)
+        )
+        return ends[0], ends[1]
 
     @property
-    def lengths(self) -> int:
-        """Number of its coordinates."""
-        return len(self.low or self.center or ())
+    def lengths(self) -> int | None:
+        """Number of its coordinates; None where any will do."""
+        return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
 
 
 class FloorsTable(Table):
@@ -129,10 +156,10 @@ class FloorsTable(Table):
 
 
 class MotionTable(Table):
-    """`[motion]`: the motion by which drives are judged at the workspace's corners."""
+    """`[motion]`: the motion, in every direction, by which drives are judged."""
 
-    speed: Positive = Field(1.0, description="of P along each axis, m/s")
-    acceleration: Positive = Field(10.0, description="of P along each axis, m/s^2")
+    speed: Positive = Field(1.0, description="of P in any direction, m/s")
+    acceleration: Positive = Field(10.0, description="of P in any direction, m/s^2")
 
 
 class ObjectiveTable(Table):
@@ -181,7 +208,8 @@ class RequirementTable(Table):
             raise ValueError(f"{self.quantity}: neither least nor most given")
         if None not in (self.least, self.most) and self.least > self.most:  # type: ignore[operator]
             raise ValueError(
-                f"{self.quantity}: at least {self.least:g} and at most {self.most:g} cannot both be"
+                f"{self.quantity}: at least {self.least:.12g} and at most {self.most:.12g} cannot "
+                "both be"
             )
         return self
 
@@ -192,13 +220,13 @@ class RequirementTable(Table):
         missing = 0.0 if self.least is None else (self.least - value) / (abs(self.least) or 1.0)
         beyond = 0.0 if self.most is None else (value - self.most) / (abs(self.most) or 1.0)
         gap = max(missing, beyond)
-        return gap if gap > _ROUNDING else 0.0
+        return gap if gap > ROUNDING else 0.0
 
     @property
     def words(self) -> str:
         """The requirement in words: "links at most 1.2"."""
         ends = (("at least", self.least), ("at most", self.most))
-        told = (f"{word} {bound:g}" for word, bound in ends if bound is not None)
+        told = (f"{word} {bound:.12g}" for word, bound in ends if bound is not None)
         return f"{self.quantity} {' and '.join(told)}"
 
 
@@ -232,6 +260,11 @@ class Spec(Table):
     workspace: WorkspaceTable | None = None
     floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
     motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
+    payload: PayloadTable | None = None
+    cycles: list[CycleTable] = Field(default_factory=list)
+    errors: ErrorsTable | None = None
+    elasticity: ElasticityTable | None = None
+    motors: MotorsTable | None = None
     search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
 
     _source: str = PrivateAttr("")
@@ -241,6 +274,12 @@ class Spec(Table):
         """The file that it was read from; empty where it was not."""
         return self._source
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The quantities that objectives and requirements name, each once."""
+        given = (o.quantity for o in self.objectives), (r.quantity for r in self.requirements)
+        return tuple(dict.fromkeys(chain(*given)))
+
     def with_seed(self, seed: int) -> Spec:
         """Return the same search with other chance."""
         return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
@@ -249,7 +288,7 @@ class Spec(Table):
 def read_spec(path: str | Path) -> Spec:
     """Read a search for a design from a TOML file.
 
-    A machine's file is looked for beside it first.
+    Files of a machine and of motors are looked for beside it first.
 
     Parameters
     ----------
@@ -268,7 +307,32 @@ def read_spec(path: str | Path) -> Spec:
     """
     source = shown(str(path), bare=True, longest=1000)
     spec = validated(Spec, read_toml(path, DataError, _ABSENT), source, DataError)
-    beside = Path(path).parent / spec.robot
-    found = spec.model_copy(update={"robot": str(beside)} if beside.is_file() else {})
+    folder = Path(path).parent
+    update: dict[str, Any] = {}
+    if (folder / spec.robot).is_file():
+        update["robot"] = str(folder / spec.robot)
+    if spec.motors is not None and (folder / spec.motors.file).is_file():
+        update["motors"] = MotorsTable(file=str(folder / spec.motors.file))
+    found = spec.model_copy(update=update)
     found._source = source
     return found
+
+
+def asked_words(spec: Spec) -> list[str]:
+    """Return what a search asks for, a line each, in the numbers of its file."""
+    lines = [
+        f"{one.quantity} as {'small' if one.minimise else 'large'} as can be"
+        for one in spec.objectives
+    ]
+    lines += [one.words for one in spec.requirements]
+    lines += [
+        f"{name} at least {value:.12g} everywhere"
+        for name, value in spec.floors
+        if not any(r.quantity == name and r.least is not None for r in spec.requirements)
+    ]
+    if spec.payload is not None:
+        lines.append(f"a payload of {spec.payload.mass:.12g} kg")
+    speed, acceleration = spec.motion.speed, spec.motion.acceleration
+    if {"force", "speed", "drive_load"} & set(spec.asked):
+        lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")
+    return lines

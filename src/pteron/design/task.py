@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from pteron.design.misfits import misfits
 from pteron.design.quantities import quantities
-from pteron.design.region import workspace_poses
-from pteron.design.spec import Spec
+from pteron.design.region import workspace_shape
+from pteron.design.spec import FloorsTable, Spec
 from pteron.design.variables import Variable, moved, variables_of
 from pteron.errors import DataError, ModelError
-from pteron.indices import INDICES
 from pteron.kernels import Array, Kernel, compile
-from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
 from pteron.maps.plan import RESULTS
+from pteron.motion import Motor, read_motors
 from pteron.toml import told
 from pteron.workspace.conditions import conditions
+from pteron.workspace.samples import Shape, cube
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
+
+_FORCES = "of all directions and places"
+"""What drives' forces and speeds are over, in the plan of a search that asks for them: searches
+that took those along axes at corners cannot be resumed."""
+
+_LATER = {"payload", "cycles", "errors", "elasticity", "motors"}
+"""Keys that a spec may have since; without them its plan is as it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +45,14 @@ class Task:
         The machine to begin with.
     variables : tuple of Variable
         The variables.
+    motors : tuple of Motor
+        The motors to choose from, if it lists any.
     """
 
     spec: Spec
     robot: Manipulator
     variables: tuple[Variable, ...]
+    motors: tuple[Motor, ...] = ()
 
     @classmethod
     def of(cls, spec: Spec) -> Task:
@@ -61,15 +72,20 @@ class Task:
                 "needs one that moves",
                 subject=robot.name,
             )
-        faults = list(_misfits(spec, robot))
+        faults = list(misfits(spec, robot))
         variables: tuple[Variable, ...] = ()
+        motors: tuple[Motor, ...] = ()
         try:
             variables = variables_of(robot, spec.variables)
         except ModelError as error:
             faults = [*error.faults, *faults]
+        try:
+            motors = () if spec.motors is None else read_motors(spec.motors.file)
+        except DataError as error:
+            faults.append(f"motors: {error}")
         if faults:
             raise DataError(told(faults), subject=spec.source)
-        return cls(spec, robot, variables)
+        return cls(spec, robot, variables, motors)
 
     def __getstate__(self) -> dict[str, Any]:
         # It crosses to other processes, which compile for themselves.
@@ -79,12 +95,45 @@ class Task:
     def plan(self) -> dict[str, Any]:
         """All that its results depend on: the spec, the machine, and the version of results."""
         spec = self.spec.model_dump(mode="json", exclude={"robot"})
-        return {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
+        spec = {key: part for key, part in spec.items() if part or key not in _LATER}
+        if spec["workspace"] is not None and spec["workspace"]["sides"] is None:
+            del spec["workspace"]["sides"]
+        plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
+        if self.motors:
+            plan["motors"] = [vars(motor) for motor in self.motors]
+        if {"force", "speed", "drive_load"} & set(self.asked):
+            plan["forces"] = _FORCES
+        return plan
+
+    @cached_property
+    def floors(self) -> FloorsTable:
+        """The least measures of every pose: the file's, or what is required where it is more."""
+        found = dict(self.spec.floors)
+        for one in self.spec.requirements:
+            if one.quantity in found and one.least is not None and one.least < 1.0:
+                found[one.quantity] = max(found[one.quantity], one.least)
+        return FloorsTable(**found)
+
+    @property
+    def floats(self) -> bool:
+        """Whether the required workspace is placed anew for every design."""
+        return self.spec.workspace is not None and self.spec.workspace.floats
+
+    @cached_property
+    def shape(self) -> tuple[Shape, float]:
+        """The shape whose largest copy is sought, and the edge that is required of it, 0 for none.
+
+        It is the workspace where that floats, else the cube.
+        """
+        count = len(self.robot.platform.lengths)
+        if self.spec.workspace is not None and self.floats:
+            return workspace_shape(self.spec.workspace, count)
+        return cube(count), 0.0
 
     @cached_property
     def conditions(self) -> SmoothConditions:
         """The conditions at every pose, as functions of the geometry."""
-        floors = self.spec.floors
+        floors = self.floors
         given = conditions(self.robot, type_i=floors.type_i, type_ii=floors.type_ii)
         return smooth_conditions(self.robot, given)
 
@@ -100,14 +149,17 @@ class Task:
     @property
     def asked(self) -> tuple[str, ...]:
         """The quantities that objectives and requirements name, each once."""
-        spec = self.spec
-        given = [*(o.quantity for o in spec.objectives), *(r.quantity for r in spec.requirements)]
-        return tuple(dict.fromkeys(given))
+        return self.spec.asked
 
     @property
     def seeks_cube(self) -> bool:
         """Whether the largest cube of each design is looked for."""
         return "cube" in self.asked or self.spec.workspace is None
+
+    @property
+    def seeks_place(self) -> bool:
+        """Whether each design has a shape to be placed: the largest cube, or the workspace."""
+        return self.seeks_cube or self.floats
 
     @property
     def ranges(self) -> Array:
@@ -122,9 +174,8 @@ class Task:
     def unit(self, name: str) -> str:
         """Return the unit of a quantity, for this machine's joints."""
         joint = self.robot.legs[0].joint
-        return {"force": joint.force_unit, "speed": f"{joint.unit}/s"}.get(
-            name, quantities()[name].unit
-        )
+        units = {"force": joint.force_unit, "speed": f"{joint.unit}/s"}
+        return units.get(name.removeprefix("cycle_"), quantities()[name].unit)
 
     def function(self, what: str) -> Kernel:
         """Return a function of the machines' topology, whose geometry a call gives."""
@@ -140,46 +191,3 @@ class Task:
         """
         stretch = self.spec.masses == "per length"
         return moved(self.robot, self.variables, values, stretch=stretch)
-
-
-def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
-    """Yield the faults for which a search does not suit its machine."""
-    if spec.pose is not None and len(spec.pose) != robot.freedom:
-        yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
-    if spec.angles is not None and len(robot.platform.angles) != 1:
-        turns = "tilts: give its orientation in pose" if robot.platform.tilts else "does not turn"
-        yield f"angles: given, but the platform of {robot.name} {turns}; leave it out"
-    lengths = robot.platform.lengths
-    if spec.workspace is not None and spec.workspace.lengths != len(lengths):
-        yield (
-            f"workspace: {spec.workspace.lengths} coordinates given, {' '.join(lengths)} of "
-            f"{robot.name} expected"
-        )
-    elif spec.workspace is not None and spec.workspace.shape == "cylinder" and len(lengths) < 3:
-        yield f"workspace: a cylinder given, but {robot.name} moves in a plane; give a box"
-    elif spec.workspace is not None:
-        corners = workspace_poses(spec.workspace, np.zeros((1, robot.freedom)), samples=2)
-        for warning in unlikely_values(robot, robot.coordinates, corners):
-            yield f"workspace: {warning}"
-    for warning in unlikely_values(
-        robot, robot.platform.angles[:1], np.array(spec.angles or ())[:, None]
-    ):
-        yield f"angles: {warning}"
-    asked = {o.quantity for o in spec.objectives} | {r.quantity for r in spec.requirements}
-    units = {leg.joint.force_unit for leg in robot.legs}
-    for name in sorted(asked & {"force", "speed"}):
-        if len(units) > 1:
-            yield (
-                f"{name}: the joints of {robot.name} have unlike units; ask for drive_load, whose "
-                "limits the machine's file gives"
-            )
-    for name in sorted(asked & INDICES.keys()):
-        if INDICES[name].turning and not robot.platform.angles:
-            yield f"{name}: about turning, but the platform of {robot.name} does not turn"
-    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
-    if "drive_load" in asked and not any(d.max_force or d.max_speed for d in drives):
-        yield f"drive_load: no drive of {robot.name} has max_force or max_speed; ask for force"
-    named = [o.quantity for o in spec.objectives]
-    for name in sorted({name for name in named if named.count(name) > 1}):
-        yield f"objectives: {name} given more than once"
-    assert asked <= quantities().keys()  # the spec has checked them

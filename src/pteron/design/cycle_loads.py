@@ -1,0 +1,86 @@
+"""What a cycle asks of the drives: the shortest time that they allow, and margins of motors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from pteron.dynamics import drive_forces
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kinematics import joint_rates
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+from pteron.motion import Fit, Motion, Motor, Sizing, choose
+
+_RATES = np.array([1.0, 2.0, 3.0])
+"""Rates at which forces are evaluated: they are quadratic in the rate."""
+
+
+def shortest_time(robot: Manipulator, motion: Motion) -> float:
+    """Return the time in which the drives can go a motion, evenly faster or slower, s.
+
+    At the rate u the forces are A + B u + C u^2 at each sample, and the first u at which one is at
+    its limit is exact. A part of dry friction by Stribeck's law counts at every speed.
+
+    Raises
+    ------
+    ModelError
+        If no drive has a limit, or one cannot hold the machine at rest.
+    """
+    robot = replace(
+        robot, legs=tuple(replace(leg, drive=_without_stribeck(leg.drive)) for leg in robot.legs)
+    )
+    forces = np.stack(
+        [
+            drive_forces(robot, motion.pose, u * motion.velocity, u**2 * motion.acceleration)
+            for u in _RATES
+        ]
+    )
+    rest, line, square = np.tensordot(np.linalg.inv(np.vander(_RATES, 3, True)), forces, axes=1)
+    drives = [leg.drive or Drive() for leg in robot.legs]
+    most = np.array([drive.max_force or inf for drive in drives])
+    for i in np.flatnonzero((np.abs(rest) > most).any(axis=0)):
+        raise ModelError(
+            f"leg {i + 1}: its drive gives {most[i]:g}, but it takes {np.abs(rest[:, i]).max():.4g}"
+            " to hold the machine in the cycle"
+        )
+    rates = [_first_root(side * square, side * line, side * rest - most) for side in (1.0, -1.0)]
+    speeds = np.abs(joint_rates(robot, motion.pose, motion.velocity).actuated).max(axis=0)
+    limits = np.array([drive.max_speed or inf for drive in drives])
+    with np.errstate(divide="ignore"):
+        rate = min(*(float(part.min()) for part in rates), float((limits / speeds).min()))
+    if not np.isfinite(rate):
+        raise ModelError("cycle_time: no limit of a drive is met, however fast the cycle is")
+    return motion.duration / rate
+
+
+def _without_stribeck(drive: Drive | None) -> Drive | None:
+    if drive is None or drive.stribeck is None:
+        return drive
+    return replace(drive, coulomb=drive.coulomb + drive.stribeck.force, stribeck=None)
+
+
+def _first_root(square: Array, line: Array, constant: Array) -> Array:
+    """Return the least u > 0 with C u^2 + B u + A = 0, A <= 0; infinite where there is none."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = np.sqrt(line**2 - 4.0 * square * constant)
+        falls = (line < 0.0) & (square > 0.0)  # the form without cancellation
+        found = np.where(falls, (root - line) / (2.0 * square), -2.0 * constant / (line + root))
+    return np.where(np.isfinite(found) & (found > 0.0), found, inf)
+
+
+def best_motors(sizings: Sequence[Sizing], motors: Sequence[Motor]) -> list[Fit]:
+    """Return the motor of a list with the greatest margin for each joint of each cycle.
+
+    From a margin of 1 on it serves; each cycle is looked at by itself.
+    """
+    best: list[Fit] = []
+    for sizing in sizings:
+        found = choose(sizing, motors)
+        for leg in range(1, sizing.robot.joint_count + 1):
+            best.append(max((fit for fit in found if fit.leg == leg), key=lambda fit: fit.margin))
+    return best

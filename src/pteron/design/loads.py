@@ -1,0 +1,190 @@
+"""Tables of a search's file for loads: payload, cycles, errors, elasticity and a list of motors."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from pteron.bodies.tables import Number, Six, Table, Three
+from pteron.indices import ALUMINIUM, STEEL, Elasticity, Section, Tolerances
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion, line_path, pick_and_place, with_payload
+from pteron.motion.trajectories.time_law import sampled
+from pteron.motion.trajectories.time_polynomials import polynomial
+from pteron.motion.trajectories.timed_path import timed_path
+
+Positive = Annotated[Number, Field(gt=0.0)]
+"""A number above 0."""
+
+Least = Annotated[Number, Field(ge=0.0)]
+"""A number of 0 or more."""
+
+SAMPLES = 121
+"""Samples of a cycle; forces are taken between them too."""
+
+_PEAK = 10.0 / sqrt(3.0)
+"""Greatest acceleration of a quintic from rest to rest over its length and inverse squared time."""
+
+
+def _numbers(given: Any) -> Any:
+    return [given] if isinstance(given, int | float) else given
+
+
+Each = Annotated[tuple[Least, ...], BeforeValidator(_numbers), Field(min_length=1)]
+"""One number of 0 or more for all legs, or one a leg."""
+
+
+class PayloadTable(Table):
+    """`[payload]`: what the platform carries."""
+
+    mass: Least = Field(description="kg")
+    center: Three | None = Field(
+        None, description="its centre of mass in the platform's frame, m; the tool if left out"
+    )
+    inertia: Number | Six = Field(0.0, description="about its centre of mass, kg m^2")
+
+    def on(self, robot: Manipulator) -> Manipulator:
+        """Return a machine that carries it."""
+        return with_payload(robot, self.mass, self.center, self.inertia)
+
+
+class CycleTable(Table):
+    """`[[cycles]]`: a motion along lines through points, or the standard pick-and-place."""
+
+    points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] | None = Field(
+        None, description="of the tool, from the workspace's middle, m; angles may follow, rad"
+    )
+    times: tuple[Number, ...] | None = Field(
+        None, description="when it rests at each of them, s, from 0"
+    )
+    duration: Positive | None = Field(
+        None, description="of the whole, s; left out, what [motion] acceleration gives"
+    )
+    corner: Least = Field(0.0, description="metres from a point at which it leaves its lines")
+    scale: Positive | None = Field(
+        None, description="of the standard pick-and-place, in place of points"
+    )
+    direction: Three | None = Field(None, description="where that goes across")
+    dwell: Least = Field(0.0, description="rest after it, s")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.points is None) == (self.scale is None):
+            raise ValueError("give either points, or the scale of the standard pick-and-place")
+        if self.times is not None:
+            if self.duration is not None or self.corner or self.points is None:
+                raise ValueError("times go with points alone: no duration, corner or scale")
+            steps = np.diff(self.times)
+            if len(self.times) != len(self.points) or self.times[0] != 0.0 or (steps <= 0.0).any():
+                raise ValueError(
+                    f"times: {list(self.times)} given, one for each of {len(self.points)} points "
+                    "expected, from 0 on, ascending"
+                )
+        for a, b in zip(self.points or (), (self.points or ())[1:], strict=False):
+            if a == b:
+                raise ValueError(f"points: {list(a)} given twice, one after the other")
+        return self
+
+    def motion(self, robot: Manipulator, middle: Array, acceleration: float) -> Motion:
+        """Return the motion of a machine about a pose, at this acceleration if no time is given."""
+        if self.points is None:
+            return pick_and_place(
+                robot,
+                middle,
+                scale=self.scale,
+                duration=self.duration,
+                samples=SAMPLES,
+                direction=self.direction,
+                peak=acceleration,
+            )
+        poses = np.tile(middle, (len(self.points), 1))
+        lengths = len(robot.platform.lengths)
+        for pose, point in zip(poses, self.points, strict=True):
+            pose[:lengths] += point[:lengths]
+            pose[lengths : len(point)] = point[lengths:]
+        path = line_path(robot, poses, self.corner)
+        stretches = np.diff(self.times) if self.times else np.sqrt(np.diff(path.rests))
+        if not self.times:
+            whole = self.duration or sqrt(_PEAK / acceleration) * stretches.sum()
+            stretches = stretches * whole / stretches.sum()
+        law = polynomial("quintic")
+        course = timed_path(path, stretches.tolist(), [law] * len(stretches))
+        return sampled(course.at, course.duration, course.duration / (SAMPLES - 1))
+
+
+class ErrorsTable(Table):
+    """`[errors]`: what the machine's accuracy is worked out from, each to either side."""
+
+    encoder: Each = Field((0.0,), description="errors of the joints, m or rad")
+    backlash: Each = Field((0.0,), description="whole play of the drives at their joints, m or rad")
+    point: Least = Field(0.0, description="tolerance of every joint's place, m")
+    length: Least = Field(0.0, description="of every link's length, m")
+    angle: Least = Field(0.0, description="of every axis, rad")
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """The same for `pose_error`."""
+        joints, backlash = (v[0] if len(v) == 1 else v for v in (self.encoder, self.backlash))
+        return Tolerances(joints, backlash, self.point, self.length, self.angle)
+
+
+class SectionTable(Table):
+    """A link's section: a round tube, a rod, or a square tube, of steel or aluminium."""
+
+    diameter: Positive | None = Field(None, description="of a round one, m")
+    side: Positive | None = Field(None, description="of a square one, m")
+    wall: Positive | None = Field(None, description="m; left out, a round one is full")
+    material: Literal["steel", "aluminium"] = "steel"
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        if (self.diameter is None) == (self.side is None) or (self.side and self.wall is None):
+            raise ValueError("give a diameter, or a side and a wall")
+        outer = self.diameter or self.side or 0.0
+        if self.wall is not None and 2.0 * self.wall > outer:
+            raise ValueError(f"wall: {self.wall:g} m given, at most half of {outer:g} m")
+        return self
+
+    @property
+    def section(self) -> Section:
+        """The same as stiffnesses."""
+        material = {"steel": STEEL, "aluminium": ALUMINIUM}[self.material]
+        if self.side is not None:
+            return Section.square_tube(self.side, self.wall or 0.0, material)
+        assert self.diameter is not None  # one of both is given
+        return Section.tube(self.diameter, self.wall or self.diameter / 2.0, material)
+
+
+class ElasticityTable(Table):
+    """`[elasticity]`: what gives way under a force on the tool; what is left out is rigid."""
+
+    force: Positive | None = Field(None, description="on the tool, in any direction, N")
+    actuators: Annotated[tuple[Positive, ...], BeforeValidator(_numbers)] | None = Field(
+        None, description="stiffness of the drives at their joints, N/m or N m/rad"
+    )
+    upper: SectionTable | None = Field(None, description="of upper links or cranks")
+    lower: SectionTable | None = Field(None, description="of lower links or rods")
+    rod_distance: Positive | None = Field(None, description="of a pair of rods, m")
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if self.actuators is None and self.upper is None and self.lower is None:
+            raise ValueError("nothing gives way; give actuators, upper or lower")
+        return self
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """The same for `stiffness`."""
+        given = (inf,) if self.actuators is None else self.actuators
+        upper, lower = (None if t is None else t.section for t in (self.upper, self.lower))
+        return Elasticity(given if len(given) > 1 else given[0], upper, lower, self.rod_distance)
+
+
+class MotorsTable(Table):
+    """`[motors]`: the motors to choose from, for `motor_margin`."""
+
+    file: str = Field(description="a CSV, Parquet or TOML file beside this one")

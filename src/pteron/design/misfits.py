@@ -1,0 +1,121 @@
+"""Faults for which a search's file does not suit the machine that it begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pteron.design.quantities import quantities
+from pteron.design.region import workspace_poses
+from pteron.design.spec import Spec
+from pteron.errors import PteronError
+from pteron.indices import INDICES
+from pteron.kinematics.unlikely_values import unlikely_values
+from pteron.manipulator import Manipulator
+
+
+def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
+    """Yield the faults for which a search does not suit its machine."""
+    if spec.pose is not None and len(spec.pose) != robot.freedom:
+        yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
+    if spec.angles is not None and len(robot.platform.angles) != 1:
+        turns = "tilts: give its orientation in pose" if robot.platform.tilts else "does not turn"
+        yield f"angles: given, but the platform of {robot.name} {turns}; leave it out"
+    lengths = robot.platform.lengths
+    count = spec.workspace and spec.workspace.lengths
+    if spec.workspace is not None and count not in (None, len(lengths)):
+        yield (
+            f"workspace: {count} coordinates given, {' '.join(lengths)} of {robot.name} expected"
+        )
+    elif spec.workspace is not None and spec.workspace.shape == "cylinder" and len(lengths) < 3:
+        yield f"workspace: a cylinder given, but {robot.name} moves in a plane; give a box"
+    elif spec.workspace is not None:
+        middle = np.zeros((1, robot.freedom))
+        placed = spec.workspace
+        if placed.floats:
+            placed = placed.placed(middle[0, : len(lengths)])
+        corners = workspace_poses(placed, middle, samples=2)
+        for warning in unlikely_values(robot, robot.coordinates, corners):
+            yield f"workspace: {warning}"
+    for warning in unlikely_values(
+        robot, robot.platform.angles[:1], np.array(spec.angles or ())[:, None]
+    ):
+        yield f"angles: {warning}"
+    asked = {o.quantity for o in spec.objectives} | {r.quantity for r in spec.requirements}
+    units = {leg.joint.force_unit for leg in robot.legs}
+    for name in sorted(asked & {"force", "speed", "cycle_force", "cycle_speed"}):
+        if len(units) > 1:
+            yield (
+                f"{name}: the joints of {robot.name} have unlike units; ask for drive_load, whose "
+                "limits the machine's file gives"
+            )
+    for name in sorted(asked & INDICES.keys()):
+        if INDICES[name].turning and not robot.platform.angles:
+            yield f"{name}: about turning, but the platform of {robot.name} does not turn"
+    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
+    if "drive_load" in asked and not any(d.max_force or d.max_speed for d in drives):
+        yield f"drive_load: no drive of {robot.name} has max_force or max_speed; ask for force"
+    named = [o.quantity for o in spec.objectives]
+    for name in sorted({name for name in named if named.count(name) > 1}):
+        yield f"objectives: {name} given more than once"
+    assert asked <= quantities().keys()  # the spec has checked them
+    yield from _missing(spec, robot, asked)
+    yield from _loads(spec, robot)
+
+
+_NEEDS = {
+    "accuracy": "errors",
+    "stiffness": "elasticity",
+    "deflection": "elasticity",
+    "motor_margin": "motors",
+}
+"""Tables that quantities need."""
+
+
+def _missing(spec: Spec, robot: Manipulator, asked: set[str]) -> Iterator[str]:
+    """Yield what quantities need and the file does not have."""
+    for name, table in _NEEDS.items():
+        if name in asked and getattr(spec, table) is None:
+            yield f"{name}: needs a table [{table}]"
+    if spec.elasticity is not None and "deflection" in asked and spec.elasticity.force is None:
+        yield "deflection: needs a force, N, in [elasticity]"
+    moving = sorted(name for name in asked if name.startswith("cycle_") or name == "motor_margin")
+    if moving and not spec.cycles:
+        yield f"{', '.join(moving)}: needs [[cycles]], a motion to drive"
+    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
+    if "cycle_time" in asked and not any(d.max_force or d.max_speed for d in drives):
+        yield (
+            f"cycle_time: no drive of {robot.name} has max_force or max_speed in its file, which "
+            "say how fast it can be"
+        )
+    floats = spec.workspace is not None and spec.workspace.floats
+    if floats and "cube" in asked:
+        yield "cube: not with a workspace that floats; ask for scale, or give it a center"
+    if not floats and "scale" in asked:
+        yield "scale: of a workspace that floats; leave out its center, or low and high"
+
+
+def _loads(spec: Spec, robot: Manipulator) -> Iterator[str]:
+    """Yield the faults of payload, cycles and numbers that are one a leg."""
+    if spec.payload is not None:
+        try:
+            spec.payload.on(robot)
+        except PteronError as error:
+            yield f"payload: {error}"
+    for i, cycle in enumerate(spec.cycles, start=1):
+        counts = {len(point) for point in cycle.points or ()}
+        if not counts <= {len(robot.platform.lengths), robot.freedom}:
+            names = " ".join(robot.coordinates[: len(robot.platform.lengths)])
+            yield f"cycles, item {i}: points of {sorted(counts)} numbers given, {names} expected"
+        for point in cycle.points or ():
+            for warning in unlikely_values(robot, robot.coordinates[: len(point)], np.array(point)):
+                yield f"cycles, item {i}: {warning}"
+    given = {
+        "errors: encoder": spec.errors and spec.errors.encoder,
+        "errors: backlash": spec.errors and spec.errors.backlash,
+        "elasticity: actuators": spec.elasticity and spec.elasticity.actuators,
+    }
+    for name, values in given.items():
+        if values and len(values) not in (1, robot.joint_count):
+            yield f"{name}: {len(values)} numbers given, 1 or {robot.joint_count} expected"
