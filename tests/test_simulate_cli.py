@@ -93,7 +93,8 @@ def test_units_of_a_cycle_and_a_payload_are_doubted(tmp_path):
 
 
 def test_a_table_on_a_narrow_screen_keeps_its_numbers(monkeypatch):
-    monkeypatch.setattr("pteron.cli.destination.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.simulate.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     monkeypatch.setenv("COLUMNS", "60")
     lines = run("delta", "--duration", 1).stdout.splitlines()
     assert max(map(len, lines)) <= 60

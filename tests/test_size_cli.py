@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from functools import lru_cache
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -51,26 +50,63 @@ def cycle_table(robot: pteron.Manipulator, **columns: float) -> pl.DataFrame:
     return pl.DataFrame({name: columns.get(name, 1.0) * value for name, value in found.items()})
 
 
-def test_a_pipe_gets_a_row_a_leg_and_json_all_numbers(driven: str):
-    rows = pl.read_csv(StringIO(done(f"size {driven}")))
+def rows_of(line: str) -> pl.DataFrame:
+    """Return the table that a command writes."""
+    done(f"{line} --out rows.csv")
+    return pl.read_csv("rows.csv")
+
+
+def test_a_program_gets_all_numbers_and_a_pipe_what_a_person_sees(driven: str, monkeypatch):
+    rows = rows_of(f"size {driven}")
     data = json.loads(done(f"size {driven} --json"))
     assert rows.to_dicts() == [pytest.approx(row) for row in data["drives"]]
     assert rows["leg"].to_list() == [1, 2]
     assert data["overloads"] == data["motors"] == []
-    assert data["all"]["energy"] == pytest.approx(
-        (rows["given_energy"] - rows["braked_energy"]).sum()
-    )
+    assert data["assumed_friction"] == [0.0, 0.0]
+    assert data["all"]["energy"] <= (rows["given_energy"] - rows["braked_energy"]).sum()
     assert data["all"]["peak_power"] <= rows["peak_power"].sum()
+    assert len(data["worst"]) == 6
+    least = min(data["margins"], key=lambda one: one["margin"])
+    text = done(f"size {driven}")
+    assert f"Enough: the drives in the file have a margin of {least['margin']:.3g}, 1 asked" in text
+    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
+    assert done(f"size {driven}").split() == text.split()
 
 
 def test_payload_dwell_and_duration_count(driven: str):
     asked = "--payload 0.4 --dwell 0.2 --duration 0.5"
-    data = json.loads(done(f"size {driven} {asked} --json"))
+    data = json.loads(done(f"size {driven} {asked} --within here --json"))
     robot = pteron.load(driven)
     cycle = pick_and_place(robot, home(robot), duration=0.5, samples=481)
     found = size(with_payload(robot, 0.4), cycle, dwell=0.2)
     assert data["duration"] == pytest.approx(0.7)
     assert [row["rms_force"] for row in data["drives"]] == pytest.approx(found.rms_forces, 1e-3)
+    assert "places and turns of the cycle, within the workspace" in done(f"size {driven} {asked}")
+
+
+def test_friction_is_assumed_and_said_and_its_absence_too():
+    line = "size five-bar --within here"
+    text = done(line)
+    assert "Friction is assumed where the file has none: dry, leg by leg 0.0111 N m, 0.0111" in text
+    free = done(f"{line} --friction 0")
+    assert "All drives: 0 J a cycle (" in free
+    assert "J given and taken back: there is no friction)" in free
+    assert "assumed" not in free
+
+
+def test_a_margin_that_is_asked_for_and_missed_is_not_enough(driven: str):
+    Path("motors.csv").write_text(MOTORS, encoding="utf-8")
+    line = f"size {driven} --within here --motors motors.csv"
+    data = json.loads(done(f"{line} --json"))
+    margin = min(one["margin"] for one in data["margins"])
+    best = max(min(m["rated_margin"], m["peak_margin"]) for m in data["motors"])
+    result = run(f"{line} --margin {3.0 * max(margin, best):.6g}")
+    assert result.exit_code == 1
+    for words in ("leg 1: not enough: max_force allow", "and a margin of", "is asked for"):
+        assert words in result.stderr
+    assert "Not enough: the drives in the file have a margin of" in result.stdout
+    assert "leg 1: not enough: no motor of the list serves; " in result.stderr
+    assert "Not enough: the first motor listed" in result.stdout
 
 
 def test_what_the_drives_cannot_do_is_told_and_ends_with_1(driven: str):
@@ -78,13 +114,15 @@ def test_what_the_drives_cannot_do_is_told_and_ends_with_1(driven: str):
     assert result.exit_code == 1
     assert "Warning: leg 1: the motion takes up to " in result.stderr
     assert "but its drive gives 30 N m (max_force)" in result.stderr
-    assert "root mean square, but the motor gives 12.8 N m all the time" in result.stderr
-    assert len(pl.read_csv(StringIO(result.stdout))) == 2
+    assert "but the motor gives 12.8 N m all the time (rated_torque and ratio)" in result.stderr
+    assert "N m about [" in result.stderr
+    assert "Not enough: the drives in the file have a margin of 0." in result.stdout
 
 
 def test_motors_of_a_list_are_fitted_to_each_joint(driven: str):
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
-    rows = pl.read_csv(StringIO(done(f"size {driven} --motors motors.csv")))
+    done(f"size {driven} --motors motors.csv --out made")
+    rows = pl.read_csv("made/motors.csv")
     assert rows["motor"].to_list() == ["100 W", "400 W"] * 2
     assert rows["serves"].all()
     assert (
@@ -92,7 +130,10 @@ def test_motors_of_a_list_are_fitted_to_each_joint(driven: str):
     ).all()
     result = run(f"size {driven} --motors motors.csv --payload 500 --duration 0.2")
     assert result.exit_code == 1
-    assert "leg 1: no motor of the list serves; 400 W comes nearest, with " in result.stderr
+    assert (
+        "leg 1: not enough: no motor of the list serves; 400 W, the nearest, has 0."
+        in result.stderr
+    )
     assert "is it in grams?" in result.stderr
 
 
@@ -116,7 +157,7 @@ def test_one_table_may_be_written(driven: str):
 
 
 def test_a_person_sees_tables_within_80_columns(driven: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.destination.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
     text = run(f"size {driven} --motors motors.csv --payload 0.2", COLUMNS="80").stdout
     assert max(map(len, text.splitlines())) <= 80
@@ -132,7 +173,7 @@ def test_a_person_sees_tables_within_80_columns(driven: str, monkeypatch: pytest
 def test_a_motion_of_a_table_is_sized_as_it_is():
     robot = pteron.load("delta")
     cycle_table(robot).write_csv("motion.csv")
-    rows = pl.read_csv(StringIO(done("size delta --cycle motion.csv")))
+    rows = rows_of("size delta --cycle motion.csv --friction 0")
     cycle = pick_and_place(robot, home(robot), scale=0.2, samples=51)
     assert rows["rms_force"].to_list() == pytest.approx(size(robot, cycle).rms_forces, rel=1e-9)
 
@@ -143,13 +184,18 @@ def test_a_motion_of_a_table_is_sized_as_it_is():
         ("size delta --payload -1", ["payload: -1.0 given", "0 kg or more"]),
         ("size delta --dwell -1", ["dwell: -1.0 given"]),
         ("size delta --duration 0", ["duration: 0.0 given", "above 0"]),
-        ("size delta --margin 0.5 --motors motors.csv", ["margin: 0.5 given", "1 or more"]),
+        ("size delta --within here --margin 0.5", ["margin: 0.5 given", "1 or more"]),
         ("size delta --motors nothing.csv", ["nothing.csv: no such file"]),
         ("size delta --cycle adpt", ["adpt"]),
         ("size delta --cycle motion.csv --duration 1", ["--duration is for --cycle adept"]),
         ("size delta --out nowhere/there.csv", ["no folder nowhere"]),
         ("size delta --out motors.csv/there", ["motors.csv", "is a file"]),
         ("size no-such-robot", ["no-such-robot"]),
+        ("size delta --friction -1", ["friction: -1.0 given"]),
+        ("size delta --dwell 1 --dwell 2", ["dwell: 2 rests given, and 1 motions"]),
+        ("size delta --within x=-0.01:0.01", ["the cycle fits nowhere", "0.02, 0, 0] (x y z"]),
+        ("size delta --within q=1", ["q: is no coordinate of delta"]),
+        ("size delta --within x=0:1:5", ["--within: NAME=LEAST:GREATEST expected"]),
     ],
 )
 def test_a_mistake_is_one_line(line: str, words: list[str]):
@@ -181,5 +227,5 @@ def test_a_table_of_the_joints_alone_is_sized_in_the_home_poses_mode():
     joints = pteron.inverse_kinematics(robot, cycle.pose)
     columns = {"t": cycle.time} | dict(zip(robot.joint_names, joints.T, strict=True))
     pl.DataFrame(columns).write_csv("motion.csv")
-    rows = pl.read_csv(StringIO(done("size delta --cycle motion.csv")))
+    rows = rows_of("size delta --cycle motion.csv --friction 0")
     assert rows["rms_force"].to_list() == pytest.approx(size(robot, cycle).rms_forces, rel=1e-2)

@@ -12,18 +12,20 @@ import pteron
 from pteron.motion import (
     Motion,
     Motor,
+    Place,
     Sizing,
     Span,
     best_ratio,
     best_ratios,
     choose,
     pick_and_place,
+    placed,
     read_motors,
     size,
     with_payload,
 )
 from pteron.motion.sizing.gearing import peak_span, rated_span, speed_span, torques
-from pteron.workspace import home_pose
+from pteron.workspace import Box, home_pose
 
 BARE = {
     **{name: CATALOG[name] for name in ("quadrupteron-oblique", "delta-4", "par4", "five-bar")},
@@ -174,7 +176,7 @@ def test_a_rest_is_held_and_counts_in_every_mean():
     moving, resting = sized("par4"), sized("par4", 0.3)
     robot, rest = MACHINES["par4"], np.zeros(4)
     held = pteron.drive_forces(robot, cycle("par4").pose[-1], rest, rest)
-    assert resting.holding == pytest.approx(held, rel=1e-12)
+    assert resting.forces[-1] == pytest.approx(held, rel=1e-12)
     whole = moving.duration + 0.3
     assert resting.duration == pytest.approx(whole)
     squares = (moving.duration * moving.rms_forces**2 + 0.3 * held**2) / whole
@@ -182,6 +184,72 @@ def test_a_rest_is_held_and_counts_in_every_mean():
     assert resting.mean_power == pytest.approx(moving.mean_power * moving.duration / whole)
     assert resting.energy == pytest.approx(moving.energy)
     assert (resting.peak_forces >= np.abs(held)).all()
+
+
+def test_motions_and_rests_follow_each_other():
+    robot, one = MACHINES["par4"], cycle("par4")
+    other = pick_and_place(robot, middle("par4"), samples=101, scale=0.1)
+    both = size(robot, [one, other], dwell=[0.1, 0.4])
+    parts = size(robot, one, dwell=0.1), size(robot, other, dwell=0.4)
+    assert both.duration == pytest.approx(sum(part.duration for part in parts), rel=1e-12)
+    squares = sum(part.duration * part.rms_forces**2 for part in parts)
+    assert both.rms_forces == pytest.approx(np.sqrt(squares / both.duration), rel=1e-12)
+    assert both.given_energy == pytest.approx(sum(part.given_energy for part in parts), rel=1e-12)
+    assert both.peak_forces.tolist() == np.max([p.peak_forces for p in parts], axis=0).tolist()
+    assert both.dwell == 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "wider"), [("five-bar", 0.1), ("delta-4", 0.1), ("quadrupteron-oblique", 0.05)]
+)
+def test_places_are_those_that_a_loop_over_all_finds(name, wider):
+    robot, tool = MACHINES[name], cycle(name, 31)
+    low, high = Box.around(tool.pose).box
+    pad = np.where(robot.platform.angular, 0.0, wider * (high - low).max())
+    region = Box(tuple(low - pad), tuple(high + pad))
+    found = size(robot, tool, dwell=0.1, places=region, friction=0.1)
+    assert found.assumed_friction.tolist() == [0.0] * robot.joint_count
+    alone = [size(robot, placed(robot, tool, place), dwell=0.1) for place in found.places]
+    for key in ("peak_forces", "rms_forces", "peak_speeds", "given_energy", "energy"):
+        every = np.array([getattr(one, key) for one in alone])
+        assert getattr(found, key) == pytest.approx(every.max(axis=0), rel=1e-9)
+    assert found.at(3).rms_forces == pytest.approx(alone[3].rms_forces, rel=1e-9)
+    # No place or turn between those that were looked at is worse.
+    rng, most = np.random.default_rng(0), found.rms_forces
+    for _ in range(25):
+        other = Place(tuple(rng.uniform(*region.box)), rng.uniform(0.0, 2.0 * np.pi))
+        moved = placed(robot, tool, other)
+        if region.holds(moved.pose).all():
+            assert (size(robot, moved, dwell=0.1).rms_forces <= 1.01 * most).all()
+    # The best ratio, and those that serve, are of all places.
+    best = best_ratio(found, 1, 3e-5)
+    ratios = best * np.array([0.999, 1.0, 1.001])
+    least = [torques(found, 1, ratio, 3e-5)[0] for ratio in ratios]
+    assert least[1] == pytest.approx(max(torques(one, 1, best, 3e-5)[0] for one in alone))
+    assert min(least) >= least[1] * (1.0 - 1e-9)
+    span, rated = rated_span(found, 1, 3e-5, 1.2 * least[1]), 1.2 * least[1]
+    spans = [rated_span(one, 1, 3e-5, rated) for one in alone]
+    assert span.least == pytest.approx(max(s.least for s in spans), rel=1e-9)
+    assert span.greatest == pytest.approx(min(s.greatest for s in spans), rel=1e-9)
+
+
+def test_a_region_that_is_not_all_in_reach_is_refused_with_the_place():
+    robot = BARE["delta-4"]
+    with pytest.raises(pteron.DataError, match=r"places: about \[.*: pose.*misses it by"):
+        size(robot, cycle("delta-4", 31), places=Box((-2.0, 0.0, -1.0, 0.0), (2.0, 0.1, -0.8, 0.5)))
+    with pytest.raises(pteron.DataError, match=r"places\[0\]: pose \[0.0\] given, x y z phi"):
+        size(robot, cycle("delta-4", 31), places=[Place((0.0,))])
+
+
+def test_friction_is_assumed_where_the_file_has_none():
+    bare = size(BARE["five-bar"], cycle("five-bar"))
+    assert bare.net_energy == 0.0
+    found = size(BARE["five-bar"], cycle("five-bar"), friction=0.1)
+    assert found.assumed_friction == pytest.approx(0.1 * bare.peak_forces, rel=1e-12)
+    work = found.integral(found.assumed_friction * np.abs(found.speeds))
+    assert found.net_energy == pytest.approx(work.sum(), rel=1e-3)
+    with pytest.raises(pteron.DataError, match=r"friction: -0\.1 given"):
+        size(BARE["five-bar"], cycle("five-bar"), friction=-0.1)
 
 
 def test_forces_are_those_of_the_drives_with_payload_and_wrench():

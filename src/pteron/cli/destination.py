@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.terminal import is_terminal, show, show_json, write, written
+from pteron.cli.terminal import show, show_json, written
 
 if TYPE_CHECKING:
     import polars as pl
@@ -57,10 +57,10 @@ class Destination:
         *,
         as_json: bool,
     ) -> None:
-        """Write files if they are asked for; then print for a program, a person, or a pipe.
+        """Write files if they are asked for; then print for a program or for a person.
 
         `data` are the figures, `more` makes the other files of a folder, by name, and `person`
-        prints what a person reads; without `--out` a pipe gets the table.
+        prints what a person reads.
         """
         files: list[Path] = []
         if self.is_table:
@@ -77,8 +77,5 @@ class Destination:
         if as_json:
             show_json(data | ({"files": [str(file) for file in files]} if files else {}))
             return
-        if is_terminal():
-            person()
-        elif self.out is None:
-            write(table.write_csv())
+        person()
         show(*written(*files))

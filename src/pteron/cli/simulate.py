@@ -11,7 +11,7 @@ from pteron.cli.arguments import STANDARD, check_rate, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import cycle_of, loaded
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import note, plain, show, table
+from pteron.cli.terminal import is_terminal, note, plain, show, table, write
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -107,7 +107,11 @@ def simulate(
         note(f"Stopped {found.stopped}")
     data = _data(found, controller, cycle, payload)
     destination.deliver(
-        found.table(), data, lambda: _pictures(found), lambda: _show(found, data), as_json=json
+        found.table(),
+        data,
+        lambda: _pictures(found),
+        partial(_tell, found, data, out),
+        as_json=json,
     )
     if found.stopped:
         raise Exit(_ENDED)
@@ -200,6 +204,14 @@ def _pictures(found: Simulation) -> dict[str, str]:
     forces = forces_figure(found.time, found.forces, ylabel=f"drive force ({units})")
     tracking = tracking_figure(found.time, found.error, found.robot.coordinates)
     return {"tracking.svg": svg_file(tracking), "forces.svg": svg_file(forces)}
+
+
+def _tell(found: Simulation, data: dict[str, Any], out: str | None) -> None:
+    """Print for a person; without --out a pipe gets the table."""
+    if is_terminal() or out is not None:
+        _show(found, data)
+    else:
+        write(found.table().write_csv())
 
 
 def _show(found: Simulation, data: dict[str, Any]) -> None:

@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import rich.table
 from typer import Exit
 
 from pteron.cli.arguments import STANDARD, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import cycle_of, loaded
+from pteron.cli.pose_ranges import pose_ranges
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, table
-from pteron.errors import UnlikelyValue
+from pteron.errors import DataError, UnlikelyValue
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
     import polars as pl
 
+    from pteron.manipulator import Manipulator
     from pteron.motion import Fit, Sizing
+    from pteron.workspace import Box
 
 _OVERLOADED = 1
 """Exit code where a drive is overloaded."""
+
+_NAMED = {"peak_force": "peak force", "rms_force": "RMS force", "peak_speed": "speed"}
+"""Quantities whose worst places are told."""
+
+_ROUNDING = 1e-9
+"""Share of a margin by which it may be missed."""
 
 _BEST = 3
 """Motors shown for each joint, the best ones."""
@@ -31,10 +42,12 @@ _BEST = 3
 def size(
     robot: str,
     *,
-    cycle: str = STANDARD,
+    cycle: list[str] | None = None,
     payload: float = 0.0,
     duration: float | None = None,
-    dwell: float = 0.0,
+    dwell: list[float] | None = None,
+    within: str | None = None,
+    friction: float = 0.1,
     motors: str | None = None,
     margin: float = 1.0,
     out: str | None = None,
@@ -43,29 +56,41 @@ def size(
 ) -> None:
     """Size the motors: peak and RMS force, speed, power and energy of each drive over a cycle.
 
+    The standard cycle is done at all places of the workspace and at all turns about the vertical,
+    and the worst of them counts and is named; a motion from a table is done as it stands. Several
+    cycles are done one after the other, each with its rest.
+
     Forces are those of the drives: the bodies with the payload, friction and the rotors, as the
-    machine's file has them. Where a cycle is more than a drive's limits there, a warning says which
-    leg and by how much.
+    machine's file has them. What is not enough is told by leg and amount, of the drives in the file
+    as of a list of motors, and the exit code is 1.
 
     A list of motors has the columns name, rotor_inertia (kg m^2), rated_torque and peak_torque
     (N m), max_speed (rad/s). For each joint it is told which serve, the smallest first, from what
     ratio to what ratio, and which ratio is best: least RMS torque.
 
-    A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv. The exit code
-    is 1 if the drives cannot do the cycle, or no motor of the list serves a joint.
+    A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv; the pictures
+    are of the place where the most power is needed.
 
     Options
     -------
-    --dwell: Rest after each cycle, s.
+    --cycle CYCLE: adept, the standard pick-and-place cycle, or a table of a motion; again for more.
+        [default: adept]
+    --dwell: Rest after each cycle, s; again for that after each of several.
+    --within REGION: Where the cycle is done: workspace, here (as it stands), or a box of poses such
+        as x=-0.1:0.1,y=-0.1:0.1; what it leaves out is as at home. [default: workspace; here of a
+        table]
+    --friction SHARE: Dry friction of a drive that has none in the file, over its largest force; 0
+        leaves it out.
     --motors FILE: Choose from the motors in this CSV or TOML file.
-    --margin: What a motor must be able to do, over what the cycle asks.
+    --margin: What drives and motors must be able to do, over what the cycle asks.
     --out DIR|FILE: Write tables, numbers and pictures to a folder, or one table.
 
     Examples
     --------
     pteron size delta --payload 1.0
-    pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing
-    pteron size quadrupteron --cycle motion.csv --out sizing.csv
+    pteron size robot.toml --motors motors.csv --dwell 0.2 --margin 1.3 --out sizing
+    pteron size quadrupteron --cycle pick.csv --dwell 0.2 --cycle home.csv --dwell 5
+    pteron size delta --within x=-0.1:0.1,y=-0.1:0.1,z=-0.9:-0.8
     """
     machine = load_robot(robot, elbows)
     from pteron.motion import choose, read_motors, size as sized
@@ -78,50 +103,89 @@ def size(
     for motor in chosen:
         for text in motor.warnings:
             note(f"Warning: {text}")
+    cycles = cycle or [STANDARD]
+    where = within or ("workspace" if cycles == [STANDARD] else "here")
+    places: Any = {"workspace": "workspace", "here": None}
+    places = places[where] if where in places else _box(machine, where)
     carrying = loaded(machine, payload)
     with spinner(f"Sizing the drives of {machine.name}"):
-        motion = cycle_of(machine, cycle, duration)
-        found = sized(carrying, motion, dwell=dwell)
+        motions = [cycle_of(machine, one, duration) for one in cycles]
+        how: dict[str, Any] = {"dwell": dwell or [0.0], "friction": friction}
+        found = sized(carrying, motions, places=places, **how)
         fits = choose(found, chosen, margin=margin)
-    for text in found.overloads:
+    lacking = [*_weak(found, margin), *_unserved(found, fits, margin)]
+    for text in lacking:
         note(f"Warning: {text}")
-    unserved = _unserved(found, fits)
-    for text in unserved:
-        note(f"Warning: {text}")
-    data = _data(found, fits, cycle, payload)
+    asked = _Asked(" and ".join(cycles), payload, where, margin)
     # A list of motors is what its choice is asked for.
-    rows = _fits_table(found, fits) if fits and out is None else found.table()
     destination.deliver(
-        rows,
-        data,
+        _fits_table(found, fits) if fits and out is None else found.table(),
+        _data(found, fits, asked),
         lambda: _more(found, fits),
-        lambda: _show(found, fits, cycle, payload),
+        lambda: _show(found, fits, asked),
         as_json=json,
     )
-    if found.overloads or unserved:
+    if lacking:
         raise Exit(_OVERLOADED)
 
 
-def _unserved(found: Sizing, fits: tuple[Fit, ...]) -> list[str]:
-    """Return the joints that no motor of the list serves, and what the best of them lacks."""
+@dataclass(frozen=True)
+class _Asked:
+    """What was asked for, in the words of the options."""
+
+    cycle: str
+    payload: float
+    within: str
+    margin: float
+
+
+def _box(machine: Manipulator, text: str) -> Box:
+    """Return the box of poses that --within says, as at home where it says nothing."""
+    from pteron.maps.grid import expect_coordinates
+    from pteron.workspace import Box, home_pose
+
+    held, ranges = pose_ranges(text, "--within")
+    expect_coordinates(machine, held, ranges)
+    spans: dict[str, tuple[float, ...]] = {name: (value,) for name, value in held.items()} | ranges
+    if any(len(span) > 2 for span in spans.values()):
+        raise DataError("--within: NAME=LEAST:GREATEST expected, such as x=-0.1:0.1,y=-0.1:0.1")
+    home = zip(machine.coordinates, home_pose(machine).tolist(), strict=True)
+    ordered = [spans.get(name, (value,)) for name, value in home]
+    return Box(tuple(span[0] for span in ordered), tuple(span[-1] for span in ordered))
+
+
+def _weak(found: Sizing, margin: float) -> list[str]:
+    """Return what the drives of the machine's file have too little of, a line each."""
+    beyond = [
+        f"leg {one.leg}: not enough: {one.limit} allow {one.most:.4g} {one.unit}, {one.margin:.3g} "
+        f"times the {one.needed:.4g} {one.unit} that the cycle takes{found.where(one)}, and a "
+        f"margin of {margin:g} is asked for"
+        for one in found.margins
+        if 1.0 <= one.margin < margin * (1.0 - _ROUNDING)
+    ]
+    return [*found.overloads, *beyond]
+
+
+def _unserved(found: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
+    """Return the joints for which no motor of the list is enough, and what the best one lacks."""
     lines = []
     for leg in range(1, found.robot.joint_count + 1):
         own = [fit for fit in fits if fit.leg == leg]
         if own and not own[0].fits:
             best = own[0]
             lines.append(
-                f"leg {leg}: no motor of the list serves; {best.motor.name} comes nearest, with "
-                f"{best.margin:.0%} of the {best.scarcest} it needs"
+                f"leg {leg}: not enough: no motor of the list serves; {best.motor.name}, the "
+                f"nearest, has {best.margin:.3g} times the {best.scarcest} that the cycle takes, "
+                f"and {margin:g} times is asked for"
             )
     return lines
 
 
-def _data(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> dict[str, Any]:
-    total = found.power.sum(axis=1)
+def _data(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> dict[str, Any]:
+    total = found.power.sum(axis=-1)
     return {
         "robot": found.robot.name,
-        "cycle": cycle,
-        "payload": payload,
+        **asdict(asked),
         "duration": found.duration,
         "dwell": found.dwell,
         "drives": found.table().to_dicts(),
@@ -131,9 +195,23 @@ def _data(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> d
             "energy": found.net_energy,
             "mean_power": found.net_energy / found.duration,
         },
+        "places": len(found.places) or 1,
+        "worst": _worst(found),
+        "assumed_friction": found.assumed_friction.tolist(),
+        "margins": [one._asdict() | {"margin": one.margin} for one in found.margins],
         "overloads": list(found.overloads),
         "motors": _fits_table(found, fits).to_dicts() if fits else [],
     }
+
+
+def _worst(found: Sizing) -> list[dict[str, Any]]:
+    """Return the worst places of each leg; none where the cycle is done as it stands."""
+    rows = []
+    for leg in range(found.robot.joint_count) if found.places else ():
+        for quantity in _NAMED:
+            place = found.places[found.worst(quantity)[leg]]
+            rows.append({"leg": leg + 1, "quantity": quantity, **asdict(place)})
+    return rows
 
 
 def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
@@ -160,26 +238,88 @@ def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
     from pteron.plots import svg_file
     from pteron.report.drive_figures import force_speed, power
 
+    if found.places:
+        found = found.at(int(found.power.sum(axis=-1).max(axis=0).argmax()))
     texts = {"power.svg": svg_file(power(found)), "force-speed.svg": svg_file(force_speed(found))}
     return texts | ({"motors.csv": _fits_table(found, fits).write_csv()} if fits else {})
 
 
-def _show(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> None:
+def _show(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> None:
     """Print for a person: loads, power, motors, and the choice."""
-    carried = f" with {payload:g} kg" if payload else ""
+    carried = f" with {asked.payload:g} kg" if asked.payload else ""
     rest = f", {found.dwell:g} s of it at rest" if found.dwell else ""
-    total = found.power.sum(axis=1)
+    places = (
+        f"The greatest of {len(found.places)} places and turns of the cycle, within "
+        f"{plain(asked.within.replace('workspace', 'the workspace'))}."
+    )
     show(
-        f"[bold]{plain(found.robot.name)}[/bold]{carried}, cycle {plain(cycle)}: "
+        f"[bold]{plain(found.robot.name)}[/bold]{carried}, cycle {plain(asked.cycle)}: "
         f"{found.duration:.4g} s{rest}",
+        *([places] if found.places else []),
         _loads(found),
+        *_places(found),
         _powers(found),
         *_rotors(found),
-        f"All drives: {found.net_energy:.4g} J a cycle, "
-        f"{found.net_energy / found.duration:.4g} W in the mean, "
-        f"{total.max():.4g} W at most",
+        *_energy(found),
         *_choice(found, fits),
+        *_verdict(found, fits, asked.margin),
     )
+
+
+def _energy(found: Sizing) -> list[str]:
+    """Return what all drives take, and from where their friction is."""
+    total = found.power.sum(axis=-1)
+    net = found.net_energy
+    given = f"{found.given_energy.sum():.4g} J given and taken back: there is no friction"
+    told = [
+        f"All drives: {net:.4g} J a cycle{'' if net else f' ({given})'}, "
+        f"{net / found.duration:.4g} W in the mean, {total.max():.4g} W at most"
+    ]
+    if found.assumed_friction.any():
+        units = [leg.joint.force_unit for leg in found.robot.legs]
+        forces = zip(found.assumed_friction, units, strict=True)
+        values = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
+        told.append(
+            f"Friction is assumed where the file has none: dry, leg by leg {values}; --friction "
+            "SHARE changes it, 0 leaves it out"
+        )
+    return told
+
+
+def _verdict(found: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
+    """Return whether drives and motors are enough, and the margin that exists."""
+    told = []
+    if found.margins:
+        least = min(found.margins, key=lambda one: one.margin)
+        enough = "Enough" if least.margin >= margin * (1.0 - _ROUNDING) else "Not enough"
+        told.append(
+            f"{enough}: the drives in the file have a margin of {least.margin:.3g}, {margin:g} "
+            f"asked; least is leg {least.leg}'s: {least.limit} allow {least.most:.4g} "
+            f"{least.unit}, the cycle takes {least.needed:.4g} {least.unit}{found.where(least)}"
+        )
+    best = [next(f for f in fits if f.leg == leg) for leg in sorted({fit.leg for fit in fits})]
+    if best:
+        least_fit = min(best, key=lambda fit: (fit.fits, fit.margin))
+        enough = "Enough" if all(fit.fits for fit in best) else "Not enough"
+        told.append(
+            f"{enough}: the first motor listed for each leg has a margin of {least_fit.margin:.3g} "
+            f"or more, {margin:g} asked; least is leg {least_fit.leg}'s {least_fit.scarcest} with "
+            f"{plain(least_fit.motor.name)}"
+        )
+    return told
+
+
+def _places(found: Sizing) -> list[rich.table.Table]:
+    """Return where each leg's force and speed are greatest."""
+    rows = []
+    for one in _worst(found):
+        pose = " ".join(f"{value:.4g}" for value in np.round(one["pose"], 6) + 0.0)
+        leg = str(one["leg"]) if one["quantity"] == "peak_force" else ""
+        rows.append(
+            (leg, _NAMED[one["quantity"]], pose, f"{np.degrees(one['turn']) % 360:.4g} deg")
+        )
+    names = "leg", "is greatest", f"about {' '.join(found.robot.coordinates)}", "turned"
+    return [table(*names, rows=rows, numbers=("leg", "turned"))] if rows else []
 
 
 def _loads(found: Sizing) -> rich.table.Table:

@@ -19,6 +19,7 @@ from pteron.motion.simulation import (
     simulate as simulate,
 )
 from pteron.motion.sizing.drive_loads import (
+    DriveMargin as DriveMargin,
     Sizing as Sizing,
     best_ratio as best_ratio,
     best_ratios as best_ratios,
@@ -26,6 +27,7 @@ from pteron.motion.sizing.drive_loads import (
 from pteron.motion.sizing.gearing import Span as Span
 from pteron.motion.sizing.motor_choice import Fit as Fit, choose as choose
 from pteron.motion.sizing.motors import Motor as Motor, read_motors as read_motors
+from pteron.motion.sizing.places import Place as Place, placed as placed
 from pteron.motion.sizing.size import size as size
 from pteron.motion.trajectories.checks import check_motion as check_motion, check_path as check_path
 from pteron.motion.trajectories.demand import Peak as Peak, peaks as peaks
@@ -59,4 +61,6 @@ from pteron.motion.trajectories.time_optimal import (
 )
 from pteron.public import publish as _publish
 
-_publish(__name__, checked=True, classes=("FourierSeries", "Motor", "MotionLimits", "Washout"))
+_publish(
+    __name__, checked=True, classes=("FourierSeries", "Motor", "MotionLimits", "Place", "Washout")
+)

@@ -1,21 +1,24 @@
-"""`Sizing`, the result of `size`: peaks, means, power and energy of each drive over a cycle."""
+"""`Sizing`, the result of `size`: peaks, means, power and energy of each drive over a cycle.
+
+Where the cycle is done at several places, each is the greatest of all places.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 
 from pteron.html_table import Column, html_table
 from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion.overloads import overloads
+from pteron.motion.sizing.places import Place
 from pteron.shapes import PerJoint
 
 if TYPE_CHECKING:
@@ -24,48 +27,74 @@ if TYPE_CHECKING:
 _STILL = 1e-9
 """Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
 
+_HOLDING = 100.0
+"""Ratio to the best one of the places where a joint moves, up to which a ratio is sought if it
+rests at others."""
+
+_SAME = 1e-9
+"""Relative difference below which ratios are the same."""
+
 _NONE = 1e-9
 """Share of the drives' energy below which its net sum counts as zero: rounding."""
 
 
+class DriveMargin(NamedTuple):
+    """A limit of a drive in the machine's file over what the cycle asks of it, at the joint."""
+
+    leg: int
+    limit: str
+    """The keys of the file: "rated_torque and ratio", "max_force" or "max_speed"."""
+    quantity: str
+    """What it bounds: "rms_force", "peak_force" or "peak_speed"."""
+    most: float
+    needed: float
+    unit: str
+
+    @property
+    def margin(self) -> float:
+        """The limit over what is needed: from 1 on it is enough."""
+        return self.most / self.needed if self.needed > 0.0 else math.inf
+
+
 @dataclass(frozen=True, repr=False)
 class Sizing:
-    """The load on a machine's drives over one cycle: a motion, and perhaps a rest after it.
+    """The load on a machine's drives over one cycle: motions and rests, at one place or at several.
 
     Everything is at the joints, per leg: N and m/s of a slider, N m and rad/s of a crank, but for
     what is said to be at the motor. Forces are those of the drives: rigid bodies, friction, offset
-    and the motors' inertia.
+    and the motors' inertia. Peaks, means, powers and energies are the greatest of all places.
 
     Attributes
     ----------
     robot : Manipulator
         The machine, with its payload if it carries one.
     time : array, shape (K,)
-        The motion's samples and the middles between them, s.
-    forces : array, shape (K, n)
-        Forces that the drives give, N or N m.
-    loads : array, shape (K, n)
-        The same without the motors' inertia: what does not depend on the ratio.
-    speeds, accelerations : array, shape (K, n)
+        The motions' samples and the middles between them, and the rests, s.
+    forces : array, shape (K, n) or (K, W, n)
+        Forces that the drives give, N or N m; of several places all of them.
+    speeds, accelerations : array, shape (K, n) or (K, W, n)
         Of the joints, m/s and m/s^2, or rad/s and rad/s^2.
     dwell : float
-        How long the platform rests after the motion, s.
-    holding : array, shape (n,)
-        Forces at that rest, where friction helps neither way.
+        How long the platform rests in the cycle, s: the drives hold it, and friction helps neither
+        way.
     load_inertia : array, shape (2, n)
         Least and greatest inertia of the rigid bodies at each joint, the other joints being held:
         the diagonal of J^-T M J^-1; kg or kg m^2.
+    places : tuple of Place
+        Where the cycle is done; empty where it is done as it stands.
+    assumed_friction : array, shape (n,)
+        Dry friction that was assumed where the machine's file has none, N or N m.
     """
 
     robot: Manipulator
     time: Array
     forces: Array
-    loads: Array
     speeds: Array
     accelerations: Array
     dwell: float
-    holding: Array
     load_inertia: Array
+    places: tuple[Place, ...]
+    assumed_friction: PerJoint
 
     def __repr__(self) -> str:
         """Return the sizing in a line; `table` has it all."""
@@ -89,73 +118,109 @@ class Sizing:
 
     @property
     def duration(self) -> float:
-        """The cycle's time, the rest included, s."""
-        return float(self.time[-1] - self.time[0]) + self.dwell
+        """The cycle's time, the rests included, s."""
+        return float(self.time[-1] - self.time[0])
+
+    @cached_property
+    def loads(self) -> Array:
+        """Forces without the motors' inertia, in their shape: what does not depend on the ratio."""
+        return self.forces - self.rotor_inertia * self.accelerations
+
+    def at(self, place: int) -> Sizing:
+        """Return the sizing at one of several places, by its index."""
+        parts = (self.forces, self.speeds, self.accelerations)
+        forces, speeds, accelerations = (part[:, place] for part in parts)
+        return replace(self, forces=forces, speeds=speeds, accelerations=accelerations, places=())
+
+    def worst(self, quantity: str) -> PerJoint:
+        """Return, for each drive, the index in `places` where a quantity is greatest.
+
+        The quantity is "peak_force", "rms_force", "peak_speed", "rms_speed", "peak_power",
+        "peak_braking", "given_energy" or "braked_energy".
+        """
+        return np.asarray(self._by_place[quantity].argmax(axis=0))
+
+    @cached_property
+    def _by_place(self) -> dict[str, Array]:
+        """Each quantity at each place, (W, n); W = 1 where the cycle is done as it stands."""
+        shape = len(self.time), -1, self.robot.joint_count
+        forces, speeds = self.forces.reshape(shape), self.speeds.reshape(shape)
+        power = forces * speeds
+        given, braked = np.maximum(power, 0.0), np.maximum(-power, 0.0)
+        return {
+            "peak_force": np.abs(forces).max(axis=0),
+            "rms_force": np.sqrt(self.mean(forces**2)),
+            "peak_speed": np.abs(speeds).max(axis=0),
+            "rms_speed": np.sqrt(self.mean(speeds**2)),
+            "peak_power": given.max(axis=0),
+            "peak_braking": braked.max(axis=0),
+            "given_energy": self.integral(given),
+            "braked_energy": self.integral(braked),
+        }
+
+    def _most(self, quantity: str) -> PerJoint:
+        return np.asarray(self._by_place[quantity].max(axis=0))
 
     def integral(self, values: Array) -> Array:
-        """Return the integral over the motion, by Simpson's rule, of values (K, ...) at `time`."""
+        """Return the integral over the cycle, by Simpson's rule, of values (K, ...) at `time`."""
         spans = (self.time[2::2] - self.time[:-2:2]) / 6.0
         ends = values[:-2:2] + 4.0 * values[1::2] + values[2::2]
         return np.asarray(np.tensordot(spans, ends, axes=1))
 
-    def mean(self, values: Array, resting: ArrayLike = 0.0) -> Array:
-        """Return the mean over the cycle of values (K, ...), which are `resting` at the rest."""
-        whole = self.integral(values) + self.dwell * np.asarray(resting)
-        return np.asarray(whole / self.duration)
-
-    @cached_property
-    def peak_forces(self) -> PerJoint:
-        """Largest size of each force, N or N m."""
-        return np.asarray(np.maximum(np.abs(self.forces).max(axis=0), self._held))
-
-    @cached_property
-    def rms_forces(self) -> PerJoint:
-        """Root mean square of each force over the cycle, N or N m: what heats a motor."""
-        return np.asarray(np.sqrt(self.mean(self.forces**2, self.holding**2)))
-
-    @cached_property
-    def peak_speeds(self) -> PerJoint:
-        """Largest speed of each joint, m/s or rad/s."""
-        return np.asarray(np.abs(self.speeds).max(axis=0))
-
-    @cached_property
-    def rms_speeds(self) -> PerJoint:
-        """Root mean square of each speed over the cycle, m/s or rad/s."""
-        return np.asarray(np.sqrt(self.mean(self.speeds**2)))
+    def mean(self, values: Array) -> Array:
+        """Return the mean over the cycle of values (K, ...) at `time`."""
+        return np.asarray(self.integral(values) / self.duration)
 
     @property
-    def _held(self) -> PerJoint:
-        return np.asarray(np.abs(self.holding) * (self.dwell > 0.0))
+    def peak_forces(self) -> PerJoint:
+        """Largest size of each force, N or N m."""
+        return self._most("peak_force")
 
-    @cached_property
+    @property
+    def rms_forces(self) -> PerJoint:
+        """Root mean square of each force over the cycle, N or N m: what heats a motor."""
+        return self._most("rms_force")
+
+    @property
+    def peak_speeds(self) -> PerJoint:
+        """Largest speed of each joint, m/s or rad/s."""
+        return self._most("peak_speed")
+
+    @property
+    def rms_speeds(self) -> PerJoint:
+        """Root mean square of each speed over the cycle, m/s or rad/s."""
+        return self._most("rms_speed")
+
+    @property
     def power(self) -> Array:
-        """Mechanical power of each drive (K, n), W: negative where it brakes."""
+        """Mechanical power of each drive, in the forces' shape, W: negative where it brakes."""
         return np.asarray(self.forces * self.speeds)
 
     @property
     def peak_power(self) -> PerJoint:
         """Largest power that each drive gives, W."""
-        return np.asarray(self.power.max(axis=0, initial=0.0))
+        return self._most("peak_power")
 
     @property
     def peak_braking(self) -> PerJoint:
         """Largest power that each drive takes back, W, as a positive number."""
-        return np.asarray((-self.power).max(axis=0, initial=0.0))
+        return self._most("peak_braking")
 
-    @cached_property
+    @property
     def given_energy(self) -> PerJoint:
         """Energy that each drive gives over the cycle while it drives, J."""
-        return self.integral(np.maximum(self.power, 0.0))
+        return self._most("given_energy")
 
-    @cached_property
+    @property
     def braked_energy(self) -> PerJoint:
         """Energy that each drive takes back over the cycle while it brakes, J, 0 or more."""
-        return self.integral(np.maximum(-self.power, 0.0))
+        return self._most("braked_energy")
 
     @property
     def energy(self) -> PerJoint:
         """Energy that each drive gives over the cycle, less what it takes back, J."""
-        return np.asarray(self.given_energy - self.braked_energy)
+        found = self._by_place
+        return np.asarray((found["given_energy"] - found["braked_energy"]).max(axis=0))
 
     @property
     def net_energy(self) -> float:
@@ -163,8 +228,9 @@ class Sizing:
 
         It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
         """
-        given, net = float(self.given_energy.sum()), float(self.energy.sum())
-        return net if abs(net) > _NONE * given else 0.0
+        given, braked = (self._by_place[f"{key}_energy"].sum(axis=1) for key in ("given", "braked"))
+        net = float((given - braked).max())
+        return net if abs(net) > _NONE * float(given.max()) else 0.0
 
     @property
     def mean_power(self) -> PerJoint:
@@ -200,26 +266,60 @@ class Sizing:
         gears = np.array([abs(drive.gear) for drive in self.drives])
         return self.rms_forces / gears, self.peak_forces / gears
 
-    def squares(self, leg: int) -> tuple[float, float, float]:
-        """Return the means over the cycle of f^2, f q'' and q''^2, f being the load of a leg."""
-        i = leg - 1
-        f, a, held = self.loads[:, i], self.accelerations[:, i], self.holding[i]
-        means = self.mean(np.stack([f * f, f * a, a * a], axis=-1), [held**2, 0.0, 0.0])
-        return float(means[0]), float(means[1]), float(means[2])
+    def squares(self, leg: int) -> tuple[Array, Array, Array]:
+        """Return the means over the cycle of f^2, f q'' and q''^2, f being the load of a leg.
+
+        Each is (), or (W,) of several places.
+        """
+        force, mixed, acceleration = (part[..., leg - 1] for part in self._squares)
+        return force, mixed, acceleration
+
+    @cached_property
+    def _squares(self) -> tuple[Array, Array, Array]:
+        f, a = self.loads, self.accelerations
+        return self.mean(f * f), self.mean(f * a), self.mean(a * a)
+
+    @cached_property
+    def margins(self) -> tuple[DriveMargin, ...]:
+        """The limits of the drives in the machine's file over what the cycle asks, leg by leg."""
+        found = []
+        for i, (leg, drive) in enumerate(zip(self.robot.legs, self.drives, strict=True)):
+            force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
+            limits = (
+                ("rated_torque and ratio", "rms_force", drive.rated_force, self.rms_forces, force),
+                ("max_force", "peak_force", drive.max_force, self.peak_forces, force),
+                ("max_speed", "peak_speed", drive.max_speed, self.peak_speeds, speed),
+            )
+            found += [
+                DriveMargin(i + 1, key, quantity, most, float(needed[i]), unit)
+                for key, quantity, most, needed, unit in limits
+                if most is not None
+            ]
+        return tuple(found)
 
     @cached_property
     def overloads(self) -> tuple[str, ...]:
         """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
-        found = list(overloads(self.robot, [self.peak_forces], self.speeds))
-        legs = zip(self.robot.legs, self.drives, self.rms_forces, strict=True)
-        for i, (leg, drive, rms) in enumerate(legs, start=1):
-            rated, unit = drive.rated_force, leg.joint.force_unit
-            if rated is not None and rms > rated:
-                found.append(
-                    f"leg {i}: the cycle takes {rms:.4g} {unit} root mean square, but the motor "
-                    f"gives {rated:.4g} {unit} all the time (rated_torque and ratio)"
+        told = []
+        for one in sorted(self.margins, key=lambda one: one.quantity == "rms_force"):
+            needed = f"{one.needed:.4g} {one.unit}"
+            if one.margin >= 1.0:
+                continue
+            if one.quantity == "rms_force":
+                told.append(
+                    f"leg {one.leg}: the cycle takes {needed} root mean square{self.where(one)}, "
+                    f"but the motor gives {one.most:.4g} {one.unit} all the time ({one.limit})"
                 )
-        return tuple(found)
+            else:
+                told.append(
+                    f"leg {one.leg}: the motion takes up to {needed}{self.where(one)}, but its "
+                    f"drive gives {one.most:g} {one.unit} ({one.limit})"
+                )
+        return tuple(told)
+
+    def where(self, one: DriveMargin) -> str:
+        """Return in words at which of several places a margin is so small; else an empty text."""
+        return f" {self.places[self.worst(one.quantity)[one.leg - 1]]}" if self.places else ""
 
     def table(self) -> pl.DataFrame:
         """Return a table, one row a leg: SI units, at the joint but for motor_torque.
@@ -289,10 +389,32 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     295.1
     """
     force, _, acceleration = sizing.squares(leg)
-    all_joints = sizing.mean(sizing.accelerations**2)
-    if rotor_inertia == 0.0 or acceleration <= _STILL**2 * float(all_joints.max()):
+    moving = acceleration > _STILL**2 * max(
+        float(sizing.squares(i)[2].max()) for i in range(1, sizing.robot.joint_count + 1)
+    )
+    if rotor_inertia == 0.0 or not moving.any():
         return math.inf
-    return math.sqrt(math.sqrt(force / acceleration) / rotor_inertia)
+    own = np.sqrt(np.sqrt(force[moving] / acceleration[moving]) / rotor_inertia)
+    least, most = float(own.min()), float(own.max())
+    if not moving.all():  # where it only holds, more is better
+        most *= _HOLDING
+    if most - least <= _SAME * most:
+        return most
+    # The greatest of convex functions of i^2.
+    found = minimize_scalar(
+        lambda log: float(mean_squares(sizing, leg, math.exp(log), rotor_inertia).max()),
+        bounds=(math.log(least), math.log(most)),
+        method="bounded",
+        options={"xatol": _SAME},
+    )
+    return math.exp(found.x)
+
+
+def mean_squares(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> Array:
+    """Return the mean square of a motor's torque over the cycle, () or (W,), (N m)^2."""
+    force, mixed, acceleration = sizing.squares(leg)
+    square = force / ratio**2 + 2.0 * rotor_inertia * mixed
+    return np.maximum(square + (rotor_inertia * ratio) ** 2 * acceleration, 0.0)
 
 
 def best_ratios(sizing: Sizing) -> PerJoint:

@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pteron.kernels import Array
-from pteron.motion.sizing.drive_loads import Sizing
+from pteron.motion.sizing.drive_loads import Sizing, mean_squares
 
 
 class Span(NamedTuple):
@@ -44,12 +43,10 @@ def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tup
 
     N m, at a ratio in rad/m or rad/rad, of a motor with this inertia of its rotor, kg m^2.
     """
-    force, mixed, acceleration = sizing.squares(leg)
-    square = force / ratio**2 + 2.0 * rotor_inertia * mixed
-    square += (rotor_inertia * ratio) ** 2 * acceleration
-    loads, accelerations = _samples(sizing, leg)
+    rms = math.sqrt(float(mean_squares(sizing, leg, ratio, rotor_inertia).max()))
+    loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
     peak = np.abs(loads / ratio + rotor_inertia * ratio * accelerations).max()
-    return math.sqrt(max(square, 0.0)), float(peak)
+    return rms, float(peak)
 
 
 def speed_span(sizing: Sizing, leg: int, max_speed: float) -> Span:
@@ -64,12 +61,12 @@ def rated_span(sizing: Sizing, leg: int, rotor_inertia: float, rated_torque: flo
     # C u^2 - B u + A <= 0 with u = i^2.
     a, b, c = force, rated_torque**2 - 2.0 * rotor_inertia * mixed, rotor_inertia**2 * acceleration
     inside = b * b - 4.0 * a * c
-    if b < 0.0 or inside < 0.0 or (b == 0.0 and a > 0.0):
+    if ((b < 0.0) | (inside < 0.0) | ((b == 0.0) & (a > 0.0))).any():
         return NONE
-    root = b + math.sqrt(inside)
-    return Span(
-        math.sqrt(2.0 * a / root) if a else 0.0, math.sqrt(root / (2.0 * c)) if c else math.inf
-    )
+    root = b + np.sqrt(inside)
+    least = np.sqrt(2.0 * a[a > 0.0] / root[a > 0.0])
+    greatest = np.sqrt(root[c > 0.0] / (2.0 * c[c > 0.0]))
+    return Span(float(least.max(initial=0.0)), float(greatest.min(initial=math.inf)))
 
 
 def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float) -> Span:
@@ -77,7 +74,7 @@ def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float
 
     At each sample |f / i + J i q''| <= T holds between the roots of two parabolas, an interval.
     """
-    loads, accelerations = _samples(sizing, leg)
+    loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
     own = rotor_inertia * accelerations
     inside = peak_torque**2 - 4.0 * loads * own
     if (inside < 0.0).any():
@@ -87,10 +84,3 @@ def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float
     moving = np.abs(own) > 0.0
     greatest = root[moving] / (2.0 * np.abs(own[moving]))
     return Span(float(least.max()), float(greatest.min(initial=math.inf)))
-
-
-def _samples(sizing: Sizing, leg: int) -> tuple[Array, Array]:
-    """Return f and q'' of a leg, the rest among them if there is one."""
-    i = leg - 1
-    f, a = sizing.loads[:, i], sizing.accelerations[:, i]
-    return (np.append(f, sizing.holding[i]), np.append(a, 0.0)) if sizing.dwell else (f, a)

@@ -1,4 +1,6 @@
-"""`size`: forces, speeds and inertia at each drive over a motion, integrated to loads (`Sizing`).
+"""`size`: forces, speeds and inertia at each drive over a cycle, integrated to loads (`Sizing`).
+
+A cycle is one motion or several, with rests, as it stands or at many places of a workspace.
 
 Integrals over the motion are Simpson's over each interval between two samples, of which the middle
 is interpolated as `Motion.at` does: exact for cubics, and the error falls with the fourth power of
@@ -7,37 +9,62 @@ the interval where the motion is smooth.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from operator import itemgetter
+from typing import Literal
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.dynamics import drive_forces, mass_matrix
 from pteron.errors import DataError
-from pteron.kernels import Array
-from pteron.kinematics import jacobian, joint_accelerations, joint_rates
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion
+from pteron.motion.motion import Motion, told_pose
 from pteron.motion.sizing.drive_loads import Sizing
+from pteron.motion.sizing.duty import DutyCycle
+from pteron.motion.sizing.places import TURNS, Place, checked, near, places_in, stays, within
+from pteron.workspace import Region
 
 _AT_REST = 1e-6
 """Share of the motion's greatest speed below which its end is at rest."""
 
+_SOUGHT = "peak_force", "rms_force", "peak_speed"
+"""Quantities whose worst places are sought."""
+
+_ROUNDS = 5
+"""Halvings of the grid about the worst places."""
+
 
 def size(
-    robot: RobotLike, motion: Motion, *, dwell: float = 0.0, wrench: ArrayLike | None = None
+    robot: RobotLike,
+    motion: Motion | Sequence[Motion],
+    *,
+    dwell: float | Sequence[float] = 0.0,
+    wrench: ArrayLike | None = None,
+    places: Region | Sequence[Place] | Literal["workspace"] | None = None,
+    friction: float = 0.0,
 ) -> Sizing:
-    """Return the load of a motion on each drive: its forces and speeds, and their integrals.
+    """Return the load of a cycle on each drive: its forces and speeds, and their integrals.
 
     Parameters
     ----------
     robot : Manipulator, name or path
         The machine, with what its file says of the drives; `with_payload` gives it a payload.
-    motion : Motion
-        One cycle.
-    dwell : float
-        Time for which the platform rests after the motion, s; the drives hold it there.
+    motion : Motion or sequence of Motion
+        One cycle; of several motions one after the other.
+    dwell : float or sequence of float
+        Time for which the platform rests after each motion, s; the drives hold it there.
     wrench : array, shape (m,), optional
         Load on the platform at P all along: a force in N and, where it turns, a moment about k
         in N m; of a platform that tilts a force and a moment, (6,).
+    places : Region, sequence of Place or "workspace", optional
+        Where else the cycle is done, as a whole: at all places and turns about the vertical at
+        which it stays in a region of poses, or in the workspace (with `least_margin` to
+        singularities, at the home pose's angles). A grid of places by 30 degrees of turn is looked
+        at, and then ever nearer about the worst of each drive. By default it is as it stands. Of a
+        motion with more than 241 samples as many moments are looked at.
+    friction : float
+        Dry friction of a drive that has none in the machine's file, as a share of the largest force
+        on it in the cycle; 0.1 is usual of gears and screws.
 
     Returns
     -------
@@ -48,8 +75,8 @@ def size(
     UnreachablePose, SingularPose
         If the machine cannot do a pose of the motion.
     DataError
-        If the motion has another number of coordinates than the machine, its time does not ascend,
-        or it is to be followed by a rest and does not end at rest.
+        If a motion has another number of coordinates than the machine, its time does not ascend,
+        or it is to be followed by a rest and does not end at rest; or it fits nowhere in a region.
 
     Examples
     --------
@@ -62,52 +89,63 @@ def size(
     (0.6, array([78.1,  7.5, 47.7]))
     """
     robot = as_manipulator(robot)
-    _check(robot, motion, dwell)
-    middles = (motion.time[:-1] + motion.time[1:]) / 2.0
+    motions = [motion] if isinstance(motion, Motion) else list(motion)
+    rests = np.ravel(np.asarray(dwell, dtype=float))
+    rests = np.repeat(rests, len(motions)) if len(rests) == 1 else rests
+    if len(rests) != len(motions) or not motions:
+        raise DataError(
+            f"dwell: {len(rests)} rests given, and {len(motions)} motions; give one for each motion"
+        )
+    for one, rest in zip(motions, rests, strict=True):
+        _check(robot, one, float(rest))
+    if not (np.isfinite(friction) and friction >= 0.0):
+        raise DataError(f"friction: {friction} given, a share of 0 or more expected")
     load = None if wrench is None else np.asarray(wrench, dtype=float)
     if load is not None and load.shape != (robot.freedom,):
         raise DataError(
             f"wrench: shape {load.shape} given, ({robot.freedom},) expected: one wrench for the "
             "whole motion"
         )
-    at_samples = motion.pose, motion.velocity, motion.acceleration
-    # The samples by themselves, so that an error's index is that of the motion.
-    parts = [_joints(robot, at_samples, load), _joints(robot, motion.at(middles), load)]
-    forces, speeds, accelerations = (
-        _interleaved(*pair) for pair in zip(parts[0], parts[1], strict=True)
-    )
-    rotors = np.array([0.0 if leg.drive is None else leg.drive.inertia for leg in robot.legs])
-    rest = np.zeros(robot.freedom)
-    inverse = np.linalg.inv(jacobian(robot, motion.pose))
-    felt = np.einsum("kai,kab,kbi->ki", inverse, mass_matrix(robot, motion.pose), inverse)
-    return Sizing(
-        robot,
-        _interleaved(motion.time, middles),
-        forces,
-        forces - rotors * accelerations,
-        speeds,
-        accelerations,
-        float(dwell),
-        drive_forces(robot, motion.pose[-1], rest, rest, load, smooth=True),
-        np.stack([felt.min(axis=0), felt.max(axis=0)]),
-    )
+    cycle = DutyCycle(robot, tuple(motions), rests, load, friction)
+    return cycle.sized() if places is None else _at_places(cycle, places)
 
 
-def _joints(
-    robot: Manipulator, state: tuple[Array, Array, Array], wrench: Array | None
-) -> tuple[Array, Array, Array]:
-    """Return forces of the drives, rates and accelerations of the joints (T, n)."""
-    return (
-        drive_forces(robot, *state, wrench, smooth=True),
-        joint_rates(robot, *state[:2]).actuated,
-        joint_accelerations(robot, *state).actuated,
-    )
-
-
-def _interleaved(samples: Array, middles: Array) -> Array:
-    found = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
-    found[::2], found[1::2] = samples, middles
-    return found
+def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["workspace"]) -> Sizing:
+    """Return the loads at given places, or at those of a region, and nearer about the worst."""
+    cycle = cycle.thinned()
+    if not (isinstance(places, Region) or places == "workspace"):
+        return cycle.sized(checked(cycle.robot, places))
+    robot, course = cycle.robot, cycle.course
+    box, fits = within(robot, places if isinstance(places, Region) else None)
+    known = dict.fromkeys(places_in(course, box, fits))
+    itself = Place(tuple(course.middle.tolist()))
+    if not isinstance(places, Region) or stays(course, itself, fits):
+        known[itself] = None
+    if not known:
+        sizes = np.ptp(course.around(0.0), axis=0)
+        raise DataError(
+            f"places: the cycle fits nowhere in the region: it is {told_pose(sizes)} wide, and the "
+            f"region {told_pose(np.ptp(box, axis=0))} ({' '.join(robot.coordinates)}, m and rad)"
+        )
+    found = cycle.sized(tuple(known))
+    worst: dict[tuple[str, int], tuple[float, Place]] = {}
+    steps, turn = np.ptp(box, axis=0) / 8.0, np.pi / TURNS if course.axis is not None else 0.0
+    for _ in range(_ROUNDS):
+        for quantity in _SOUGHT:
+            most = getattr(found, f"{quantity}s")
+            for leg, i in enumerate(found.worst(quantity)):
+                old = worst.get((quantity, leg), (-1.0, None))
+                worst[quantity, leg] = max(
+                    (float(most[leg]), found.places[i]), old, key=itemgetter(0)
+                )
+        around = (n for place in {p for _, p in worst.values()} for n in near(place, steps, turn))
+        new = [place for place in dict.fromkeys(around) if place not in known]
+        new = [place for place in new if stays(course, place, fits)]
+        if new:
+            found = cycle.sized(tuple(new))
+            known.update(dict.fromkeys(new))
+        steps, turn = steps / 2.0, turn / 2.0
+    return cycle.sized(tuple(known))
 
 
 def _check(robot: Manipulator, motion: Motion, dwell: float) -> None:

@@ -143,7 +143,7 @@ def _largest(robot: Manipulator, cycle: Cycle, least: float, wanted: int) -> int
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
-        return _keeps(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
+        return keeps_margin(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
 
     if wanted > _STEPS or not fits(wanted):
         return 0
@@ -153,7 +153,7 @@ def _largest(robot: Manipulator, cycle: Cycle, least: float, wanted: int) -> int
     return _STEPS - bisect_left(most, True, lo=1, key=lambda less: fits(_STEPS - less))
 
 
-def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
+def keeps_margin(robot: Manipulator, poses: Array, least: float) -> bool:
     """Say whether all poses keep the margins and the joints' limits."""
     type_i = numeric(robot, "reach")(poses)[1]
     if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false

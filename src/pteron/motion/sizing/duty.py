@@ -1,0 +1,169 @@
+"""`DutyCycle`: motions with rests, and the loads on a machine's drives, in place or elsewhere.
+
+Integrals over a motion are Simpson's over each interval between two samples, of which the middle is
+interpolated as `Motion.at` does: exact for cubics, and the error falls with the fourth power of the
+interval where the motion is smooth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pteron.arguments import expect_to_fit
+from pteron.dynamics import drive_forces, mass_matrix
+from pteron.errors import DataError, SingularPose, UnreachablePose
+from pteron.kernels import Array
+from pteron.kinematics import jacobian, joint_accelerations, joint_rates
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+from pteron.motion.motion import Motion
+from pteron.motion.sizing.drive_loads import Sizing
+from pteron.motion.sizing.places import Course, Place
+from pteron.motion.trajectories.tool import Curve
+
+_SAMPLES = 241
+"""Most samples of a motion that is done at several places."""
+
+_HALVES = np.array([0.0, 0.5, 1.0])
+
+
+@dataclass(frozen=True)
+class DutyCycle:
+    """Motions one after the other, each with a rest behind it.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine, with its payload.
+    motions : tuple of Motion
+        At least one.
+    rests : array, shape (M,)
+        Time of the rest after each, s; 0 is none.
+    wrench : array, shape (m,), or None
+        On the platform all along.
+    friction : float
+        Dry friction of a drive that has none in the file, over the largest force on it.
+    """
+
+    robot: Manipulator
+    motions: tuple[Motion, ...]
+    rests: Array
+    wrench: Array | None
+    friction: float
+
+    @cached_property
+    def course(self) -> Course:
+        """The motions' paths, from their middle."""
+        return Course.of(self.robot, self.motions)
+
+    def thinned(self) -> DutyCycle:
+        """Return it with as many samples as are looked at in each of several places."""
+        motions = []
+        for one in self.motions:
+            time = np.linspace(one.time[0], one.time[-1], _SAMPLES)
+            motions.append(Motion(time, *one.at(time)) if len(one.time) > _SAMPLES else one)
+        return replace(self, motions=tuple(motions))
+
+    def sized(self, places: Sequence[Place] = ()) -> Sizing:
+        """Return the loads at places, or as it stands if none is given."""
+        curves: list[Curve] = [(m.pose, m.velocity, m.acceleration) for m in self.motions]
+        if places:
+            count = sum(2.0 * curve[0].size for curve in curves)
+            expect_to_fit("places", len(places), 10.0 * count * len(places))
+            curves = list(self.course.at(places))
+            try:
+                return self._sized(curves, places)
+            except (UnreachablePose, SingularPose) as error:
+                raise DataError(f"places: {places[error.index[-1]]}: {error}") from None
+        return self._sized(curves, places)
+
+    def _sized(self, curves: Sequence[Curve], places: Sequence[Place]) -> Sizing:
+        """Return the loads over motions (T, m), or (T, W, m) of places."""
+        clock, inertias = float(self.motions[0].time[0]), []
+        blocks: list[tuple[Array, ...]] = []
+        for motion, curve, rest in zip(self.motions, curves, self.rests, strict=True):
+            middles = (motion.time[:-1] + motion.time[1:]) / 2.0
+            # The samples by themselves, so that an error's index is that of the motion.
+            samples = motion.time, *self._loads(*curve)
+            between = middles, *self._loads(*_between(motion.time, curve, middles))
+            time, *loads = (_interleaved(*pair) for pair in zip(samples, between, strict=True))
+            blocks.append((clock + time - time[0], *loads))
+            clock += motion.duration
+            if rest:
+                pose, still = (
+                    np.repeat(curve[0][-1:], 3, axis=0),
+                    np.zeros((3, *curve[0].shape[1:])),
+                )
+                blocks.append((clock + rest * _HALVES, *self._loads(pose, still, still)))
+                clock += float(rest)
+            inertias.append(self._inertia(curve[0]))
+        time, forces, speeds, accelerations = (
+            _joined(parts) for parts in zip(*blocks, strict=True)
+        )
+        assumed = self._assumed_friction(forces)
+        for i, drive in enumerate(self.drives):
+            forces[..., i] += assumed[i] * np.tanh(speeds[..., i] / drive.rest_speed)
+        least, most = zip(*inertias, strict=True)
+        return Sizing(
+            self.robot,
+            time,
+            forces,
+            speeds,
+            accelerations,
+            float(self.rests.sum()),
+            np.stack([np.min(least, axis=0), np.max(most, axis=0)]),
+            tuple(places),
+            assumed,
+        )
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        """The drives of the machine's file, or empty ones."""
+        return tuple(leg.drive or Drive() for leg in self.robot.legs)
+
+    def _loads(self, *state: Array) -> Curve:
+        """Return forces of the drives, rates and accelerations of the joints (..., n)."""
+        return (
+            drive_forces(self.robot, *state, self.wrench, smooth=True),
+            joint_rates(self.robot, *state[:2]).actuated,
+            joint_accelerations(self.robot, *state).actuated,
+        )
+
+    def _inertia(self, poses: Array) -> tuple[Array, Array]:
+        """Return the least and the greatest inertia that each joint moves (n,), the others held."""
+        inverse = np.linalg.inv(jacobian(self.robot, poses))
+        felt = np.einsum(
+            "...ai,...ab,...bi->...i", inverse, mass_matrix(self.robot, poses), inverse
+        )
+        felt = felt.reshape(-1, self.robot.joint_count)
+        return felt.min(axis=0), felt.max(axis=0)
+
+    def _assumed_friction(self, forces: Array) -> Array:
+        """Return dry friction (n,) of the drives that have none in the file."""
+        most = np.abs(forces).reshape(-1, self.robot.joint_count).max(axis=0)
+        without = [not (d.coulomb or d.viscous or d.stribeck) for d in self.drives]
+        return np.asarray(self.friction * most * without)
+
+
+def _between(time: Array, curve: Curve, middles: Array) -> Curve:
+    """Return a curve (T, ..., m) at other times."""
+    flat = Motion(time, *(part.reshape(len(time), -1) for part in curve))
+    shape = len(middles), *curve[0].shape[1:]
+    pose, velocity, acceleration = (part.reshape(shape) for part in flat.at(middles))
+    return pose, velocity, acceleration
+
+
+def _interleaved(samples: Array, middles: Array) -> Array:
+    found = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
+    found[::2], found[1::2] = samples, middles
+    return found
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    """Return parts one behind the other; between two, an interval of no length keeps the pairs."""
+    found = [row for part in parts for row in (part, part[-1:])]
+    return np.concatenate(found[:-1])
