@@ -125,11 +125,12 @@ class DutyCycle:
         """The drives of the machine's file, or empty ones."""
         return tuple(leg.drive or Drive() for leg in self.robot.legs)
 
-    def _loads(self, *state: Array) -> Curve:
+    def _loads(self, pose: Array, velocity: Array, acceleration: Array) -> Curve:
         """Return forces of the drives, rates and accelerations of the joints (..., n)."""
+        state = pose, velocity, acceleration
         return (
             drive_forces(self.robot, *state, self.wrench, smooth=True),
-            joint_rates(self.robot, *state[:2]).actuated,
+            joint_rates(self.robot, pose, velocity).actuated,
             joint_accelerations(self.robot, *state).actuated,
         )
 

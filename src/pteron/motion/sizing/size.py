@@ -10,7 +10,6 @@ the interval where the motion is smooth.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import itemgetter
 from typing import Literal
 
 import numpy as np
@@ -134,10 +133,9 @@ def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["wor
         for quantity in _SOUGHT:
             most = getattr(found, f"{quantity}s")
             for leg, i in enumerate(found.worst(quantity)):
-                old = worst.get((quantity, leg), (-1.0, None))
-                worst[quantity, leg] = max(
-                    (float(most[leg]), found.places[i]), old, key=itemgetter(0)
-                )
+                value = float(most[leg])
+                if (quantity, leg) not in worst or value > worst[quantity, leg][0]:
+                    worst[quantity, leg] = value, found.places[i]
         around = (n for place in {p for _, p in worst.values()} for n in near(place, steps, turn))
         new = [place for place in dict.fromkeys(around) if place not in known]
         new = [place for place in new if stays(course, place, fits)]
