@@ -74,7 +74,7 @@ def log_of(
     *,
     time=None,
     duration=8.0,
-    rate=500.0,
+    rate=300.0,
     joint_noise=0.0,
     force_noise=0.0,
     friction=None,

@@ -36,7 +36,7 @@ def test_forces_that_never_change_are_refused_in_one_line():
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("delta", "theta2 jumps by 6.283 rad, a turn"), ("linear-delta", "rho2 ")]
+    ("name", "said"), [("delta", "theta2 jumps by 6.28"), ("linear-delta", "rho2 ")]
 )
 def test_an_encoder_that_wraps_is_named(name, said):
     robot, log, _ = clean(name)
@@ -50,7 +50,7 @@ def test_an_encoder_that_wraps_is_named(name, said):
 def test_a_wild_sample_of_a_joint_is_no_wrap():
     robot, log, _ = clean("linear-delta")
     joints = log.joints.copy()
-    joints[1000:1003, 0] += 1.5 * np.ptp(joints[:, 0])
+    joints[500:503, 0] += 1.5 * np.ptp(joints[:, 0])
     assert found(robot, replace(log, joints=joints)).fault_isolation.tried
 
 
@@ -98,7 +98,8 @@ def test_swapped_positions_and_what_is_equivalent_are_told():
     log = noisy(log)
     text = refused(robot, replace(log, joints=log.joints[:, [1, 0, 2, 3]]), "columns")
     assert "theta1 and theta2 are swapped" in text
-    assert "as well explained: torque1 and torque2 are swapped" in text
+    assert "torque1 and torque2 are swapped" in text
+    assert "as well explained: " in text
     # Either way leads to a machine that exists.
     mended = found(
         robot, replace(log, joints=log.joints[:, [1, 0, 2, 3]], forces=log.forces[:, [1, 0, 2, 3]])
@@ -189,7 +190,7 @@ def test_rotors_heavier_than_what_is_there_are_not_trusted():
 def test_a_fault_shows_in_a_log_with_two_phases_too_long_to_be_looked_at_whole():
     robot, log = with_phases("five-bar", 0.02)
     late = replace(log, forces=late_by(log, 6e-3))
-    rows = np.r_[np.tile(np.arange(4000), 3), np.tile(np.arange(4000, 8000), 3)]
+    rows = np.r_[np.tile(np.arange(2400), 5), np.tile(np.arange(2400, 4800), 5)]
     late = replace(
         late,
         time=np.arange(len(rows)) / RATE,

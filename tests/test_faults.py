@@ -19,7 +19,7 @@ from pteron.identification.signals import States
 from pteron.legs import Drive, Stribeck
 from pteron.workspace import home_pose
 
-RATE = 500.0
+RATE = 300.0
 
 
 def brisk(robot):

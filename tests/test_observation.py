@@ -229,7 +229,7 @@ def test_periods_with_uneven_samples_and_a_gap_are_exact(name):
 
 
 def test_a_gap_that_no_other_period_fills_is_refused():
-    log = without(log_of(CATALOG["quadrupteron"], duration=4.0), 500, 1500)
+    log = without(log_of(CATALOG["quadrupteron"], duration=4.0), 300, 900)
     processing = Processing(derivatives="periodic", period=4.0)
     with pytest.raises(DataError, match="samples leave"):
         preprocessing_of(CATALOG["quadrupteron"], log, processing)
@@ -330,8 +330,8 @@ def test_what_is_left_of_noise_has_the_size_of_the_noise(case):
 def test_pieces_give_the_equations_of_the_whole(derivatives, size):
     name = "tripteron"
     log = log_of(CATALOG[name], joint_noise=1e-6 * (derivatives == "central"))
-    log = without(log, 2000, 2050)
-    log = replace(log, payload=(np.arange(log.rows) > 2600).astype(int))
+    log = without(log, 1200, 1230)
+    log = replace(log, payload=(np.arange(log.rows) > 1600).astype(int))
     wanted = Processing(derivatives=derivatives, cutoff=25.0, slow=0.2)
     treatment = preprocessing_of(CATALOG[name], log, wanted)
     assert treatment.settling > 5
@@ -371,7 +371,7 @@ def test_a_payload_is_found_from_two_phases():
         time=np.r_[first.time, 8.0 + second.time],
         joints=np.vstack([first.joints, second.joints]),
         forces=np.vstack([first.forces, second.forces]),
-        payload=np.repeat([0, 1], 4000),
+        payload=np.repeat([0, 1], 2400),
     )
     for derivatives, period in (("central", None), ("periodic", 4.0)):
         wanted = Processing(derivatives=derivatives, period=period)

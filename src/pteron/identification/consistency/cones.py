@@ -81,14 +81,19 @@ class RealBodies:
         )
 
 
-def widest(real: RealBodies, start: Array, free: Array, most: float) -> float | None:
-    """Return how deep in the set z = start + free @ y can be, at most `most`; None if nowhere."""
+def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[float, Array]:
+    """Return how deep in the set z = start + free @ y can be, at most `most`, and there z.
+
+    The depth is minus infinity where there is no such z.
+    """
     of_z, of_depth, constant = real.rows
     rows = np.column_stack([of_z @ free, of_depth])
     last = np.eye(rows.shape[1])[-1]
     right = np.concatenate([[most], constant + of_z @ start])
     found = _solved(real, np.zeros(len(last)), -last, np.vstack([-last, rows]), right)
-    return None if found is None else float(found[0][-1])
+    if found is None:
+        return -np.inf, start
+    return float(found[0][-1]), start + free @ found[0][:-1]
 
 
 def nearest(

@@ -146,12 +146,11 @@ def consistent_model(
     inverse, free = right[: base.rank].T / singular @ left.T, right[base.rank :].T
 
     # Have any real bodies these values? If none, those of the closest ones are aimed at
-    depth = widest(real, inverse @ (vector / sizes), free, _DEEPEST)
-    feasible = depth is not None and depth >= _SHALLOW
+    depth, border = widest(real, inverse @ (vector / sizes), free, _DEEPEST)
+    feasible = depth >= _SHALLOW
     spread = np.diag(sizes) if root is None else root
     if feasible:
-        assert depth is not None
-        aim, border, inner = vector, np.zeros(0), 0.5 * depth
+        aim, inner = vector, 0.5 * depth
     else:
         deep = nearest(
             real, np.zeros(free.shape[0]), np.eye(free.shape[0]), 1.0, target.matrix, target.right
@@ -164,17 +163,18 @@ def consistent_model(
         least = closest(real, grouping, vector, spread, _SHALLOW)
         if least is None:
             raise ModelError(_TOO_FAR)
-        border, forces = _inside(bodies, least[0], deep, _SHALLOW * target.margins), least[1]
+        border = _inside(bodies, least[0], deep, 0.5 * _SHALLOW * target.margins)
+        forces = least[1]
         aim, inner = grouping @ border, 0.5 * _SHALLOW
 
     # Of all real bodies with these values, those nearest to the target
     start = inverse @ (aim / sizes)
     found = nearest(real, start, free, inner, target.matrix, target.right)
-    if not feasible and (found is None or (bodies.least(found) <= 0.0).any()):
-        # The closest model is then the only one, to the solver's accuracy.
-        found = border
-    if found is None:
-        raise ModelError(_TOO_FAR)
+    if found is None or (bodies.least(found) <= 0.0).any():
+        # The closest model is then the only one, to the solver's accuracy; of feasible values that
+        # are far from any drawing the answer may be off by more than bodies have to spare.
+        margins = 0.5 * inner * target.margins
+        found = border if found is None or not feasible else _inside(bodies, found, border, margins)
 
     # The answer, checked without the solver
     residual = float(np.abs((grouping @ found - aim) / (sizes * np.linalg.norm(found))).max())
@@ -259,6 +259,6 @@ def _inside(bodies: Bodies, point: Array, deep: Array, margins: Array) -> Array:
     # Values that are thousands of deviations off leave the solver little accuracy at the border.
     for part in (0.0, *np.logspace(-12, 0, 37)):
         moved = (1.0 - part) * point + part * deep
-        if (bodies.least(moved) >= 0.5 * margins).all():
+        if (bodies.least(moved) >= margins).all():
             break
     return np.asarray(moved)
