@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 from pteron.cli.arguments import Command, NumbersCommand, without_types
 from pteron.cli.base_parameters import base, table1
 from pteron.cli.calibrate import calibrate
+from pteron.cli.choose import choose
 from pteron.cli.cue import cue
 from pteron.cli.cycle import cycle
 from pteron.cli.design import design
@@ -130,7 +131,7 @@ _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "See it": (view, play, film, workspace),
     "Compute": (inverse, direct, forces, base, table1),
     "Move": (cycle, cue, simulate, size),
-    "Design": (design,),
+    "Design": (choose, design),
     "From a log to a controller": (calibrate, excite, identify, export),
 }
 """The subcommands of each panel of the help."""

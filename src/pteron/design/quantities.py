@@ -66,7 +66,8 @@ def _links(robot: Manipulator) -> float:
     )
 
 
-def _moving_mass(robot: Manipulator) -> float:
+def moving_mass(robot: Manipulator) -> float:
+    """Return the mass of all that moves, kg."""
     legs = sum(body.values[0] for leg in robot.legs for body in leg.bodies.values())
     carried = sum(bar.mass for bar in robot.platform.bars)
     return float(legs + robot.platform.inertia.mass + carried)
@@ -143,7 +144,7 @@ _OWN = {
         cover="proved",
     ),
     "links": _simple("m", "sum of the links' lengths", _links),
-    "moving_mass": _simple("kg", "mass of all that moves", _moving_mass),
+    "moving_mass": _simple("kg", "mass of all that moves", moving_mass),
     "size": Quantity(
         "m", "diagonal of the box that holds all joints at the poses of the workspace", _size
     ),

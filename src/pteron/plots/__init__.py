@@ -31,7 +31,7 @@ from pteron.plots.forces import (
     forces_figure as forces_figure,
     regularity_figure as regularity_figure,
 )
-from pteron.plots.front import front_figure as front_figure
+from pteron.plots.front import front_figure as front_figure, fronts_figure as fronts_figure
 from pteron.plots.index_maps import map_figure as map_figure
 from pteron.plots.jacobian_maps import (
     condition_figure as condition_figure,

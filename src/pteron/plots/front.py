@@ -111,6 +111,37 @@ def front_figure(
     return figure
 
 
+def fronts_figure(
+    fronts: Mapping[str, ArrayLike], names: Sequence[str], units: Sequence[str]
+) -> Figure:
+    """Return the picture of several fronts of two objectives, the first over the second.
+
+    Parameters
+    ----------
+    fronts : mapping of str to array, shape (K, 2)
+        The two objectives of designs, by what these are.
+    names, units : sequence of str
+        Of the two objectives.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = blank(_WIDE, _TALL)
+    labels = [_label(name, unit) for name, unit in zip(names, units, strict=True)]
+    axes = plain_axes(figure, labels[1], labels[0])
+    styles = zip(fronts.items(), cycle(LEG_COLORS), cycle(_MARKS), strict=False)
+    for (name, front), color, mark in styles:
+        values = np.array(front)[np.argsort(np.array(front)[:, 1])]
+        axes.plot(
+            *(values[:, 1], values[:, 0]), color=color, marker=mark, markersize=4.5, linewidth=0.8
+        )
+        axes.lines[-1].set_label(name)
+    axes.margins(0.08)
+    legend(figure, 4)
+    return figure
+
+
 def _label(name: str, unit: str) -> str:
     unit = "mm" if unit == "m" else unit
     said = name.replace("_", " ")

@@ -1,0 +1,102 @@
+"""`pteron choose`: kinds of machines for a job, from a TOML file to a page and their files."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from typer import Exit
+
+from pteron.cli.progress import progress_bar
+from pteron.cli.terminal import note, plain, show, show_json, table, written
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.design import Choice
+
+_NONE = 1
+"""Exit code where no machine does the job."""
+
+
+def choose(
+    job: str,
+    *,
+    out: str | None = None,
+    workers: int = 1,
+    json: bool = False,
+) -> None:
+    """Choose a machine for a job: which kind, which dimensions, which motors.
+
+    The file says what the machine must do: workspace, payload, cycles, accuracy, stiffness, room,
+    motors to choose from, and what is to be small. All kinds of the catalog that can do the motion
+    are searched; the best design of each is proved over the workspace, and its drives are told
+    with their margins at the worst place and in the worst direction.
+
+    A folder gets choose.html, choose.json and a TOML file for each machine, with its drives. Kinds
+    that are finished are kept there, so that the same command goes on where it was ended. The exit
+    code is 1 if no machine does the job.
+
+    Arguments
+    ---------
+    JOB: What the machine must do, a TOML file.
+
+    Options
+    -------
+    --out FOLDER: Write the results to a folder, and go on there if ended.
+    --workers: Processes that do the work.
+
+    Examples
+    --------
+    pteron choose task.toml
+    pteron choose task.toml --out machines --workers 2
+    """
+    from pteron.design import choose_machine, read_job
+
+    if workers < 1:
+        raise DataError(f"--workers: {workers} given, 1 or more expected")
+    asked = read_job(job)
+    if out is not None:
+        from pteron.report.write import checked_folder
+
+        checked_folder(out)
+    with progress_bar("Choosing") as bar:
+        found = choose_machine(
+            asked, folder=out, workers=workers, progress=lambda share, _: bar(share)
+        )
+    if found.resumed:
+        note(f"Gone on in {out}: {', '.join(found.resumed)} finished before")
+    files = []
+    if out is not None:
+        from pteron.report.choice.write import write_choice
+
+        files = write_choice(found, out)
+    if json:
+        show_json(found.data() | ({"files": [str(file) for file in files]} if files else {}))
+    else:
+        _show(found)
+        show(*written(*files))
+    if found.best is None:
+        raise Exit(_NONE)
+
+
+def _show(found: Choice) -> None:
+    from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
+
+    show("[bold]Asked[/bold]: " + plain("; ".join(asked(found.job))))
+    serving = [one for one in found.verdicts if one.serves]
+    rows = {one.kind: cells(one) for one in serving}
+    shown = list(dict.fromkeys(key for row in rows.values() for key in row))
+    if serving:
+        made = ((kind, *(plain(row.get(n, "-")) for n in shown)) for kind, row in rows.items())
+        show(table("kind", *shown, rows=made, numbers=tuple(shown), names=("kind",)))
+    for one in serving:
+        show(
+            f"[bold]{one.kind}[/bold]: {plain(drives(one))}",
+            f"  mm: {dimensions(one)}",
+            f"  {plain(one.proved)}",
+            f"  margins: {plain(margins(one))}",
+        )
+    for one in found.verdicts:
+        if not one.serves:
+            near = plain("; ".join(one.why))
+            show(f"[bold]{one.kind}[/bold] falls out: the nearest design has {near}")
+    show(*(f"[dim]{plain(line)}[/dim]" for line in assumed(found)))

@@ -1,0 +1,238 @@
+"""`choose_machine`: kinds of machines for one job, each with its best design, side by side."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pteron.atomic import write_text
+from pteron.design.choosing.drives import GEARBOXES, MOTORS, Options, read_lists
+from pteron.design.choosing.job import Job
+from pteron.design.choosing.kinds import Build, Kind, fitting_kinds
+from pteron.design.choosing.rating import Case
+from pteron.design.choosing.samples import half_sides
+from pteron.design.choosing.search import search_kind
+from pteron.design.choosing.verdict import Verdict, judged
+from pteron.design.evolution import one_thread
+from pteron.errors import DataError
+from pteron.json_values import json_ready
+from pteron.maps.plan import RESULTS
+
+_SEARCH = 0.9
+"""Share of a kind's work that is its search."""
+
+_KEPT = "kinds"
+"""Folder of the kinds that are finished, in that of the results."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What every kind of machine can do for a job.
+
+    Attributes
+    ----------
+    job : Job
+        The job.
+    verdicts : tuple of Verdict
+        The best first, by the first objective; those that do not serve last.
+    resumed : tuple of str
+        Kinds that an earlier run had finished.
+    """
+
+    job: Job
+    verdicts: tuple[Verdict, ...]
+    resumed: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> Verdict | None:
+        """The best kind by the first objective; None where none serves."""
+        return self.verdicts[0] if self.verdicts and self.verdicts[0].serves else None
+
+    def robots(self) -> dict[str, str]:
+        """Return the machines' files by their names."""
+        return {f"{one.kind}.toml": one.robot for one in self.verdicts if one.serves}
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data, SI units."""
+        found = {
+            "objectives": list(self.job.objectives),
+            "kinds": [one.data() for one in self.verdicts],
+            "job": self.job.model_dump(mode="json", exclude_none=True),
+        }
+        return dict(json_ready(found))
+
+
+def choose_machine(
+    job: Job,
+    *,
+    folder: str | Path | None = None,
+    workers: int = 1,
+    progress: Callable[[float, str], None] | None = None,
+) -> Choice:
+    """Search all kinds of machines for one that does a job, with its dimensions and drives.
+
+    Each kind is a machine of the catalog whose size, proportions, links and place under the
+    workspace vary. A design must keep reach, floors and limits over the workspace, its room, and
+    have drives for all cycles at every place and in every direction; of what is left the best is
+    proved by intervals.
+
+    Parameters
+    ----------
+    job : Job
+        What the machine must do; see `read_job`.
+    folder : str or Path, optional
+        Folder of finished kinds; the same call goes on where it was ended.
+    workers : int
+        Processes that do the work.
+    progress : callable, optional
+        Takes the share that is done, and the kind.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    DataError
+        If no kind can do the motion, a cycle does not fit into the workspace, a list of motors
+        cannot be read, or a price is asked for of motors that have none.
+    """
+    cases = _cases(job)
+    kept = _Kept(None if folder is None else Path(folder) / _KEPT, job, cases)
+    found = {name: known for name in cases if (known := kept.find(name)) is not None}
+    resumed = tuple(found)
+    shares = {name: float(name in found) for name in cases}
+
+    def tell(name: str, share: float) -> None:
+        shares[name] = share if name in found else _SEARCH * share
+        if progress is not None:
+            progress(sum(shares.values()) / len(shares), name)
+
+    left = {name: case for name, case in cases.items() if name not in found}
+    for name, verdict in _searched(left, workers, tell):
+        found[name] = verdict
+        kept.keep(verdict)
+        tell(name, 1.0)
+    objective = job.objectives[0]
+    order = sorted(
+        found.values(), key=lambda v: (not v.serves, v.figures.get(objective, np.inf), v.kind)
+    )
+    return Choice(job, tuple(order), resumed)
+
+
+def _cases(job: Job) -> dict[str, Case]:
+    """Return the job for each kind that can do the motion."""
+    space = job.workspace
+    turns, tilts = space.turn is not None, space.tilt is not None
+    names = fitting_kinds(job.kinds, job.lengths, turns, tilts)
+    if not names:
+        raise DataError("no kind of machine in the catalog has these freedoms")
+    files = (
+        job.file(job.motors.list or str(MOTORS)),
+        job.file(job.motors.gearboxes or str(GEARBOXES)),
+    )
+    motors, gearboxes = read_lists(*files)
+    options = {
+        unit: Options.of(motors, gearboxes, unit, job.motors.friction) for unit in ("rad", "m")
+    }
+    unpriced = [o.name for some in options.values() for o in some.all if not np.isfinite(o.price)]
+    if unpriced and ("price" in job.objectives or job.most.price is not None):
+        raise DataError(
+            f"price: asked for, but {unpriced[0]} has none; add a column price, or ask for "
+            '"rated_power"'
+        )
+    needed = 2.0 * float(half_sides(job).max())
+    stocks = {"upper": job.links.upper, "lower": job.links.lower}
+    build = Build(job.links.plate, job.links.carriage)
+    free = job.free
+    return {
+        name: Case(job, Kind(name, max(needed, 1e-3), stocks, build, free), options)
+        for name in names
+    }
+
+
+def _verdict(case: Case, progress: Callable[[float], None]) -> Verdict:
+    search = case.job.search
+    with one_thread():
+        return judged(case, search_kind(case, search.evaluations, search.seed, progress))
+
+
+def _searched(
+    cases: Mapping[str, Case], workers: int, tell: Callable[[str, float], None]
+) -> Iterator[tuple[str, Verdict]]:
+    """Yield the verdicts as they are found, in as many processes."""
+    if workers < 2 or len(cases) < 2:
+        for name, case in cases.items():
+            yield name, _verdict(case, partial(tell, name))
+        return
+    context = get_context("spawn")
+    done = context.Array("d", len(cases))
+    with ProcessPoolExecutor(workers, context, _begin, (done,)) as pool:
+        jobs = {
+            pool.submit(_in_process, case, k): name for k, (name, case) in enumerate(cases.items())
+        }
+        names, left = list(cases), set(jobs)
+        while left:
+            ready, left = wait(left, timeout=0.5, return_when=FIRST_COMPLETED)
+            for name, share in zip(names, done[:], strict=True):
+                if share:
+                    tell(name, share)
+            for one in ready:
+                yield jobs[one], one.result()
+
+
+_shares: Any = None
+
+
+def _begin(shares: Any) -> None:
+    global _shares
+    _shares = shares
+
+
+def _in_process(case: Case, k: int) -> Verdict:
+    def tell(share: float) -> None:
+        _shares[k] = share
+
+    return _verdict(case, tell)
+
+
+class _Kept:
+    """Finished kinds in a folder, each with a digest of all that it depends on."""
+
+    def __init__(self, folder: Path | None, job: Job, cases: Mapping[str, Case]) -> None:
+        self._folder, self._job, self._cases = folder, job, cases
+
+    def _digest(self, name: str) -> str:
+        job = self._job.model_dump(mode="json", exclude={"kinds"})
+        options = {unit: repr(some.all) for unit, some in self._cases[name].options.items()}
+        text = json.dumps([RESULTS, name, job, options], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def find(self, name: str) -> Verdict | None:
+        """Return a kind that an earlier run has finished."""
+        if self._folder is None or not (file := self._folder / f"{name}.json").is_file():
+            return None
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            if data.pop("digest", None) != self._digest(name):
+                return None
+            lists = {key: tuple(data[key]) for key in ("why", "drives", "front", "middle")}
+            return Verdict(**data | lists)
+        except (ValueError, TypeError, KeyError):
+            return None
+
+    def keep(self, verdict: Verdict) -> None:
+        """Keep a finished kind."""
+        if self._folder is not None:
+            data = json_ready(verdict.data() | {"digest": self._digest(verdict.kind)})
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_text(self._folder / f"{verdict.kind}.json", json.dumps(data, indent=1) + "\n")

@@ -1,0 +1,288 @@
+"""The TOML file of a job for which `choose_machine` seeks a machine, as pydantic models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+
+from pteron.bodies.tables import Count, Number, Six, Table, Three, Two
+from pteron.design.spec import Floor, Positive
+from pteron.errors import DataError, shown
+from pteron.toml import read_toml, validated
+
+_ABSENT = "no such file; it should describe what a machine must do"
+"""The message where the file is missing."""
+
+_FAR = 20.0
+"""Metres from which on a workspace or a cell was probably given in millimetres."""
+
+OBJECTIVES = {
+    "price": "",
+    "rated_power": "W",
+    "moving_mass": "kg",
+    "energy": "J",
+    "cycle_time": "s",
+    "footprint": "m^2",
+    "height": "m",
+}
+"""What a machine can be chosen for, less of it being better, with units."""
+
+Positions = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
+
+
+def _listed(given: Any) -> Any:
+    return [given] if isinstance(given, str) else given
+
+
+class WorkspaceTable(Table):
+    """`[workspace]`: where the platform's point P must work; it has one of three shapes."""
+
+    size: Positions | None = Field(None, description="sides of a box, m; two for a flat one")
+    radius: Positive | None = Field(None, description="of an upright cylinder, m")
+    height: Positive | None = Field(None, description="of the cylinder, m")
+    poses: Annotated[list[tuple[Number, ...]], Field(min_length=1)] | None = Field(
+        None, description="positions, all of which must be met: x y z, m"
+    )
+    center: Three | None = Field(
+        None, description="its middle in the cell, m; left out, it may be anywhere in the cell"
+    )
+    turn: Two | None = Field(None, description="least and greatest turn about the upright, rad")
+    tilt: Annotated[Number, Field(gt=0.0, lt=1.5)] | None = Field(
+        None, description="roll and pitch each, to both sides, rad"
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        keys = ("size", "radius", "height", "poses")
+        given = [key for key in keys if getattr(self, key) is not None]
+        if given not in (["size"], ["radius", "height"], ["poses"]):
+            raise ValueError(
+                f"{', '.join(given) or 'nothing'} given; a box has size, a cylinder radius and "
+                "height, anything else a list of poses"
+            )
+        lengths = [*(self.size or ()), self.radius or 0.0, self.height or 0.0]
+        if max(lengths) > _FAR:
+            raise ValueError(f"a workspace of {max(lengths):g} m given: are these mm?")
+        if self.poses is not None and {len(one) for one in self.poses} not in ({2}, {3}):
+            raise ValueError("poses: each has x y, or x y z")
+        if self.turn is not None and not self.turn[0] < self.turn[1]:
+            raise ValueError(f"turn: {list(self.turn)} given, [low, high] expected, rad")
+        return self
+
+
+class PayloadTable(Table):
+    """`[payload]`: what the platform carries."""
+
+    mass: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="kg")
+    center: Three | None = Field(None, description="in the platform's frame, m; else the tool")
+    inertia: Number | Six = Field(0.0, description="about its centre of mass, kg m^2")
+
+
+class CycleTable(Table):
+    """`[[cycles]]`: a path of the platform through points, again and again."""
+
+    name: str | None = None
+    points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] = Field(
+        description="from the middle of the workspace, m"
+    )
+    corner: Annotated[Number, Field(ge=0.0)] = Field(
+        0.0, description="metres before and after a point where the path leaves its lines; 0: stop"
+    )
+    duration: Positive | None = Field(
+        None, description="of the path, s; left out, as fast as the motors can"
+    )
+    dwell: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="rest after it, s")
+    back: bool = Field(False, description="whether the path goes back as it came")
+    anywhere: bool = Field(
+        True, description="whether it may be at any place and in any direction of the workspace"
+    )
+
+
+class MotionTable(Table):
+    """`[motion]`: what the platform must be able to do everywhere, in every direction."""
+
+    speed: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of P, m/s")
+    acceleration: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of P, m/s^2")
+
+
+class AccuracyTable(Table):
+    """`[accuracy]`: how far the tool may be from where it should be."""
+
+    most: Positive = Field(description="m")
+    counted: Literal["deviation", "worst"] = Field(
+        "deviation", description="root of the sum of squares of all errors, or their sum"
+    )
+    counts_per_turn: Positive = Field(20000.0, description="of the motors' encoders")
+    backlash: bool = Field(True, description="whether the gearboxes' backlash counts")
+    point: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of joints' places, m")
+    length: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of links, m")
+    angle: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of axes, rad")
+
+
+class StiffnessTable(Table):
+    """`[stiffness]`: how far the tool may give way."""
+
+    force: Positive = Field(description="in any direction, N")
+    most: Positive = Field(description="m")
+
+
+class KeepOutTable(Table):
+    """`[[keep_out]]`: a box in which no part of the machine may be."""
+
+    low: Three = Field(description="m; from the middle of a workspace that floats")
+    high: Three = Field(description="m")
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"low {list(self.low)} is not below high {list(self.high)}")
+        return self
+
+
+class CellTable(Table):
+    """`[cell]`: the room for the machine."""
+
+    footprint: tuple[Positive, Positive] | None = Field(None, description="along x and y, m")
+    height: Positive | None = Field(None, description="m")
+    low: Three | None = Field(None, description="of a cell with a place of its own, m")
+    high: Three | None = Field(None, description="m")
+    margin: Annotated[Number, Field(ge=0.0)] = Field(
+        0.03, description="half the width of bodies about their middle lines, m"
+    )
+
+
+class MotorsTable(Table):
+    """`[motors]`: what the drives are chosen from."""
+
+    list: str | None = Field(None, description="CSV or TOML file; else the package's examples")
+    gearboxes: str | None = Field(None, description="CSV file; else the package's examples")
+    margin: Annotated[Number, Field(ge=1.0)] = Field(
+        1.2, description="what a drive must be able to do, over what is asked"
+    )
+    friction: Annotated[Number, Field(ge=0.0, lt=0.5)] = Field(
+        0.05, description="dry friction as a share of the rated torque"
+    )
+
+
+class LinksTable(Table):
+    """`[links]`: what the moving parts are made of."""
+
+    upper: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        ["aluminium-tube:40x2", "aluminium-tube:60x3"], description="stock of cranks, to choose"
+    )
+    lower: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        ["carbon-tube:12x1", "carbon-tube:20x1.5"], description="stock of rods, to choose from"
+    )
+    plate: Positive = Field(0.006, description="thickness of an aluminium platform, m")
+    carriage: Positive = Field(0.4, description="mass of what slides on a guide, kg")
+
+
+class FloorsTable(Table):
+    """`[floors]`: least measures of every pose of the workspace, each 1 at best."""
+
+    type_i: Floor = 0.1
+    type_ii: Floor = 0.05
+
+
+class SearchTable(Table):
+    """`[search]`: how long, and by what chance."""
+
+    evaluations: Count = Field(800, description="designs of each kind")
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class BoundTable(Table):
+    """`[most]`: greatest values of what else is asked."""
+
+    price: Positive | None = None
+    rated_power: Positive | None = None
+    moving_mass: Positive | None = None
+    energy: Positive | None = None
+    cycle_time: Positive | None = None
+
+
+class Job(Table):
+    """What a machine must do, as its file has it."""
+
+    workspace: WorkspaceTable
+    payload: PayloadTable = Field(default_factory=lambda: PayloadTable.model_validate({}))
+    cycles: list[CycleTable] = Field(default_factory=list)
+    motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
+    accuracy: AccuracyTable | None = None
+    stiffness: StiffnessTable | None = None
+    cell: CellTable = Field(default_factory=lambda: CellTable.model_validate({}))
+    keep_out: list[KeepOutTable] = Field(default_factory=list)
+    motors: MotorsTable = Field(default_factory=lambda: MotorsTable.model_validate({}))
+    links: LinksTable = Field(default_factory=lambda: LinksTable.model_validate({}))
+    floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
+    most: BoundTable = Field(default_factory=lambda: BoundTable.model_validate({}))
+    kinds: list[str] | None = Field(None, description="to choose from; else all that can do it")
+    objectives: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        ["price"], description=f"what is to be small: {', '.join(OBJECTIVES)}"
+    )
+    search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
+
+    _folder: Path = PrivateAttr(Path())
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        faults = list(self._faults())
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+    def _faults(self) -> Iterator[str]:
+        for name in self.objectives:
+            if name not in OBJECTIVES:
+                yield f"objectives: {shown(name)} is none of {', '.join(OBJECTIVES)}"
+        if not self.cycles and not self.motion.acceleration:
+            yield "no [[cycles]] and no [motion] acceleration: nothing says what the motors must do"
+        if self.free and "cycle_time" not in self.objectives and self.most.cycle_time is None:
+            yield (
+                'cycles: one without duration needs objectives = ["cycle_time"], or [most] '
+                "cycle_time"
+            )
+        if "cycle_time" in self.objectives and not self.free:
+            yield "objectives: cycle_time, but every cycle has its duration; leave one out"
+        for k, cycle in enumerate(self.cycles, start=1):
+            if {len(point) for point in cycle.points} != {self.lengths}:
+                yield f"cycles[{k}]: points of {self.lengths} numbers expected, as the workspace's"
+        if (self.cell.low is None) != (self.cell.high is None):
+            yield "cell: low and high go together"
+        if self.cell.low is not None and self.workspace.center is None:
+            yield "cell: low and high need [workspace] center; a workspace that floats has height "
+            "and footprint"
+
+    @property
+    def lengths(self) -> int:
+        """The number of the workspace's coordinates, 2 or 3."""
+        if self.workspace.radius is not None:
+            return 3
+        return len(self.workspace.size or (self.workspace.poses or [()])[0])
+
+    @property
+    def free(self) -> bool:
+        """Whether a cycle is to be as fast as the motors can."""
+        return any(cycle.duration is None for cycle in self.cycles)
+
+    def file(self, name: str) -> Path:
+        """Return a file that it names: beside it, or as it stands."""
+        beside = self._folder / name
+        return beside if beside.exists() else Path(name)
+
+
+def read_job(path: str | Path) -> Job:
+    """Read what a machine must do from a TOML file.
+
+    Raises
+    ------
+    DataError
+        If it cannot be read, has unknown keys or contradicts itself; all its faults are listed.
+    """
+    source = shown(str(path), bare=True, longest=1000)
+    found = validated(Job, read_toml(path, DataError, _ABSENT), source, DataError)
+    found._folder = Path(path).parent
+    return found

@@ -1,0 +1,359 @@
+"""`Rating`: how a machine of a kind does a job, stage by stage, each the cheaper the earlier."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from pteron.bodies.inertia import inertia_count
+from pteron.design.choosing.drives import Loads, Option, Options
+from pteron.design.choosing.job import OBJECTIVES, Job
+from pteron.design.choosing.kinds import Kind, slides
+from pteron.design.choosing.samples import Places, cycles_of, half_sides, sample_poses
+from pteron.design.choosing.tool import (
+    compliance_with,
+    compliances,
+    errors_with,
+    link_sections,
+    unit_errors,
+)
+from pteron.design.quantities import moving_mass
+from pteron.design.worst_cases import worst_forces, worst_speeds
+from pteron.dynamics import drive_forces
+from pteron.errors import ModelError
+from pteron.indices import Section
+from pteron.kernels import Array, numeric
+from pteron.kinematics import inverse_kinematics, jacobian, joint_accelerations
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+from pteron.motion import with_payload
+
+_STROKE = 0.03
+"""Share of a slider's travel by which its guide is longer at each end."""
+
+_FLOOR = 1.05
+"""What the floors are in a search over those that are proved at last."""
+
+_HEAVY = 1e6
+"""kg m^2: an inertia beside which that of a machine is nothing."""
+
+_STEPS = 6
+"""Points along a link at which it is outside of keep-out boxes."""
+
+_BY_STAGE = 100.0
+"""Cost of a design that fails at the last stage; of one before it is twice as much, and so on."""
+
+
+@dataclass
+class Rating:
+    """A machine as far as it was judged.
+
+    Attributes
+    ----------
+    values : array, shape (V,)
+        The numbers of the kind.
+    figures : dict
+        Quantities by name: objectives, margins, error, deflection.
+    misses : dict
+        By how much each bound is missed, as a share of it: empty where all is kept.
+    told : list of str
+        The same in words.
+    robot : Manipulator or None
+        The machine with its drives, without payload.
+    middle : array, shape (m,)
+        The pose in the middle of the workspace.
+    options : tuple of Option
+        The drive of each leg.
+    stage : int
+        At which it fell out; 0 where it did not.
+    near : float
+        How far the next cheaper drives are from serving, from 0 on.
+    """
+
+    values: Array
+    figures: dict[str, float] = field(default_factory=dict)
+    misses: dict[str, float] = field(default_factory=dict)
+    told: list[str] = field(default_factory=list)
+    robot: Manipulator | None = None
+    middle: Array = field(default_factory=lambda: np.zeros(0))
+    options: tuple[Option, ...] = ()
+    stage: int = 0
+    near: float = 1.0
+
+    def cost(self, objective: str) -> float:
+        """Return what a search makes small."""
+        if self.misses:
+            return _BY_STAGE * (6 - self.stage) + min(sum(self.misses.values()), 0.9 * _BY_STAGE)
+        value = self.figures[objective]
+        # A price has steps: along one the design is the better whose next step down is nearer.
+        return float(np.log(value) + 0.01 * min(self.near, 1.0)) if value > 0.0 else 0.0
+
+
+class Case:
+    """A job for one kind of machine.
+
+    Parameters
+    ----------
+    job : Job
+        The job.
+    kind : Kind
+        The kind.
+    options : mapping of str to Options
+        Drives, by the unit of the joint.
+    """
+
+    def __init__(self, job: Job, kind: Kind, options: Mapping[str, Options]) -> None:
+        self.job, self.kind, self.options = job, kind, options
+        self.poses = sample_poses(job, kind.robot)
+        self.corners = sample_poses(job, kind.robot, 2)
+        self.cycles = cycles_of(job, kind.robot)
+        self.half = half_sides(job)
+
+    @cached_property
+    def groups(self) -> list[list[int]]:
+        """Legs of one type, which have the same drive."""
+        legs = self.kind.robot.legs
+        kinds = dict.fromkeys((leg.type, leg.joint.unit) for leg in legs)
+        return [[i for i, g in enumerate(legs) if (g.type, g.joint.unit) == k] for k in kinds]
+
+    def rate(self, values: Array) -> Rating:
+        """Return how the machine of a design does the job; call it within `alike(kind.like)`."""
+        found = Rating(np.asarray(values, dtype=float))
+        try:
+            robot, found.middle = self.kind.machine(values)
+        except ModelError:
+            found.stage = 1
+            _miss(found, "machine", 1.0, "there is no such machine")
+            return found
+        found.robot = robot
+        for stage, judge in enumerate((self._reach, self._room, self._drive, self._rest), start=1):
+            judge(found)
+            if found.misses:
+                found.stage = stage
+                return found
+        return found
+
+    def _reach(self, found: Rating) -> None:
+        """Judge reach, floors and limits over the workspace; set the limits of what slides."""
+        robot, poses, floors = _of(found), found.middle + self.poses, self.job.floors
+        squares = np.asarray(numeric(robot, "squared_type_i")(poses)[0])
+        measure = np.asarray(numeric(robot, "type_ii")(poses)[0])
+        least = float(squares.min())
+        found.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
+        _below(found, "squared type-I measure", least, (_FLOOR * floors.type_i) ** 2)
+        if least < 0.0:
+            return
+        sign = np.sign(np.nanmedian(measure))
+        lowest = float((sign * measure).min())
+        found.figures["type_ii"] = lowest
+        _below(found, "type-II measure", lowest, _FLOOR * floors.type_ii)
+        share = float(np.nan_to_num(numeric(robot, "passive_room")(poses)[0], nan=1.0).min())
+        _below(found, "passive joints' margin to their limits", share, 0.0)
+        joints = inverse_kinematics(robot, poses, on_failure="nan")
+        if not np.isfinite(joints).all():
+            _miss(found, "reach", 1.0, "a leg does not reach the workspace")
+            return
+        legs = []
+        for leg, low, high in zip(robot.legs, joints.min(axis=0), joints.max(axis=0), strict=True):
+            spare = _STROKE * (high - low) + 1e-6
+            if slides(leg):
+                leg = replace(leg, limits=(float(low - spare), float(high + spare)))
+            elif leg.limits is not None:
+                half = 0.5 * (leg.limits[1] - leg.limits[0])
+                margin = min(low - leg.limits[0], leg.limits[1] - high) / half
+                _below(found, "joints' margin to their limits", float(margin), 0.01)
+            legs.append(leg)
+        found.robot = replace(robot, legs=tuple(legs))
+
+    def _room(self, found: Rating) -> None:
+        """Judge the footprint, the height, and what is to be kept out of."""
+        robot, cell = _of(found), self.job.cell
+        points = np.asarray(numeric(robot, "joint_points")(found.middle + self.poses)[0])
+        count = len(robot.platform.lengths)
+        middle = found.middle[:count] @ robot.platform.directions
+        points = points - middle
+        flat = points.reshape(-1, 3)
+        flat = flat[np.isfinite(flat).all(axis=1)]
+        low, high = flat.min(axis=0) - cell.margin, flat.max(axis=0) + cell.margin
+        size = high - low
+        found.figures |= {"footprint": float(size[0] * size[1]), "height": float(size[2])}
+        found.figures |= {"width": float(size[0]), "depth": float(size[1])}
+        for name, value, most in (
+            ("width", size[0], cell.footprint and cell.footprint[0]),
+            ("depth", size[1], cell.footprint and cell.footprint[1]),
+            ("height", size[2], cell.height),
+        ):
+            _above(found, name, float(value), most, " m")
+        center = np.array(self.job.workspace.center or (0.0, 0.0, 0.0))
+        if cell.low is not None and cell.high is not None:
+            beyond = np.maximum(cell.low - (center + low), center + high - cell.high)
+            if beyond.max() > 0.0:
+                _miss(found, "cell", beyond.max(), f"it is {beyond.max():.3g} m beyond the cell")
+        if self.job.keep_out:
+            ends = np.linspace(0.0, 1.0, _STEPS)[:, None, None]
+            along = points[..., :-1, :][..., None, :, :]
+            lines = along + ends * np.diff(points, axis=-2)[..., None, :, :] + center
+            for box in self.job.keep_out:
+                inside = np.minimum(lines - box.low, box.high - lines).min(axis=-1) + cell.margin
+                depth = float(np.nanmax(inside, initial=-1.0))
+                if depth > 0.0:
+                    _miss(found, "keep-out", depth, f"it is {depth:.3g} m inside a keep-out box")
+
+    def _drive(self, found: Rating) -> None:
+        """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
+        robot = self.loaded(_of(found))
+        given = self.kind.numbers(found.values)
+        try:
+            loads, work = self.loads(robot, found.middle, given.get("time"))
+            errors = gives = None
+            if self.job.accuracy is not None:
+                errors = unit_errors(self.job.accuracy, robot, found.middle + self.poses)
+            if self.job.stiffness is not None:
+                gives = compliances(robot, found.middle + self.corners, self.sections(found))
+        except ModelError:
+            _miss(found, "loads", 1.0, "it does not reach a cycle")
+            return
+        options: list[Option | None] = [None] * robot.joint_count
+        asked, near = self.job.motors.margin, 0.0
+        for legs in self.groups:
+            all_ = self.options[robot.legs[legs[0]].joint.unit]
+            margins = loads.margins(all_, legs)
+            shares = {
+                "rated torque": margins[0] / asked,
+                "peak torque": margins[1] / asked,
+                "motor speed": margins[2] / asked,
+            }
+            if self.job.accuracy is not None and errors is not None:
+                of_options = errors_with(self.job.accuracy, errors, *all_.numbers[[0, 5]])
+                shares["accuracy"] = self.job.accuracy.most / of_options
+            if self.job.stiffness is not None and gives is not None:
+                given_way = self.job.stiffness.force * compliance_with(gives, all_.numbers[6])
+                shares["stiffness"] = self.job.stiffness.most / given_way
+            every = np.array(list(shares.values()))
+            least = every.min(axis=0)
+            good = np.flatnonzero(least >= 1.0)
+            if not len(good):
+                best = int(least.argmax())
+                for name, share in shares.items():
+                    if (part := float(share[best])) < 1.0:
+                        told = f"{name} {part:.0%} of what is asked, with {all_.all[best].name}"
+                        _miss(found, name, 1.0 / max(part, 1e-3) - 1.0, told)
+                return
+            first = int(good[0])
+            if first:
+                near += float(1.0 - min(1.0, least[:first].max()))
+            for leg in legs:
+                options[leg] = all_.all[first]
+        found.near = near / len(self.groups)
+        found.options = tuple(o for o in options if o is not None)
+        legs_with = (
+            replace(leg, drive=option.drive)
+            for leg, option in zip(_of(found).legs, found.options, strict=True)
+        )
+        found.robot = replace(_of(found), legs=tuple(legs_with))
+        friction = np.array([option.drive.coulomb for option in found.options])
+        found.figures |= {
+            "price": float(sum(o.price for o in found.options)),
+            "rated_power": float(
+                sum(o.motor.rated_torque * o.motor.max_speed for o in found.options)
+            ),
+            "moving_mass": moving_mass(found.robot),
+            "energy": max(
+                (float(work_ + (friction * way).sum()) for work_, way in work), default=0.0
+            ),
+            "cycle_time": given.get("time", 0.0),
+        }
+
+    def _rest(self, found: Rating) -> None:
+        """Judge what else has a greatest value."""
+        for name, most in self.job.most.model_dump().items():
+            _above(found, name, found.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
+
+    def loaded(self, robot: Manipulator) -> Manipulator:
+        """Return a machine with the payload."""
+        payload = self.job.payload
+        if not payload.mass:
+            return robot
+        count = inertia_count(robot.platform.inertia.kinds)
+        given = payload.inertia
+        inertia: float | Sequence[float]
+        if isinstance(given, tuple):
+            inertia = given if count > 1 else given[5]
+        else:
+            inertia = (given, 0.0, 0.0, given, 0.0, given) if count > 1 else given
+        return with_payload(robot, payload.mass, payload.center, inertia)
+
+    def sections(self, found: Rating) -> dict[str, Section]:
+        """Return the sections of a design's links."""
+        given = self.kind.numbers(found.values)
+        chosen = {key: names[int(given.get(key, 0.0))] for key, names in self.kind.stocks.items()}
+        return link_sections(_of(found), chosen)
+
+    def loads(
+        self, robot: Manipulator, middle: Array, time: float | None
+    ) -> tuple[Loads, list[tuple[float, Array]]]:
+        """Return the loads of all cycles at all places, and of each the work and ways of joints."""
+        n = robot.joint_count
+        squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
+        speeds = np.zeros(n)
+        for cycle in self.cycles:
+            duration = cycle.duration or time or 1.0
+            states = self.states(cycle, middle, duration)
+            f = drive_forces(robot, *states)
+            a = joint_accelerations(robot, *states).actuated
+            v = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
+            held = cycle.dwell * np.stack([f[:, -1] ** 2, *[np.zeros_like(f[:, -1])] * 2], axis=-1)
+            means = np.trapezoid(np.stack([f * f, f * a, a * a], axis=-1), axis=1)
+            means = means * duration / (f.shape[1] - 1)
+            squares.append((means + held) / (duration + cycle.dwell))
+            step = duration / (f.shape[1] - 1)
+            given = np.trapezoid(np.maximum(f * v, 0.0), axis=1).sum(axis=-1) * step
+            ways = np.trapezoid(np.abs(v), axis=1) * step
+            work += list(zip(given.tolist(), ways, strict=True))
+            forces.append(f.reshape(-1, n))
+            rises.append(a.reshape(-1, n))
+            speeds = np.maximum(speeds, np.abs(v).max(axis=(0, 1)))
+        asked = self.job.motion
+        everywhere = np.zeros((2, n))
+        if asked.acceleration or asked.speed:
+            poses = middle + self.corners
+            heavy = (replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
+            speed = max(asked.speed, 1e-6)
+            everywhere[0] = worst_forces(robot, poses, speed, asked.acceleration).max(axis=0)
+            spun = worst_forces(replace(robot, legs=tuple(heavy)), poses, speed, asked.acceleration)
+            everywhere[1] = spun.max(axis=0) / _HEAVY
+            speeds = np.maximum(speeds, worst_speeds(robot, poses, speed).max(axis=0))
+        every = np.concatenate(squares) if squares else np.zeros((1, n, 3))
+        return Loads(every, np.concatenate(forces), np.concatenate(rises), speeds, everywhere), work
+
+    def states(self, cycle: Places, middle: Array, duration: float) -> tuple[Array, Array, Array]:
+        """Return the states (B, K, m) of a cycle that takes so long."""
+        pose, velocity, acceleration = cycle.states
+        return middle + pose, velocity / duration, acceleration / duration**2
+
+
+def _of(found: Rating) -> Manipulator:
+    assert found.robot is not None  # the first stage has made it
+    return found.robot
+
+
+def _miss(found: Rating, name: str, share: float, told: str) -> None:
+    """Note that a bound is missed."""
+    found.misses[name] = max(found.misses.get(name, 0.0), float(share))
+    found.told.append(told)
+
+
+def _below(found: Rating, name: str, value: float, least: float) -> None:
+    if not value >= least:
+        share = least - value if np.isfinite(value) else 1.0
+        _miss(found, name, share, f"{name} {value:.3g}, at least {least:.3g} asked")
+
+
+def _above(found: Rating, name: str, value: float, most: float | None, unit: str) -> None:
+    if most is not None and not value <= most:
+        share = value / most - 1.0 if np.isfinite(value) else 1.0
+        words = name.replace("_", " ")
+        _miss(found, name, share, f"{words} {value:.4g}{unit}, at most {most:g}{unit} asked")

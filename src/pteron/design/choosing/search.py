@@ -1,0 +1,120 @@
+"""The search for the best design of one kind: spread evenly, then evolved, then refined."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pteron.design.choosing.rating import Case, Rating
+from pteron.kernels import Array, alike
+
+_POPULATION = 6
+"""Designs that evolve, for each number of one."""
+
+_SPREAD = 4
+"""Designs that are drawn at first, for each that evolves."""
+
+_REFINED = 0.25
+"""Share of the evaluations for Nelder and Mead's method."""
+
+_WEIGHT, _CROSSING = (0.4, 0.9), 0.8
+"""Range of the weight of differences, and the share of numbers that they change."""
+
+
+def search_kind(
+    case: Case, evaluations: int, seed: int, progress: Callable[[float], None] | None = None
+) -> list[Rating]:
+    """Return all designs that were rated, for every objective a share of them.
+
+    Differential evolution (Storn and Price, Journal of Global Optimization 11, 1997) towards the
+    best, from the best of designs that are drawn evenly; then Nelder and Mead's method.
+    """
+    found: list[Rating] = []
+    low, high = case.kind.ranges
+    objectives = case.job.objectives
+
+    def rated(units: Array) -> Rating:
+        found.append(case.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
+        if progress is not None:
+            progress(len(found) / evaluations)
+        return found[-1]
+
+    with alike(case.kind.like):
+        for k, objective in enumerate(objectives):
+            rng = np.random.default_rng((seed, k))
+            end = evaluations * (k + 1) // len(objectives)
+            _evolved(rated, found, rng, end, objective, (low, high))
+    return found
+
+
+def _evolved(
+    rated: Callable[[Array], Rating],
+    found: list[Rating],
+    rng: np.random.Generator,
+    end: int,
+    objective: str,
+    ranges: tuple[Array, Array],
+) -> None:
+    """Rate designs until so many are found: what is known already counts."""
+    size = len(ranges[0])
+    count = _POPULATION * size
+    first = min(_SPREAD * count, (end - len(found)) // 2)
+    strata = rng.permuted(np.tile(np.arange(max(first, 1)), (size, 1)), axis=1).T
+    for units in (strata + rng.random(strata.shape)) / max(first, 1):
+        rated(units)
+    # The best so far, of all objectives.
+    known = sorted(found, key=lambda one: one.cost(objective))[:count]
+    low, high = ranges
+    units = np.array([(one.values - low) / (high - low) for one in known])
+    costs = np.array([one.cost(objective) for one in known])
+    start = len(found)
+    while len(found) < end - int(_REFINED * (end - start)):
+        for i in range(len(units)):
+            a, b = units[rng.choice(len(units), 2, replace=False)]
+            weight = rng.uniform(*_WEIGHT)
+            trial = units[i] + weight * (units[costs.argmin()] - units[i]) + weight * (a - b)
+            crossed = rng.random(size) < _CROSSING
+            crossed[rng.integers(size)] = True
+            trial = np.where(crossed, trial, units[i])
+            trial = np.where((trial < 0.0) | (trial > 1.0), rng.random(size), trial)
+            cost = rated(trial).cost(objective)
+            if cost <= costs[i]:
+                units[i], costs[i] = trial, cost
+    _refined(rated, found, units[costs.argmin()], end, objective)
+
+
+def _refined(
+    rated: Callable[[Array], Rating], found: list[Rating], start: Array, end: int, objective: str
+) -> None:
+    from scipy.optimize import minimize  # type: ignore[import-untyped]
+
+    while len(found) < end:
+        before = len(found)
+        simplex = np.vstack(
+            [start, start + 0.05 * np.where(start > 0.5, -1.0, 1.0) * np.eye(len(start))]
+        )
+        answer = minimize(
+            lambda units: rated(units).cost(objective),
+            start,
+            method="Nelder-Mead",
+            options={
+                "maxfev": end - before,
+                "initial_simplex": simplex,
+                "xatol": 1e-4,
+                "fatol": 1e-6,
+            },
+        )
+        start = np.clip(answer.x, 0.0, 1.0)
+
+
+def front(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
+    """Return the designs that keep all that is asked and that no other betters in everything."""
+    good = [one for one in ratings if not one.misses]
+    costs = np.array([[one.figures[name] for name in objectives] for one in good])
+    _, first = np.unique(costs, axis=0, return_index=True)
+    return [
+        good[k]
+        for k in first
+        if not ((costs <= costs[k]).all(axis=1) & (costs < costs[k]).any(axis=1)).any()
+    ]

@@ -1,0 +1,100 @@
+"""A verdict in words and rounded numbers, as the table on the screen and the page have it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import isfinite
+
+from pteron.design.choosing.choose import Choice
+from pteron.design.choosing.job import Job
+from pteron.design.choosing.verdict import Verdict
+
+_FIGURES = {
+    "price": ("price", 1.0),
+    "rated_power": ("power (W)", 1.0),
+    "shortest_time": ("time (s)", 1.0),
+    "error": ("error (mm)", 1e3),
+    "deflection": ("gives way (mm)", 1e3),
+    "moving_mass": ("mass (kg)", 1.0),
+    "energy": ("energy (J)", 1.0),
+}
+"""Figures of a verdict that are shown: their headings and factors."""
+
+_MARGINS = {"rated_margin": "rated torque", "peak_margin": "peak torque", "speed_margin": "speed"}
+
+
+def cells(one: Verdict) -> dict[str, str]:
+    """Return a row's numbers by their headings, rounded; of a machine that serves."""
+    found = {"margin": f"{min(one.figures[name] for name in _MARGINS):.2f}"}
+    for name, (heading, factor) in _FIGURES.items():
+        if (value := one.figures.get(name)) is not None and isfinite(value):
+            found[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
+    size = (f"{one.figures[name]:.2f}" for name in ("width", "depth", "height"))
+    return found | {"size (m)": " x ".join(size)}
+
+
+def drives(one: Verdict) -> str:
+    """Return motors and gearboxes in a line."""
+    return ", ".join(f"{count} x {name}" for name, count in Counter(one.drives).items())
+
+
+def dimensions(one: Verdict) -> str:
+    """Return the dimensions of a machine in a line, mm."""
+    return ", ".join(f"{name} {1e3 * value:.0f}" for name, value in one.dimensions.items())
+
+
+def margins(one: Verdict) -> str:
+    """Return the drives' margins and the place of the least, in a line."""
+    told = ", ".join(f"{word} {one.figures[name]:.2f}" for name, word in _MARGINS.items())
+    return f"{told}; least at {one.worst}" if one.worst else told
+
+
+def asked(job: Job) -> list[str]:
+    """Return what a job asks for, a line each, as it was asked."""
+    space, found = job.workspace, []
+    if space.size is not None:
+        found.append(f"workspace {' x '.join(f'{1e3 * x:g}' for x in space.size)} mm")
+    elif space.poses is not None:
+        found.append(f"workspace of {len(space.poses)} poses")
+    else:
+        found.append(f"workspace: cylinder of radius {space.radius:g} m, height {space.height:g} m")
+    if space.turn is not None:
+        found.append(f"turn from {space.turn[0]:g} to {space.turn[1]:g} rad")
+    if space.tilt is not None:
+        found.append(f"tilt {space.tilt:g} rad to each side")
+    if job.payload.mass:
+        found.append(f"payload {job.payload.mass:g} kg")
+    for k, cycle in enumerate(job.cycles, start=1):
+        time = "as fast as can be" if cycle.duration is None else f"in {cycle.duration:g} s"
+        where = ", anywhere in the workspace" if cycle.anywhere else ""
+        found.append(f"{cycle.name or f'cycle {k}'} {time}{where}")
+    if job.motion.acceleration:
+        found.append(
+            f"{job.motion.acceleration:g} m/s^2 at up to {job.motion.speed:g} m/s in any direction"
+        )
+    if job.accuracy is not None:
+        found.append(f"tool within {1e3 * job.accuracy.most:g} mm ({job.accuracy.counted})")
+    if job.stiffness is not None:
+        limit = f"{1e3 * job.stiffness.most:g} mm"
+        found.append(f"gives way {limit} at most under {job.stiffness.force:g} N")
+    if job.cell.footprint is not None:
+        found.append(f"footprint {' x '.join(f'{x:g}' for x in job.cell.footprint)} m")
+    found += [f"height {job.cell.height:g} m"] if job.cell.height is not None else []
+    bounds = job.most.model_dump(exclude_none=True)
+    found += [f"{name.replace('_', ' ')} at most {value:g}" for name, value in bounds.items()]
+    return [*found, f"least {' and '.join(name.replace('_', ' ') for name in job.objectives)}"]
+
+
+def assumed(choice: Choice) -> list[str]:
+    """Return what was assumed, a line each."""
+    motors, links = choice.job.motors, choice.job.links
+    examples = [] if motors.list else ["The motors are the package's examples, not products."]
+    return [
+        *examples,
+        f"Drives have {motors.margin:g} times what is asked, and dry friction of "
+        f"{motors.friction:.0%} of their rated torque.",
+        f"Links are cut from {', '.join({*links.upper, *links.lower})}; the platform is half of an "
+        f"aluminium disc {1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
+        "The workspace is that of the platform's point P; a hexapod's joints have no cones.",
+        "The shortest time is that of the cycle at its worst place with this margin.",
+    ]

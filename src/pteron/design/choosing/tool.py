@@ -1,0 +1,102 @@
+"""Errors of the tool and how it gives way, in parts that hold for whatever drives are chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pteron.design.choosing.job import AccuracyTable
+from pteron.design.worst_cases import worst_position_errors
+from pteron.indices import (
+    ALUMINIUM,
+    STEEL,
+    Elasticity,
+    Material,
+    Section,
+    Tolerances,
+    pose_error,
+    stiffness,
+)
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.manipulator.dimensions import Stock
+
+MATERIALS = {"steel": STEEL, "aluminium": ALUMINIUM, "carbon": Material(120e9, 5e9)}
+"""Of stock, for stiffness; carbon is fibre in resin, most of it along the tube."""
+
+_SOFT, _HARD = 1e4, 1e7
+"""Stiffnesses of drives, N/m or N m/rad, between whose compliances others lie."""
+
+
+def tolerances(asked: AccuracyTable, joints: float | Sequence[float]) -> Tolerances:
+    """Return the tolerances that are asked for, with these errors of the joints."""
+    return Tolerances(joints, 0.0, asked.point, asked.length, asked.angle)
+
+
+def joint_errors(asked: AccuracyTable, ratios: Array, backlash: Array) -> Array:
+    """Return errors of joints, m or rad: half a count of the encoder, and half the backlash."""
+    return np.asarray(np.pi / asked.counts_per_turn / ratios + 0.5 * asked.backlash * backlash)
+
+
+def unit_errors(asked: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
+    """Return the tool's error at poses (N,) by a joint error of 1, and by all else, m."""
+    joints, others = (
+        greatest_errors(asked, robot, poses, given)
+        for given in (Tolerances(joints=1.0), tolerances(asked, 0.0))
+    )
+    return joints, others
+
+
+def greatest_errors(
+    asked: AccuracyTable, robot: Manipulator, poses: Array, given: Tolerances
+) -> Array:
+    """Return the tool's error at poses (N,), m, as it is to be counted."""
+    if asked.counted == "worst":
+        return worst_position_errors(robot, poses, given)
+    return np.asarray(pose_error(robot, poses, given).position)
+
+
+def errors_with(
+    asked: AccuracyTable, units: tuple[Array, Array], ratios: Array, backlash: Array
+) -> Array:
+    """Return the greatest error of the tool (O,) with each of several drives, m."""
+    joint = joint_errors(asked, ratios, backlash)[:, None] * units[0]
+    whole = joint + units[1] if asked.counted == "worst" else np.hypot(joint, units[1])
+    return np.asarray(whole.max(axis=1))
+
+
+def link_sections(robot: Manipulator, stocks: Mapping[str, str]) -> dict[str, Section]:
+    """Return the sections of upper and lower links that are cut from stock."""
+    found = {}
+    for key, name in stocks.items():
+        stock = Stock.of(name)
+        wall = 0.5 * (stock.outer - stock.inner)
+        tube = Section.tube(stock.outer, wall, MATERIALS[name.split("-")[0]])
+        rods = getattr(robot.legs[0], "rods", 1) if key == "lower" else 1
+        parts = (tube.axial, tube.bending, tube.sideways, tube.torsion)
+        found[key] = Section(*(rods * part for part in parts))
+    return found
+
+
+def elasticity(sections: Mapping[str, Section], actuators: float | Sequence[float]) -> Elasticity:
+    """Return the stiffnesses of a machine's drives and links."""
+    several = actuators if isinstance(actuators, float) else tuple(actuators)
+    return Elasticity(several, sections.get("upper"), sections.get("lower"))
+
+
+def compliances(
+    robot: Manipulator, poses: Array, sections: Mapping[str, Section]
+) -> tuple[Array, Array]:
+    """Return the worst compliance at poses (N,): with rigid drives, and by that of the drives."""
+    soft, hard = (
+        np.asarray(1.0 / stiffness(robot, poses, elasticity(sections, k)).least)
+        for k in (_SOFT, _HARD)
+    )
+    by_drive = (soft - hard) / (1.0 / _SOFT - 1.0 / _HARD)
+    return np.maximum(hard - by_drive / _HARD, 0.0), by_drive
+
+
+def compliance_with(given: tuple[Array, Array], actuators: Array) -> Array:
+    """Return the greatest compliance (O,) with each of several drives' stiffnesses, m/N."""
+    return np.asarray((given[0] + given[1] / actuators[:, None]).max(axis=1))

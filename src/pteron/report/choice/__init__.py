@@ -1,0 +1,1 @@
+"""The page on a choice of machines, with its numbers and the machines' files."""
