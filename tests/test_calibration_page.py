@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from measured import built, positions
-from mechanisms import CATALOG
+from mechanisms import CATALOG, CLIENTS
 from test_report import HOSTILE, Reader, strict
 
 import pteron
@@ -29,6 +29,7 @@ def calibration():
     return calibrate(DRAWN, Measurements.of(DRAWN, readings, poses=poses))
 
 
+@CLIENTS
 def test_the_page_is_whole_and_says_the_verdict_first(tmp_path: Path):
     result = calibration()
     files = write_calibration(result, tmp_path / "a" / "b")

@@ -6,6 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 import tilting
+from mechanisms import CLIENTS
 from typer.testing import CliRunner
 
 import pteron
@@ -69,6 +70,7 @@ def test_what_cannot_be_shown_is_told():
         cue(ROBOT, {"t": TIME, **NONE}, pose=HOME + 50.0)
 
 
+@CLIENTS
 def test_the_command_writes_what_the_function_returns(tmp_path):
     robot, out = pteron.save(ROBOT, tmp_path / "robot.toml"), tmp_path / "cue.csv"
     vehicle = {"t": TIME, **NONE, "ax": np.sin(TIME)}

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from mechanisms import CATALOG
+from mechanisms import CATALOG, CLIENTS
 from test_cli import done, refused, run
 
 import pteron
@@ -336,6 +336,7 @@ def test_all_faults_of_variables_are_told_at_once():
         assert text in str(told.value)
 
 
+@CLIENTS
 def test_the_command_writes_what_it_finds(tmp_path):
     """Planar, so that it is quick; and the same command again reads what was evaluated."""
     spec = tmp_path / "spec.toml"

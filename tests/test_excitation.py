@@ -624,6 +624,7 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
     assert held_out.duration >= 10.0
 
 
+@CLIENTS
 def test_the_command_says_what_it_leaves_out(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # A base parameter of the five-bar is 0: its column has no nominal size.
@@ -640,6 +641,7 @@ def test_the_command_says_what_it_leaves_out(tmp_path: Path, monkeypatch):
     assert found["conditioning"]["nominal"] is None
 
 
+@CLIENTS
 def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run(f"excite quadrupteron {QUICK} --space joints --seconds 1 --elbows +-+- --json")

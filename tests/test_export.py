@@ -14,7 +14,7 @@ from tempfile import mkdtemp
 import numpy as np
 import pytest
 from logs_of_motions import Friction, log_of, motion
-from mechanisms import CATALOG, LARGE, NIGHTLY, gated, states, with_elbows
+from mechanisms import CATALOG, CLIENTS, LARGE, NIGHTLY, gated, states, with_elbows
 from typer.testing import CliRunner
 
 import pteron
@@ -114,6 +114,7 @@ def test_its_test_program_passes(tmp_path, name, real, compiler):
     assert run(tmp_path) == (0, "all functions agree with the library\n")
 
 
+@CLIENTS
 @pytest.mark.parametrize("left_out", gated([(), LARGE], [LARGE]), ids=len)
 def test_every_function_can_be_exported_and_the_test_program_can_fail(tmp_path, left_out):
     names = [n for n in pteron.kernels.FUNCTIONS if n not in ("base_regressor", *left_out)]
@@ -192,7 +193,7 @@ def compiled(robot, functions, folder, **options):
 
 
 @pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize("name", ["quadrupteron", "par4", "ankle"])
+@pytest.mark.parametrize("name", gated(["quadrupteron", "par4", "ankle"], ["par4"], CLIENTS))
 def test_a_payload_is_set_while_the_code_runs(tmp_path, name, real):
     robot = ROBOTS.get(name) or pteron.load(name)
     mass, center = 0.7, (0.03, -0.02, 0.05)
@@ -624,6 +625,7 @@ def test_a_file_s_text_stays_inside_its_comment(tmp_path):
     assert block.read_text().count("*)") == block.read_text().count("(*")
 
 
+@CLIENTS
 def test_a_project_for_cmake(tmp_path):
     if shutil.which("cmake") is None:
         pytest.skip("cmake is not installed")

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 from logs_of_motions import log_of, motion
-from mechanisms import CATALOG
+from mechanisms import CATALOG, CLIENTS
 from test_cli import done, refused, run
 from test_report import Reader, strict
 
@@ -114,6 +114,7 @@ def test_cranks_are_identified_too():
     assert (np.abs(values - true) < 6.0 * deviations).all()
 
 
+@CLIENTS
 @QUICK
 def test_options_reach_the_work():
     write_log(log("tripteron"), "a.csv")

@@ -10,6 +10,7 @@ import tokenize
 from pathlib import Path
 
 import pytest
+from mechanisms import CLIENTS
 
 import pteron
 
@@ -115,6 +116,7 @@ def test_an_unknown_name_is_an_attribute_error():
         pteron.kinematic  # noqa: B018
 
 
+@CLIENTS
 def test_star_imports_bring_the_public_names():
     code = (
         "import json\nbefore = set(globals())\nfrom pteron import *\n"

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import pytest
-from mechanisms import NIGHTLY
+from mechanisms import CLIENTS, NIGHTLY
 
 pytest.importorskip("jax")
 
@@ -49,6 +49,7 @@ assert small(*state, parameters=early).dtype == np.float32
 """
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     "code",
     [

@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from mechanisms import CATALOG, MECHANISMS, NIGHTLY, random_machine
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, NIGHTLY, random_machine
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
 from PIL import Image
 from scipy.spatial.transform import Rotation
@@ -193,6 +193,7 @@ def test_an_svg_is_drawn_once_and_laid_out_as_matplotlib_does():
     np.testing.assert_array_equal(axes.get_position().bounds, same.get_position().bounds)
 
 
+@CLIENTS
 def test_pictures_need_no_pyplot():
     script = "import sys, pteron.plots; print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run(

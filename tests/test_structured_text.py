@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, LARGE, gated, several, states
+from mechanisms import CATALOG, CLIENTS, LARGE, gated, several, states
 from structured_text import Block, Trap, parse, read
 from test_export import ROBOTS, identification_file, stiff
 
@@ -126,6 +126,7 @@ def runner(machine, what):
     return Runner(program(ROBOTS[machine], what))
 
 
+@CLIENTS
 @pytest.mark.parametrize(("machine", "what"), SHORT)
 def test_blark_reads_blocks_and_sees_the_tree_that_is_run(machine, what):
     text = runner(machine, what).text
@@ -432,6 +433,7 @@ def test_text_can_be_read():
     assert {"leg1_u_x", "leg1_u_x_2", "pose_2", "t", "t_2"} <= set(names)
 
 
+@CLIENTS
 @pytest.mark.parametrize("left_out", gated([(), LARGE], [LARGE]), ids=len)
 def test_every_function_can_be_a_block(tmp_path, left_out):
     """What a machine has not, such as a rod's angle, is left alone."""

@@ -180,6 +180,7 @@ def test_c_on_other_modes_layouts_and_gravity(name):
     assert np.isfinite(found[:3]).all()
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("name", "what"),
     [
@@ -220,7 +221,7 @@ EDGES = [
 ]
 
 
-@pytest.mark.parametrize("target", ["c", "numba"])
+@pytest.mark.parametrize("target", ["c", pytest.param("numba", marks=CLIENTS)])
 def test_sines_have_the_same_bits_on_every_target(target):
     importable(target)
     x = ca.SX.sym("x")
@@ -277,6 +278,7 @@ def test_float32_in_c(what):
     assert kernel(*(value[0].astype(np.float32) for value in values)).dtype == np.float32
 
 
+@CLIENTS
 @pytest.mark.parametrize("what", gated(SOME, ["direct_kinematics", DYNAMICS]))
 def test_jax(what):
     pytest.importorskip("jax")
@@ -405,7 +407,7 @@ def test_base_parameters_of_another_layout_are_refused():
 # What a call accepts.
 
 
-@pytest.mark.parametrize("target", ["c", "numba"])
+@pytest.mark.parametrize("target", ["c", pytest.param("numba", marks=CLIENTS)])
 def test_layouts_that_are_not_plain_are_served_all_the_same(target):
     importable(target)
     kernel, vm = (compiled(ROBOT, DYNAMICS, name, grade="parametric") for name in (target, "vm"))

@@ -7,7 +7,7 @@ import fmpy.validation
 import numpy as np
 import pytest
 import tilting
-from mechanisms import gated
+from mechanisms import CLIENTS, gated
 from scipy.integrate import solve_ivp
 from test_export import compiled
 from test_other_tools import KINDS, EmcPose, driven, kinematics, simulated, started
@@ -158,6 +158,7 @@ LETTERS = dict(
 )
 
 
+@CLIENTS
 @pytest.mark.parametrize("motion", gated(tilting.LEGS, ["3T3R"]))
 def test_linuxcnc_moves_a_tilting_machine_as_genhexkins_does(tmp_path, motion):
     """With a tool of its own, and one that the tool table makes longer: both turn about the tip."""
