@@ -129,7 +129,7 @@ class FittedMotion:
         rows = len(self.states)
         if len(self._some) == rows:
             return columns
-        return np.asarray(make_interp_spline(self._some, columns, k=3)(np.arange(rows)))
+        return np.asarray(make_interp_spline(self._some, columns, k=5)(np.arange(rows)))
 
     @cached_property
     def _some(self) -> NDArray[np.int64]:

@@ -39,7 +39,7 @@ show too little motion."""
 _EXACT = 1e-7
 """Residuals, over the forces, below which they are rounding and show no faults."""
 
-_POINTS = 8
+_POINTS = 5
 """States in a period of the highest frequency at which columns that take long are computed; between
 them they are interpolated."""
 
