@@ -121,6 +121,7 @@ LEFT = {
 """Subcommands that are not run here, and where they are."""
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", RUN)
 def test_commands_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -203,6 +204,7 @@ def test_python_runs(name, tmp_path, monkeypatch):
 # Pictures.
 
 
+@CLIENTS
 def test_pictures_are_those_that_are_drawn(tmp_path, monkeypatch):
     """Those of the catalog take longer, and MuJoCo's need OpenGL: `make docs` compares all."""
     monkeypatch.syspath_prepend(DOCS / "pictures")

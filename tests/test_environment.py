@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from mechanisms import CATALOG, NIGHTLY, TILTED, in_turn, random_machine, with_elbows
+from mechanisms import CATALOG, CLIENTS, NIGHTLY, TILTED, in_turn, random_machine, with_elbows
 from scipy.integrate import solve_ivp
 from test_sizing import driven
 
@@ -54,6 +54,7 @@ def moved(name):
     return pick_and_place(world.robot, world.home, scale=0.1, duration=0.6)
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("name", "follow"),
     [
@@ -303,6 +304,7 @@ def test_some_of_many_environments_may_start_anew():
     np.testing.assert_array_equal(after[1], alone)
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", ["five-bar", "delta-4"])
 def test_a_picture_shows_the_machine(name):
     env = PteronEnv(MACHINES[name], render_mode="rgb_array")

@@ -10,7 +10,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from mechanisms import gated
+from mechanisms import CLIENTS, gated
 from PIL import Image, ImageSequence
 from test_cli import done, refused, run
 
@@ -52,6 +52,7 @@ def unpacked(path):
     return np.array(frames), times
 
 
+@CLIENTS
 @pytest.mark.parametrize("turns", gated([0.0, 1.0], [1.0]))
 def test_an_mp4_plays_in_a_browser_at_the_speed_it_says(turns):
     made = film(TRIPTERON, CYCLE, "cycle.mp4", fps=8.0, speed=0.5, size=SIZE, turns=turns)
@@ -150,6 +151,7 @@ def test_an_interrupted_film_leaves_what_was_there(ending):
     assert [path.name for path in Path().iterdir() if path.is_file()] == [target.name]
 
 
+@CLIENTS
 def test_the_command_films_the_standard_cycle_and_a_table():
     short = "--fps 4 --size 240x180"
     told = json.loads(done(f"film tripteron -o cycle.gif --speed 1 {short} --json"))

@@ -129,6 +129,7 @@ def test_casadi_differentiates_friction_also_at_rest(name, speed):
     np.testing.assert_allclose(found, expected, 0.0, 1e-5 * np.abs(found).max())
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", gated(["quadrupteron", "3-rrr"], ["3-rrr"]))
 def test_the_casadi_example_finds_a_motion(tmp_path, name):
     files = export_casadi(ROBOTS[name], tmp_path)
@@ -173,6 +174,7 @@ def simulated(path, kind, stop, **values):
 KINDS = ["CoSimulation", "ModelExchange"]
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     "name",
     gated(
@@ -272,6 +274,7 @@ def test_an_fmu_refuses_what_it_cannot_start_from(values, words):
     assert words in said[0]
 
 
+@CLIENTS
 def test_casadi_takes_the_fmu_too():
     robot = ROBOTS["par4"]
     model = ca.DaeBuilder("par4", str(fmpy.extract(fmu_of("par4"))), {})

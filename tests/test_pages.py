@@ -524,6 +524,7 @@ def test_a_table_of_poses_may_have_semicolons_and_decimal_commas(tmp_path):
     np.testing.assert_array_equal(found.motion.pose, playback(robot, plain).motion.pose)
 
 
+@CLIENTS
 def test_a_report_shows_the_motion_that_it_is_given(tmp_path):
     robot = MACHINES["driven"]
     motion = way_out("driven")

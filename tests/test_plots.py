@@ -527,6 +527,7 @@ def test_in_print_letters_are_legible_and_all_is_on_the_paper(picture):
         assert edge.min() > 250, "something is cut"
 
 
+@CLIENTS
 def test_a_saved_figure_keeps_its_text_and_is_the_same_each_time(tmp_path):
     first = {}
     for ending in ("svg", "pdf", "png"):
