@@ -52,6 +52,23 @@ def test_the_page_is_whole_and_says_the_verdict_first(tmp_path: Path):
     assert [value["name"] for value in data["values"]] == [value.name for value in result.values]
 
 
+def test_of_a_machine_that_turns_only_the_angles_are_mapped(tmp_path: Path):
+    robot = pteron.load("ankle")
+    poses, off = pteron.random_poses(robot, 30), np.array([0.01, -0.01])
+    readings = pteron.inverse_kinematics(robot, poses)
+    given = Measurements.of(robot, readings + off, poses=poses)
+    result = calibrate(robot, given, free=["zeros"])
+    asked = np.array([0.1, -0.2])
+    ends = pteron.inverse_kinematics(robot, asked) - np.outer(np.linspace(0.0, 1.0, 5), off)
+    expected = pteron.follow(robot, ends, asked)[-1] - asked
+    errors, left = result.errors(asked)
+    np.testing.assert_allclose(errors[0], expected, rtol=0.0, atol=1e-9)
+    assert left[0] < 1e-6 < 5e-3 < np.linalg.norm(expected)
+    text = write_calibration(result, tmp_path).page.read_text("utf-8")
+    assert "Before, in mrad" in text
+    assert "the tool goes wrong" not in text
+
+
 def test_the_file_holds_the_machine_as_found(tmp_path: Path):
     model = write_calibration(calibration(), tmp_path).model
     found = pteron.load(model)

@@ -130,6 +130,8 @@ class Calibration:
     def errors(self, poses: ArrayLike) -> tuple[Array, Array]:
         """Return where the tool goes wrong at poses: by how much as drawn, and what stays open.
 
+        Of a machine whose platform turns only, it is the pose's angles that go wrong, rad.
+
         Parameters
         ----------
         poses : array, shape (N, m)
@@ -137,11 +139,11 @@ class Calibration:
 
         Returns
         -------
-        before : array, shape (N, 3)
+        before : array, shape (N, 3) or (N, m)
             From where the tool is asked to be to where the found machine takes it when it is driven
-            as drawn, in the base frame, m; NaN where it cannot go.
+            as drawn, in the base frame, m; or the angles' differences; NaN where it cannot go.
         after : array, shape (N,)
-            Standard deviation of the tool's place when driven as found, m.
+            Standard deviation of the tool's place, or of the angles, when driven as found.
         """
         asked = np.atleast_2d(np.asarray(poses, dtype=float))
         slopes = MachineSlopes(self.drawn, self.blocks)
@@ -151,8 +153,11 @@ class Calibration:
         found = self.fit.guess
         gone = slopes.poses(found, found.joints(readings), asked)
         tools = (TOOL,) * len(asked)
-        before = found.points(tools, gone) - self.start.points(tools, asked)
-        moved = slopes.pose_slopes(found, rest, np.where(np.isfinite(gone), gone, asked))[1]
+        moves = bool(self.drawn.platform.lengths)
+        before = gone - asked
+        if moves:
+            before = found.points(tools, gone) - self.start.points(tools, asked)
+        moved = slopes.pose_slopes(found, rest, np.where(np.isfinite(gone), gone, asked))[moves]
         return before, np.sqrt(np.maximum(variances(moved, self.fit.covariance), 0.0))
 
     def misfit(self, other: Guess | Sequence[float]) -> float:

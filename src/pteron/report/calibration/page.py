@@ -36,7 +36,7 @@ _LEVELS = 6
 """Shades of a map, about."""
 
 _FINE = 1e-4
-"""Greatest error, m, of a map in micrometres."""
+"""Error, m or rad, below which it is told in micrometres or microradians."""
 
 
 class ErrorMap(NamedTuple):
@@ -67,21 +67,25 @@ def page(result: Calibration) -> str:
 
 def scaled(value: float, kind: str) -> str:
     """Return an error of a kind of measurement with its unit."""
-    return f"{significant(1e3 * value)} mrad" if kind == "angle" else length(value)
+    factor, unit = _unit(value, kind)
+    return f"{significant(factor * value)} {unit}"
 
 
-def length(value: float) -> str:
-    """Return a length in mm, a small one in micrometres."""
-    if abs(value) < _FINE:
-        return f"{significant(1e6 * value)} µm"
-    return f"{significant(1e3 * value)} mm"
+def _unit(greatest: float, kind: str) -> tuple[float, str]:
+    factor, prefix = (1e6, "µ") if abs(greatest) < _FINE else (1e3, "m")
+    return factor, prefix + ("rad" if kind == "angle" else "m")
 
 
 def error_maps(result: Calibration) -> list[ErrorMap]:
-    """Return the tool's errors on the slices through the home pose of a machine's lengths."""
+    """Return the tool's errors on the slices through the home pose of a machine's lengths.
+
+    Where the platform turns only they are the angles', on the slices of these.
+    """
     robot, home = result.drawn, home_pose(result.drawn)
+    lengths = set(robot.platform.lengths)
+    kind, what = ("position", "tool") if lengths else ("angle", "angles")
     planes = slice_planes(robot)
-    level = [plane for plane in planes if set(plane) <= set(robot.platform.lengths)]
+    level = [plane for plane in planes if set(plane) <= lengths]
     found = []
     for plane in (level or planes)[:3]:
         with suppress(ModelError):
@@ -92,16 +96,16 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
             if not reached.any() or not errors[0][reached].max() > 0.0:
                 continue
             drawn, units = [], []
-            for error, when in zip(errors, ("before", "after"), strict=True):
-                greatest = float(error[reached].max())
-                factor, unit = (1e6, "µm") if greatest < _FINE else (1e3, "mm")
+            most = [float(error[reached].max()) for error in errors]
+            for error, greatest, when in zip(errors, most, ("before", "after"), strict=True):
+                factor, unit = _unit(greatest, kind)
                 values = np.where(reached, factor * error, np.nan).reshape(cut.status.shape)
                 figure = measure_figure(cut, values, levels=levels(values))
-                title = f"The tool's error {when} in the {'-'.join(plane)} plane, {unit}"
+                title = f"The error of the {what} {when} in the {'-'.join(plane)} plane, {unit}"
                 drawn.append(svg(figure, name=f"{when}{''.join(plane)}", title=title))
                 units.append(unit)
-            most = tuple(length(float(error[reached].max())) for error in errors)
-            found.append(ErrorMap("-".join(plane), drawn[0], drawn[1], list(most), units))
+            told = [scaled(value, kind) for value in most]
+            found.append(ErrorMap("-".join(plane), drawn[0], drawn[1], told, units))
     return found
 
 
@@ -127,11 +131,13 @@ def _figures(result: Calibration) -> dict[str, Any]:
     with suppress(PteronError):  # the found machine does not reach the drawn one's home
         figure = differences_figure(robot, result.robot)
         made["machine"] = svg(figure, name="machine", title="The machine drawn and found")
-    poses = random_poses(robot, _ARROWS, seed=0)
-    errors, _ = result.errors(poses)
-    if np.abs(errors).max(initial=0.0, where=np.isfinite(errors)) > 0.0:
-        place, axes = robot.platform.at(poses)
-        tools = place + robot.platform.tool @ axes
-        figure = tool_errors_figure(robot, tools, errors)
-        made["arrows"] = svg(figure, name="arrows", title="The tool's errors as drawn, enlarged")
+    if robot.platform.lengths:
+        poses = random_poses(robot, _ARROWS, seed=0)
+        errors, _ = result.errors(poses)
+        if np.abs(errors).max(initial=0.0, where=np.isfinite(errors)) > 0.0:
+            place, axes = robot.platform.at(poses)
+            tools = place + robot.platform.tool @ axes
+            figure = tool_errors_figure(robot, tools, errors)
+            title = "The tool's errors as drawn, enlarged"
+            made["arrows"] = svg(figure, name="arrows", title=title)
     return made
