@@ -321,6 +321,32 @@ def test_a_fault_that_residuals_show_is_named(kind, words, told):
     assert result.verdict.grade != "trustworthy"
 
 
+def test_rows_that_a_fault_explains_are_not_listed_one_by_one():
+    robot = pteron.load("stewart")
+    given = faulty(measured(robot), "row")
+    readings = given.readings.copy()
+    readings[-5:, 1] += 1e-3
+    result = calibrate(robot, replace(given, readings=readings), free=GEOMETRY)
+    assert (~result.fit.kept).sum() == 6
+    slipped, left = (finding.text for finding in result.findings)
+    assert "zero of joint 2 (rho2) slipped by -0.99" in slipped
+    assert "before row 56" in slipped
+    assert left.startswith("Left out, as it does not fit: row 18 (off by 5.0")
+
+
+def test_an_instrument_and_a_mark_that_moved_are_told_apart_where_the_platform_turns():
+    robot = pteron.load("quadrupteron")
+    given, step = measured(robot), np.array([0.0, 4e-4, 3e-4])
+    turns = robot.platform.at(off_drawing(robot)[2])[1][33:]
+    for moved, words in ((step, "The instrument moved"), (step @ turns, "The mark tool moved")):
+        positions = given.positions.copy()
+        positions[33:] += moved
+        result = calibrate(robot, replace(given, positions=positions), free=GEOMETRY)
+        (finding,) = result.findings
+        assert finding.text.startswith(f"{words}")
+        assert "before row 34" in finding.text
+
+
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
@@ -441,6 +467,23 @@ def test_readings_noise_is_carried_to_what_is_measured():
     assert result.fit.kept.all()
     assert np.median(result.fit.distances) < 3.0
     assert result.misfit(steps) < 3.0 * len(steps)
+
+
+def test_rows_without_a_measurement_or_a_pose_do_not_touch_the_noise():
+    robot = pteron.load("five-bar")
+    *_, poses, _ = off_drawing(robot, 0, 16)
+    given = measured(robot, 0, 16, told=False)
+    unmeasured, beyond = given.positions.copy(), given.readings.copy()
+    unmeasured[5] = np.nan
+    beyond[5] = [np.pi, 0.0]  # its cranks point away from each other
+    found = []
+    for rows in (replace(given, positions=unmeasured), replace(given, readings=beyond)):
+        guess = Guess.drawn(robot, rows)
+        fit = Fitter(rows, blocks_of(robot, rows, GEOMETRY), guess, poses).run()
+        assert np.isfinite(fit.covariance).all()
+        found.append((fit.noise["position"], fit.kept[5], *fit.total))
+    assert [kept for _, kept, *_ in found] == [True, False]
+    np.testing.assert_allclose(*[[noise, *total] for noise, _, *total in found], rtol=0.01)
 
 
 def test_intervals_hold_where_many_distances_share_a_rows_readings():

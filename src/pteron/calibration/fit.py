@@ -261,7 +261,6 @@ class Fitter:
         if 2 * lost[kept].sum() > kept.sum():
             raise ValueError
         found = np.where(np.isnan(found), poses, found)  # out of reach by little; it may come back
-        cost += _LOST * float((lost & kept).sum())
         residuals = np.zeros((rows, width))
         measured = np.zeros((rows, width), dtype=bool)
         distances = np.zeros(rows)
@@ -269,6 +268,7 @@ class Fitter:
             chosen = np.arange(start, min(start + _CHUNK, rows))
             at = self.slopes.rows(guess, self.given, found, chosen)
             residuals[chosen], measured[chosen] = at.residuals, at.measured
+            lost[chosen] |= ~np.isfinite(at.by_reading).all(axis=(1, 2))
             r, slopes, _ = self.whitened(at, guess, noise)
             r[lost[chosen]], slopes[lost[chosen]] = 0.0, 0.0
             squares = np.einsum("nk,nk->n", r, r)
@@ -284,7 +284,7 @@ class Fitter:
             flat = (heavy[..., None] * slopes[:, used]).reshape(-1, count)
             matrix += flat.T @ flat
             right += flat.T @ (heavy * r[:, used]).reshape(-1)
-        cost += float(self.prior @ total**2)
+        cost += float(self.prior @ total**2) + _LOST * float((lost & kept).sum())
         if not np.isfinite(cost):
             raise ValueError
         distances[lost] = BEYOND
@@ -333,8 +333,8 @@ class Fitter:
         """Return the noise by kind that the residuals show, less what the unknowns took of it."""
         if not sought:
             return {}
-        kept = fit.kept
-        rows = np.flatnonzero(kept & (fit.distances < BEYOND))
+        kept = fit.kept & (fit.distances < BEYOND)
+        rows = np.flatnonzero(kept)
         some = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _CHUNK)).astype(int))]
         at = self.slopes.rows(fit.guess, self.given, fit.poses, some)
         found = {}

@@ -6,7 +6,8 @@ squared residuals would fall if it were sought too (a score test).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ _HEAVIEST = 3.0
 _SHARE = 0.2
 """Least share of the squared residuals that a reported fault explains."""
 
+_EXPLAINED = 0.3
+"""Share of a row's residuals up to which the rest is explained by a fault."""
+
 _NOISY = 4.0
 """Mean square along one leg's coordinate, in variances, above which its model is doubted."""
 
@@ -38,20 +42,28 @@ _LISTED = 8
 """Most outlying rows that are named."""
 
 
+class Trial(NamedTuple):
+    """A fault that was tried: what it is and moves, and by how much squared residuals fall."""
+
+    kind: str
+    text: str
+    freedom: int
+    fall: float
+    moved: Array
+    """Residuals (N, K) less those without it, before the other unknowns follow."""
+
+
 def residual_faults(
     start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
 ) -> tuple[Finding, ...]:
-    """Return the faults that residuals show, first the one that explains most."""
-    outliers = _outliers(fit, given)
-    found = list(_shown(start, fit, blocks, given)) or list(_bad_leg(start, fit, blocks, given))
-    if not found:
-        return outliers
-    best = max(found, key=lambda one: one.improvement)
-    return (best,) if (~fit.kept).sum() > _LISTED else (best, *outliers)
+    """Return the fault that explains most residuals, and the rows that do not fit even so."""
+    found, explained = _shown(start, fit, blocks, given)
+    found = found or tuple(_bad_leg(start, fit, blocks, given))
+    return *found, *_outliers(fit, given, ~fit.kept & ~explained)
 
 
-def _outliers(fit: Fit, given: Measurements) -> tuple[Finding, ...]:
-    rows = np.flatnonzero(~fit.kept)
+def _outliers(fit: Fit, given: Measurements, out: NDArray[np.bool_]) -> tuple[Finding, ...]:
+    rows = np.flatnonzero(out)
     if not len(rows):
         return ()
     worst = rows[np.argsort(-fit.distances[rows])][:_LISTED]
@@ -72,13 +84,12 @@ def _size(fit: Fit, row: int) -> str:
 
 def _shown(
     start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
-) -> Iterator[Finding]:
-    """Yield the faults that explain what noise does not."""
-    joints, names = len(start.robot.legs), start.robot.joint_names
+) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
+    """Return the fault, if any, that best explains what noise does not, and the rows (N,) so."""
     count = blocks[-1].where.stop
-    whole = _extended(blocks, given, joints)
-    fitter = Fitter(given, whole, start, fit.poses)
-    chosen = evenly(len(given), _ROWS)
+    more = _extended(blocks, given, len(start.robot.legs))
+    fitter = Fitter(given, (*blocks, *more), start, fit.poses)
+    chosen = np.union1d(evenly(len(given), _ROWS), np.flatnonzero(~fit.kept)[:_ROWS])
     at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
     r, slopes, _ = fitter.whitened(at, fit.guess, fit.noise)
     off = np.sqrt(np.einsum("nk,nk->n", r, r) / np.maximum(at.measured.sum(axis=1), 1))
@@ -86,14 +97,18 @@ def _shown(
     weights[~np.isfinite(slopes).all(axis=(1, 2))] = 0.0  # no pose
     r = weights[:, None] * r
     slopes = weights[:, None, None] * np.nan_to_num(slopes)
-    own, more = slopes[..., :count], slopes[..., count:]
+    own = slopes[..., :count]
     flat = own.reshape(-1, count)
     covariance = np.linalg.inv(flat.T @ flat + np.diag(fitter.prior[:count]))
-    left = r - (own @ (covariance @ (flat.T @ r.reshape(-1))))
+
+    def remaining(moved: Array) -> Array:
+        """Return what is left of residuals (N, K) where the fit's unknowns follow."""
+        return np.asarray(moved - own @ (covariance @ (flat.T @ moved.reshape(-1))))
+
+    left = remaining(r)
     # Noise that was found has the fault in it: a middle row's is nearer the truth.
     squares = np.einsum("nk,nk->n", left, left) / np.maximum(at.measured.sum(axis=1), 1)
     variance = max(float(np.median(squares)) / 0.6, 1e-12)
-    total = float(squares.sum())
 
     def score(columns: Array) -> tuple[float, Array]:
         """Return how the squared residuals fall with columns (N, K, c), and their amounts."""
@@ -107,48 +122,78 @@ def _shown(
         amounts = -(inverse @ (right / size)) / size
         return float(-right @ amounts) / variance, amounts
 
-    tests: list[tuple[str, str, int, float]] = []
-    later = np.arange(len(chosen))
-    for i, leg in enumerate(start.robot.legs):
-        column, told = more[..., i : i + 1], "mrad" if leg.joint.unit == "rad" else "mm"
-        for t in range(3, len(chosen) - 3, max(1, len(chosen) // 200)):
-            found, amount = score(column * (later >= t)[:, None, None])
+    tried, best, gain = 0, None, -np.inf
+    frame = [block for block in blocks if block.kind == "frame"]
+    for trial in _trials(start, given, chosen, slopes, [*more, *frame], score):
+        tried += 1
+        more_than_chance = trial.fall - float(chi2.isf(0.5, trial.freedom))
+        if more_than_chance > gain:
+            best, gain = trial, more_than_chance
+    explained = np.zeros(len(given), dtype=bool)
+    share = _SHARE * float(squares.sum()) / variance
+    if best is None or best.fall <= max(chi2.isf(_CHANCE / tried, best.freedom), share):
+        return (), explained
+    after = np.linalg.norm(left + remaining(best.moved), axis=-1)
+    explained[chosen] = after < _EXPLAINED * np.linalg.norm(left, axis=-1)
+    return (Finding(best.kind, best.text, gain),), explained
+
+
+def _trials(
+    start: Guess,
+    given: Measurements,
+    chosen: NDArray[np.int64],
+    slopes: Array,
+    more: Sequence[Block],
+    score: Callable[[Array], tuple[float, Array]],
+) -> Iterator[Trial]:
+    """Try all faults at chosen rows, with slopes (N, K, p) against all unknowns."""
+    later, places = np.arange(len(chosen)), [given.places[i] for i in chosen]
+    zeros, *others = more
+
+    def since(columns: Array, most: int) -> Iterator[tuple[str, float, Array, Array]]:
+        for t in range(3, len(chosen) - 3, max(1, len(chosen) // most)):
+            part = columns * (later >= t)[:, None, None]
+            fall, amounts = score(part)
+            yield places[t], fall, amounts, part @ amounts
+
+    joints = slopes[..., zeros.where]
+    for i, (leg, name) in enumerate(zip(start.robot.legs, start.robot.joint_names, strict=True)):
+        column, unit = joints[..., i : i + 1], "mrad" if leg.joint.unit == "rad" else "mm"
+        for place, fall, amounts, moved in since(column, 200):
             text = (
-                f"The zero of joint {i + 1} ({names[i]}) slipped by {1e3 * amount[0]:+.3g} {told} "
-                f"before {given.places[chosen[t]]}: home it again, and measure anew from there."
+                f"The zero of joint {i + 1} ({name}) slipped by {1e3 * amounts[0]:+.3g} {unit} "
+                f"before {place}: home it again, and measure anew from there."
             )
-            tests.append(("slipped zero", text, 1, found))
-        steps = np.sign(np.diff(given.readings[chosen, i], prepend=given.readings[chosen[0], i]))
-        found, amount = score(column * steps[:, None, None])
+            yield Trial("slipped zero", text, 1, fall, moved)
+        read = given.readings[chosen, i]
+        column = column * np.sign(np.diff(read, prepend=read[0]))[:, None, None]
+        fall, amounts = score(column)
         text = (
-            f"Joint {i + 1} ({names[i]}) stops {2e3 * abs(amount[0]):.3g} {told} apart by its "
+            f"Joint {i + 1} ({name}) stops {2e3 * abs(amounts[0]):.3g} {unit} apart by its "
             "direction of approach: approach poses from one side, or take up its play."
         )
-        tests.append(("backlash", text, 1, found))
+        yield Trial("backlash", text, 1, fall, column @ amounts)
     times = given.times[chosen] if given.times is not None else chosen.astype(float)
-    span = np.ptp(times)
-    if span > 0.0:
-        along = (times - times.mean()) / span
-        found, amount = score(more[..., :joints] * along[:, None, None])
+    if span := np.ptp(times):
+        columns = joints * ((times - times.mean()) / span)[:, None, None]
+        fall, amounts = score(columns)
         text = (
             "The readings drift from the first row to the last, by up to "
-            f"{1e3 * np.abs(amount).max():.3g} mm or mrad, as a machine's do that grows warm: let "
+            f"{1e3 * np.abs(amounts).max():.3g} mm or mrad, as a machine's do that grows warm: let "
             "it warm up, and measure quickly."
         )
-        tests.append(("drift", text, joints, found))
-    for k, name in enumerate(sorted({given.marks[i] for i in chosen})):
-        columns = more[..., joints + 3 * k : joints + 3 * k + 3]
-        for t in range(3, len(chosen) - 3, max(1, len(chosen) // 60)):
-            found, amount = score(columns * (later >= t)[:, None, None])
+        yield Trial("drift", text, len(amounts), fall, columns @ amounts)
+    for block in others:
+        what, alike = "instrument", ""
+        if block.kind == "mark":
+            what = f"mark {block.name or 'tool'}"
+            alike = "" if start.robot.platform.angular.any() else ", or the instrument"
+        for place, fall, amounts, moved in since(slopes[..., block.where], 60):
             text = (
-                f"The mark {name or 'tool'} moved by {1e3 * np.linalg.norm(amount):.3g} mm before "
-                f"{given.places[chosen[t]]}: fix it, and measure anew from there."
+                f"The {what} moved by {1e3 * np.linalg.norm(amounts[:3]):.3g} mm before {place}"
+                f"{alike}: fix it, and measure anew from there."
             )
-            tests.append(("moved mark", text, 3, found))
-    for kind, text, freedom, found in tests:
-        limit = chi2.isf(_CHANCE / len(tests), freedom)
-        if found > limit and found * variance > _SHARE * total:
-            yield Finding(kind, text, float(found - chi2.isf(0.5, freedom)))
+            yield Trial(f"moved {block.kind}", text, len(amounts), fall, moved)
 
 
 def _bad_leg(
@@ -177,17 +222,15 @@ def _bad_leg(
         yield Finding("wrong model", text, float(squares[:, first].sum()))
 
 
-def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> tuple[Block, ...]:
-    """Return the blocks with a zero for each joint and every mark once more."""
-    start = blocks[-1].where.stop
-    zeros = tuple(Unknown("", "zeros", "", np.inf) for _ in range(joints))
-    found = [
-        *blocks,
-        Block("zeros", "", slice(start, start + joints), zeros, (), tuple(range(joints))),
-    ]
-    start += joints
-    for name in sorted(set(given.marks)):
-        where = slice(start, start + 3)
-        found.append(Block("mark", name, where, (Unknown("", "tool", "m", np.inf),) * 3))
-        start += 3
-    return tuple(found)
+def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> list[Block]:
+    """Return blocks behind others: every joint's zero, each mark, and the instrument's frame."""
+    kinds = [("zeros", "", tuple(range(joints)))]
+    kinds += [("mark", name, ()) for name in sorted(set(given.marks))]
+    kinds += [] if any(block.kind == "frame" for block in blocks) else [("frame", "", ())]
+    start, found = blocks[-1].where.stop, []
+    for kind, name, legs in kinds:
+        size = {"zeros": joints, "mark": 3, "frame": 6}[kind]
+        unknowns = (Unknown("", kind, "", np.inf),) * size
+        found.append(Block(kind, name, slice(start, start + size), unknowns, (), legs))
+        start += size
+    return found
