@@ -77,3 +77,4 @@ def test_planned_poses_are_a_table_that_the_machine_runs():
     assert len(table) == 9
     assert len(set(poses[:, 2])) == 1
     assert "every pose is proved to serve" in text
+    assert "From 59 poses on, some are held out" in " ".join(text.split())

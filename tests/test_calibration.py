@@ -254,6 +254,20 @@ def test_seven_heights_leave_rods_at_the_drawing_and_say_so():
     assert max(abs(value.found - 0.28) for value in rods) < 1e-3
     assert result.observability.at_poses == 7
     assert "No rows were left for a check" in result.verdict.reasons[0]
+    assert "Measure at 54 or more poses" in result.verdict.next_steps[0]
+
+
+def test_forty_heights_leave_some_for_a_check_where_their_noise_is_given():
+    robot = pteron.load("linear-delta")
+    truth, _, poses, readings = off_drawing(robot, 1, 40)
+    heights = tool_places(truth.robot, poses, truth.marks[""])[:, 2]
+    heights += NOISE * np.random.default_rng(1).standard_normal(40)
+    for noise, checked in (({"height": NOISE}, True), ({}, False)):
+        setup = Setup(noise=noise)
+        given = Measurements.of(robot, readings, heights=heights, setup=setup)
+        result = calibrate(robot, given, free=GEOMETRY)
+        assert (result.held_out is not None) == checked
+        assert (result.verdict.grade == "trustworthy") == checked
 
 
 def test_free_factors_without_tolerance_bend_rods_and_tolerances_hold_them():

@@ -17,17 +17,11 @@ from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Calibration, HeldOut, calibrated, values_of
 from pteron.calibration.start import placed, starting_poses
 from pteron.calibration.unknowns import blocks_of
-from pteron.calibration.verdict import verdict_of
+from pteron.calibration.verdict import EVERY, rows_for_check, verdict_of
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike, as_manipulator
 
 Array = NDArray[np.float64]
-
-_EVERY = 5
-"""One row in so many is held out of the fit where no other log is given."""
-
-_PER_VALUE = 1.5
-"""Measured numbers for each unknown below which no row is held out."""
 
 _TRIED_ROWS = 5000
 """Most rows of the fit that is judged at the held-out rows; more change it little."""
@@ -106,8 +100,9 @@ def calibrate(
     poses = starting_poses(start, measurements)
     start = placed(start, measurements, poses)
     kept = np.ones(len(measurements), dtype=bool)
-    if held_out is None and _enough(measurements, blocks):
-        kept[_EVERY // 2 :: _EVERY] = False
+    checked = rows_for_check(measurements, blocks)
+    if held_out is None and len(measurements) >= checked:
+        kept[EVERY // 2 :: EVERY] = False
     judged = partial = None
     if held_out is not None or not kept.all():
         fitted = np.zeros_like(kept)
@@ -128,7 +123,7 @@ def calibrate(
         shown,
         judged,
         findings,
-        verdict_of(fit, blocks, shown, judged, findings),
+        verdict_of(fit, blocks, shown, judged, findings, checked),
         measurements,
         fit,
         blocks,
@@ -144,11 +139,6 @@ def _check(joints: int, given: Measurements) -> None:
         raise DataError(f"{given.places[row]}: a reading is missing or not finite")
     if not given.kinds:
         raise DataError("measurements: nothing was measured; give a position, an angle, a height")
-
-
-def _enough(given: Measurements, blocks: Sequence[Block]) -> bool:
-    counted = sum(int((~np.isnan(values)).sum()) for values in given.parts.values())
-    return counted >= _PER_VALUE * blocks[-1].where.stop and len(given) >= 2 * _EVERY
 
 
 def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurements) -> HeldOut:

@@ -16,6 +16,7 @@ from pteron.calibration.guess import Guess, tolerances_of, variances
 from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, Plane, Setup
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
+from pteron.calibration.verdict import rows_for_check
 from pteron.errors import DataError, ModelError
 from pteron.kernels import numeric
 from pteron.kinematics import random_poses
@@ -78,6 +79,8 @@ class Plan:
     before, after : float
         Expected greatest error of the tool's place in that box, as a standard deviation, by
         tolerances alone and after a calibration, m.
+    checked : int
+        How many poses, or more, leave some to check the calibration by.
     """
 
     robot: Manipulator
@@ -87,6 +90,7 @@ class Plan:
     region: Box
     before: float
     after: float
+    checked: int
 
     def columns(self) -> dict[str, Array]:
         """Return the columns of the table that the machine runs: poses, then readings."""
@@ -190,7 +194,8 @@ def plan(
         for known in (np.diag(tolerances**2), covariance)
     )
     readings = start.readings(slopes.joints(start, picked))
-    return Plan(robot, measure, picked, readings, region, before, after)
+    checked = rows_for_check(given, blocks)
+    return Plan(robot, measure, picked, readings, region, before, after, checked)
 
 
 def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:

@@ -9,9 +9,16 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block
+from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
 from pteron.calibration.result import Finding, HeldOut
 from pteron.verdict import Opinion, Verdict
+
+EVERY = 5
+"""One row in so many is held out of the fit for a check."""
+
+_PER_VALUE = {True: 1.0, False: 1.5}
+"""Measured numbers for each unknown below which none is, where their noise is given or is not."""
 
 _AT_THE_NOISE = 1.3
 """Held-out error, over the one expected from noise and intervals, up to which it is trusted."""
@@ -26,19 +33,30 @@ _OFF = 5.0
 """Distance from the drawing, in tolerances, above which a value is doubted."""
 
 
+def rows_for_check(given: Measurements, blocks: Sequence[Block]) -> int:
+    """Return from how many rows on, like those given, some are held out of the fit."""
+    counted = sum(int((~np.isnan(values)).sum()) for values in given.parts.values())
+    least = _PER_VALUE[set(given.kinds) <= set(given.setup.noise)] * blocks[-1].where.stop
+    return max(2 * EVERY, int(np.ceil(least * len(given) / counted)))
+
+
 def verdict_of(
     fit: Fit,
     blocks: Sequence[Block],
     shown: Observability,
     held_out: HeldOut | None,
     findings: Sequence[Finding],
+    checked: int,
 ) -> Verdict:
     """Return the verdict."""
     found = Opinion()
     if held_out is None:
         found.lower("usable with care")
         found.reasons.append("No rows were left for a check: all were needed for the fit.")
-        found.steps.append("Measure at more poses, or give a second log (--held-out).")
+        found.steps.append(
+            f"Measure at {checked} or more poses (fewer where the noise is given), or give a "
+            "second log (--held-out)."
+        )
     else:
         for kind, after in held_out.after.items():
             expected, before = held_out.expected[kind], held_out.before[kind]

@@ -148,11 +148,16 @@ def _plan(
     )
     what, unit = ("tool's place", "mm") if machine.platform.lengths else ("angles", "mrad")
     off = "is" if unit == "mm" else "are"
+    few = (
+        f"From {found.checked} poses on, some are held out to check the calibration by; with "
+        "fewer give a second log (--held-out)."
+    )
     show(
         f"{plain(machine.name)}: {count} poses at which to measure {measure}, in a box where every "
         f"pose is proved to serve: {sides}",
         f"The {what} {off} off by up to {1e3 * found.before:.3g} {unit} as drawn (one standard "
         f"deviation of the tolerances); {1e3 * found.after:.3g} {unit} are expected to be left.",
+        *([few] if count < found.checked else []),
         *written(path),
     )
 
