@@ -128,6 +128,12 @@ def test_a_screws_length_is_that_of_a_ram_between_universal_joints(tmp_path):
     assert re.search(r"add up to [\d.]+ mm \(leg 2\)", done.stderr)
 
 
+def test_rams_far_longer_than_the_platform_is_wide_are_not_singular():
+    robot = TILTED["stewart"]
+    far = tuple(replace(leg, limits=(0.01, 1e4)) for leg in robot.legs)
+    assert not pteron.architecture(replace(robot, legs=far)).singular
+
+
 @NIGHTLY
 def test_points_in_line_are_the_reason():
     robot = tilting.machine("3R", ("UPS",), 4)[0]

@@ -170,7 +170,15 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
     poses = _poses(robot)
     if not len(poses):
         return False  # nowhere in reach, which is told where a pose is used
-    return bool((type_ii_sizes(robot, poses) <= _VANISHING).all())
+    if (type_ii_sizes(robot, poses) > _VANISHING).any():
+        return False
+    # Where legs are far longer than the platform is wide, det J is small but its rank is full.
+    points = np.array([leg.platform_point for leg in robot.legs])
+    rows = numeric(robot, "jacobian")(poses)[0]
+    rows = rows / np.where(robot.platform.angular, np.linalg.norm(points, axis=1).max() or 1.0, 1.0)
+    rows = rows[np.isfinite(rows).all(axis=(1, 2))]
+    values = np.linalg.svd(rows / np.linalg.norm(rows, axis=-1, keepdims=True), compute_uv=False)
+    return bool((values[:, -1] <= _VANISHING * values[:, 0]).all())
 
 
 @lru_cache(maxsize=64)
