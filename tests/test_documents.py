@@ -108,6 +108,7 @@ def test_options_that_are_shown_exist(name):
 
 RUN = ("README.md", "docs/start/first-result.md", "docs/start/install.md")
 LEFT = {
+    "choose": "test_choosing.py",
     "design": "test_design.py",
     "excite": "searches for its motion; test_excitation_files.py",
     "film": "test_films.py",

@@ -106,7 +106,7 @@ def choose_machine(
         If no kind can do the motion, a cycle does not fit into the workspace, a list of motors
         cannot be read, or a price is asked for of motors that have none.
     """
-    cases = _cases(job)
+    cases = cases_of(job)
     kept = _Kept(None if folder is None else Path(folder) / _KEPT, job, cases)
     found = {name: known for name in cases if (known := kept.find(name)) is not None}
     resumed = tuple(found)
@@ -129,7 +129,7 @@ def choose_machine(
     return Choice(job, tuple(order), resumed)
 
 
-def _cases(job: Job) -> dict[str, Case]:
+def cases_of(job: Job) -> dict[str, Case]:
     """Return the job for each kind that can do the motion."""
     space = job.workspace
     turns, tilts = space.turn is not None, space.tilt is not None

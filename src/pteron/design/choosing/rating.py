@@ -23,7 +23,7 @@ from pteron.design.choosing.tool import (
 from pteron.design.quantities import moving_mass
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
-from pteron.errors import ModelError
+from pteron.errors import ModelError, PteronError
 from pteron.indices import Section
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics, jacobian, joint_accelerations
@@ -213,7 +213,7 @@ class Case:
                 errors = unit_errors(self.job.accuracy, robot, found.middle + self.poses)
             if self.job.stiffness is not None:
                 gives = compliances(robot, found.middle + self.corners, self.sections(found))
-        except ModelError:
+        except PteronError:
             _miss(found, "loads", 1.0, "it does not reach a cycle")
             return
         options: list[Option | None] = [None] * robot.joint_count

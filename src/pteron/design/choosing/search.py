@@ -9,10 +9,10 @@ import numpy as np
 from pteron.design.choosing.rating import Case, Rating
 from pteron.kernels import Array, alike
 
-_POPULATION = 6
+_POPULATION = 3
 """Designs that evolve, for each number of one."""
 
-_SPREAD = 4
+_SPREAD = 6
 """Designs that are drawn at first, for each that evolves."""
 
 _REFINED = 0.25

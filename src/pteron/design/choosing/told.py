@@ -11,7 +11,6 @@ from pteron.design.choosing.verdict import Verdict
 
 _FIGURES = {
     "price": ("price", 1.0),
-    "rated_power": ("power (W)", 1.0),
     "shortest_time": ("time (s)", 1.0),
     "error": ("error (mm)", 1e3),
     "deflection": ("gives way (mm)", 1e3),
@@ -29,8 +28,7 @@ def cells(one: Verdict) -> dict[str, str]:
     for name, (heading, factor) in _FIGURES.items():
         if (value := one.figures.get(name)) is not None and isfinite(value):
             found[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
-    size = (f"{one.figures[name]:.2f}" for name in ("width", "depth", "height"))
-    return found | {"size (m)": " x ".join(size)}
+    return found
 
 
 def drives(one: Verdict) -> str:
@@ -40,7 +38,9 @@ def drives(one: Verdict) -> str:
 
 def dimensions(one: Verdict) -> str:
     """Return the dimensions of a machine in a line, mm."""
-    return ", ".join(f"{name} {1e3 * value:.0f}" for name, value in one.dimensions.items())
+    own = ", ".join(f"{name} {1e3 * value:.0f}" for name, value in one.dimensions.items())
+    whole = (f"{1e3 * one.figures[name]:.0f}" for name in ("width", "depth", "height"))
+    return f"{own}; it moves within {' x '.join(whole)}"
 
 
 def margins(one: Verdict) -> str:
@@ -89,12 +89,14 @@ def assumed(choice: Choice) -> list[str]:
     """Return what was assumed, a line each."""
     motors, links = choice.job.motors, choice.job.links
     examples = [] if motors.list else ["The motors are the package's examples, not products."]
+    stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
+    stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
     return [
         *examples,
         f"Drives have {motors.margin:g} times what is asked, and dry friction of "
         f"{motors.friction:.0%} of their rated torque.",
-        f"Links are cut from {', '.join({*links.upper, *links.lower})}; the platform is half of an "
-        f"aluminium disc {1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
+        f"Links are cut from {stocks}; the platform is half of an aluminium disc "
+        f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
         "The workspace is that of the platform's point P; a hexapod's joints have no cones.",
         "The shortest time is that of the cycle at its worst place with this margin.",
     ]

@@ -11,7 +11,7 @@ import numpy as np
 
 from pteron.design.choosing.kinds import slides
 from pteron.design.choosing.rating import Case, Rating
-from pteron.design.choosing.samples import Places
+from pteron.design.choosing.samples import Places, sample_poses
 from pteron.design.choosing.search import front
 from pteron.design.choosing.tool import elasticity, greatest_errors, joint_errors, tolerances
 from pteron.design.worst_cases import worst_forces, worst_speeds
@@ -27,6 +27,12 @@ from pteron.workspace import Box, Cylinder, Proof, Region, prove
 
 _TRIED = 8
 """Designs of which a proof is tried, the best first."""
+
+_NOTHING = 1e-9
+"""Least force, speed or torque by which a limit is divided."""
+
+_DENSE = 7
+"""Poses along each side of a box at which errors and stiffness are looked at last."""
 
 _BOXES = 60_000
 """Boxes after which a proof is given up."""
@@ -101,10 +107,24 @@ def judged(case: Case, found: list[Rating]) -> Verdict:
     for one in good[:_TRIED]:
         proofs = _proofs(case, one)
         bad = next((p for p in proofs if p.counterexample is not None), None)
-        if bad is None:
-            return _verdict(case, one, proofs, counts, front(good, shown_objectives(objectives)))
         why = str(bad)
+        if bad is None:
+            found = _verdict(case, one, proofs, counts, front(good, shown_objectives(objectives)))
+            why = _exceeded(case, found)
+            if not why:
+                return found
     return Verdict(case.kind.name, False, (f"the nearest design is {why}",), *counts)
+
+
+def _exceeded(case: Case, found: Verdict) -> str:
+    """Return in words what a design exceeds between the poses of its search; empty for nothing."""
+    job, figures = case.job, found.figures
+    bounds = {"error": job.accuracy, "deflection": job.stiffness}
+    for name, asked in bounds.items():
+        if asked is not None and figures[name] > asked.most:
+            return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * asked.most:g} mm asked"
+    least = min(figures[name] for name in ("rated_margin", "peak_margin", "speed_margin"))
+    return f"not so: the drives' margin is {least:.3g} at {found.worst}" if least < 1.0 else ""
 
 
 def shown_objectives(objectives: Sequence[str]) -> list[str]:
@@ -164,12 +184,12 @@ def _verdict(
     figures = dict(one.figures)
     margins, worst, place = _margins(case, carrying, one)
     figures |= margins
-    poses = one.middle + case.poses
+    poses = one.middle + sample_poses(case.job, robot, _DENSE)
     if case.job.accuracy is not None:
         figures["error"] = _error(case, robot, one, poses)
     if case.job.stiffness is not None:
         springs = elasticity(case.sections(one), [o.gearbox.stiffness for o in one.options])
-        least = stiffness(robot, one.middle + case.corners, springs).least.min()
+        least = stiffness(robot, poses, springs).least.min()
         figures["deflection"] = float(case.job.stiffness.force / least)
     times = _reached(case, carrying, one, place)
     objectives = shown_objectives(case.job.objectives)
@@ -241,9 +261,11 @@ def _margins(
         held = cycle.dwell * forces[:, -1] ** 2
         rms = np.sqrt((means + held) / (duration + cycle.dwell))
         several = {
-            "rated_margin": (rated / rms).min(axis=-1),
-            "peak_margin": (most / np.abs(forces).max(axis=1)).min(axis=-1),
-            "speed_margin": (fastest / np.abs(rates).max(axis=1)).min(axis=-1),
+            "rated_margin": (rated / np.maximum(rms, _NOTHING)).min(axis=-1),
+            "peak_margin": (most / np.maximum(np.abs(forces).max(axis=1), _NOTHING)).min(axis=-1),
+            "speed_margin": (fastest / np.maximum(np.abs(rates).max(axis=1), _NOTHING)).min(
+                axis=-1
+            ),
         }
         for name, values in several.items():
             found[name] = min(found[name], float(values.min()))
@@ -254,13 +276,14 @@ def _margins(
     asked = case.job.motion
     if asked.acceleration or asked.speed:
         corners = one.middle + case.corners
-        forces = worst_forces(robot, corners, max(asked.speed, 1e-6), asked.acceleration)
-        rates = worst_speeds(robot, corners, max(asked.speed, 1e-6))
-        peak, speed = float((most / forces).min()), float((fastest / rates).min())
+        speed = max(asked.speed, _NOTHING)
+        forces = np.maximum(worst_forces(robot, corners, speed, asked.acceleration), _NOTHING)
+        rates = np.maximum(worst_speeds(robot, corners, speed), _NOTHING)
+        peak, fast = float((most / forces).min()), float((fastest / rates).min())
         found["peak_margin"] = min(found["peak_margin"], peak)
-        found["speed_margin"] = min(found["speed_margin"], speed)
-        if min(peak, speed) < least:
-            at = (most / forces).min(axis=-1) if peak < speed else (fastest / rates).min(axis=-1)
+        found["speed_margin"] = min(found["speed_margin"], fast)
+        if min(peak, fast) < least:
+            at = (most / forces).min(axis=-1) if peak < fast else (fastest / rates).min(axis=-1)
             corner = case.corners[int(at.argmin())][: len(robot.platform.lengths)]
             told = ", ".join(f"{1e3 * x:+.0f}" for x in corner)
             worst = f"the motion in any direction, at ({told}) mm"
