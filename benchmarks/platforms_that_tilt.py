@@ -35,8 +35,8 @@ _MACHINES, _STATES = (1, 20) if quick() else (10, 200)
 _FEWEST = _STATES // 2
 """States of a machine: one that reaches less of its surroundings is drawn anew."""
 
-_TYPE_I, _TYPE_II = 0.05, 1e-3
-"""Measures of a state, at least."""
+_TYPE_I, _TYPE_II = 0.1, 1e-3
+"""Measures of a state, at least: at 0.07 from a crank that is stretched ten digits are left."""
 
 _BOUNDS = {"loops": 1e-13, "J": 1e-10, "MuJoCo": 1e-8, "Lagrange": 1e-8, "forward": 1e-10}
 _METHODS: tuple[Literal["exact", "svd", "qr"], ...] = ("exact", "svd", "qr")
