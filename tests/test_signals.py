@@ -1,6 +1,7 @@
 """From samples to states: noise, filters, derivatives, blocks, assembly modes."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -32,6 +33,8 @@ from pteron.identification.signals.repetition import repeating_rows
 from pteron.identification.signals.samples import blocks
 from pteron.kinematics.evaluate import unchecked
 from pteron.workspace import home_pose
+
+log_of = partial(log_of, rate=500.0)  # rows are counted here
 
 RATE = 1000.0
 TIME = np.arange(20_000) / RATE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from pteron.identification.logs import Log, open_log, read_log, write_log
 from pteron.identification.logs.spikes import force_spikes, joint_spikes
 from pteron.identification.observation import observations_of
 from pteron.identification.signals import preprocessing_of
+
+log_of = partial(log_of, rate=500.0)  # rows are counted here
 
 MACHINES = ("quadrupteron", "delta", "par4", "five-bar")
 each_machine = pytest.mark.parametrize("name", MACHINES)
