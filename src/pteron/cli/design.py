@@ -145,7 +145,8 @@ def _show(summary: Summary) -> None:
         f"{front.kept} keep all that is asked, {len(front)} on the front"
     )
     show(*(f"Asked for: {plain(line)}" for line in asked_words(front.task.spec)))
-    show(*(f"To begin with: {plain(line)}" for line in summary.start.proofs))
+    lines = (*summary.start.proofs, *summary.start.lacking)
+    show(*(f"To begin with: {plain(line)}" for line in lines))
     numbers = ("to begin with", "now", "change")
     for told in summary.chosen:
         rows = ((plain(c.what), c.shown(c.before), c.shown(c.after), c.by) for c in told.changes)

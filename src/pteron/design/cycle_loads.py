@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
+from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 
 from pteron.dynamics import drive_forces
 from pteron.errors import ModelError
@@ -14,10 +15,14 @@ from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion import Fit, Motion, Motor, Sizing, choose
+from pteron.motion import Motion, Motor, Sizing
+from pteron.motion.sizing.gearing import torques
 
 _RATES = np.array([1.0, 2.0, 3.0])
 """Rates at which forces are evaluated: they are quadratic in the rate."""
+
+_DECADES = 4.0
+"""Powers of ten below the ratio at which a motor is as fast as it may be, where one is sought."""
 
 
 def shortest_time(robot: Manipulator, motion: Motion) -> float:
@@ -73,14 +78,57 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
     return np.where(np.isfinite(found) & (found > 0.0), found, inf)
 
 
-def best_motors(sizings: Sequence[Sizing], motors: Sequence[Motor]) -> list[Fit]:
-    """Return the motor of a list with the greatest margin for each joint of each cycle.
+@dataclass(frozen=True)
+class MotorMargin:
+    """A motor at a joint, at the ratio where its margin is greatest: from 1 on it serves."""
 
-    From a margin of 1 on it serves; each cycle is looked at by itself.
+    leg: int
+    motor: Motor
+    ratio: float
+    margin: float
+    scarcest: str
+
+    @classmethod
+    def of(cls, sizing: Sizing, leg: int, motor: Motor) -> MotorMargin:
+        """Return the margin that a motor has in a cycle, at any ratio.
+
+        Each limit allows an interval of ratios, so that the least of their margins has one maximum.
+        """
+        fastest = float(sizing.peak_speeds[leg - 1])
+
+        def margins(ratio: float) -> dict[str, float]:
+            rms, peak = torques(sizing, leg, ratio, motor.rotor_inertia)
+            return {
+                "rated torque": motor.rated_torque / rms if rms else inf,
+                "peak torque": motor.peak_torque / peak if peak else inf,
+                "speed": motor.max_speed / (ratio * fastest) if fastest else inf,
+            }
+
+        middle = np.log(motor.max_speed / fastest if fastest else 1.0)
+        found = minimize_scalar(
+            lambda log_ratio: -np.log(min(margins(np.exp(log_ratio)).values())),
+            bounds=(middle - _DECADES * np.log(10.0), middle + np.log(10.0)),
+            method="bounded",
+            options={"xatol": 1e-6},
+        )
+        ratio = float(np.exp(found.x))
+        known = margins(ratio)
+        scarcest = min(known, key=known.__getitem__)
+        return cls(leg, motor, ratio, known[scarcest], scarcest)
+
+
+def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[MotorMargin]:
+    """Return a motor of a list for each joint: the smallest whose margin is enough.
+
+    Where none is, the one with the greatest margin.
     """
-    best: list[Fit] = []
-    for sizing in sizings:
-        found = choose(sizing, motors)
-        for leg in range(1, sizing.robot.joint_count + 1):
-            best.append(max((fit for fit in found if fit.leg == leg), key=lambda fit: fit.margin))
-    return best
+    found = []
+    for leg in range(1, sizing.robot.joint_count + 1):
+        fits = [MotorMargin.of(sizing, leg, one) for one in motors]
+        serving = [fit for fit in fits if fit.margin >= enough]
+        found.append(
+            min(serving, key=lambda fit: fit.motor.rated_torque * fit.motor.max_speed)
+            if serving
+            else max(fits, key=lambda fit: fit.margin)
+        )
+    return found

@@ -8,12 +8,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from pteron.design.quantities import COVERS, quantities
-from pteron.design.region import workspace_poses
+from pteron.design.region import workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING, WorkspaceTable
 from pteron.design.task import Task
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.equations.machine import numbers
-from pteron.errors import ModelError, SingularPose, UnreachablePose
+from pteron.errors import PteronError
 from pteron.kernels import Array, alike
 from pteron.kinematics.sampling import joint_limits, search_ball
 from pteron.manipulator import Manipulator, parameters
@@ -125,10 +125,19 @@ class Design:
         )
 
     @cached_property
-    def sizings(self) -> tuple[Sizing, ...]:
-        """The loads on the drives over each cycle, with the payload."""
-        pairs = zip(self.cycles, self.task.spec.cycles, strict=True)
-        return tuple(size(self.carrying, motion, dwell=one.dwell) for motion, one in pairs)
+    def sizing(self) -> Sizing:
+        """The loads on the drives over the cycles, one after the other, with the payload.
+
+        Where one may be anywhere they are taken at all its places and turns in the workspace.
+        """
+        cycles, pose = self.task.spec.cycles, self.task.orientations[0]
+        anywhere = self.workspace is not None and any(cycle.anywhere for cycle in cycles)
+        return size(
+            self.carrying,
+            self.cycles,
+            dwell=[cycle.dwell for cycle in cycles],
+            places=workspace_region(self.workspace, pose) if anywhere and self.workspace else None,
+        )
 
     @cached_property
     def _sides(self) -> dict[float, float]:
@@ -178,8 +187,13 @@ class Design:
 
     def cover(self, name: str) -> str:
         """Return over what one of its quantities is known, in words."""
-        times = sum(2 * len(motion.time) - 1 for motion in self.cycles) if self.cycles else 0
-        words = COVERS[quantities()[name].cover].format(places=len(self.poses), times=times)
+        kind = quantities()[name].cover
+        times, places = 0, str(len(self.poses))
+        if kind == "cycles":
+            times = sum(2 * len(motion.time) - 1 for motion in self.cycles)
+            several = () if name == "cycle_time" else self.sizing.places
+            places = f", at {len(several)} places and turns" if several else ""
+        words = COVERS[kind].format(times=times, places=places)
         floor = dict(self.task.floors).get(name)
         return f"{words}; the proof is of at least {floor:.12g}" if floor else words
 
@@ -210,7 +224,7 @@ class Design:
         try:
             with alike(self.task.robot):
                 found = float(quantity.of(self))
-        except (UnreachablePose, SingularPose, ModelError) as error:
+        except PteronError as error:
             return np.nan, str(error)
         if not np.isnan(found):
             return found, ""

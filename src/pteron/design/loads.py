@@ -70,6 +70,9 @@ class CycleTable(Table):
     )
     direction: Three | None = Field(None, description="where that goes across")
     dwell: Least = Field(0.0, description="rest after it, s")
+    anywhere: bool = Field(
+        False, description="whether loads count at all its places and turns in the workspace"
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -88,6 +91,17 @@ class CycleTable(Table):
             if a == b:
                 raise ValueError(f"points: {list(a)} given twice, one after the other")
         return self
+
+    @property
+    def words(self) -> str:
+        """What it is, in a line: "4 points in 0.4 s, then 0.1 s of rest"."""
+        what = (
+            f"{len(self.points)} points" if self.points else f"pick-and-place x {self.scale:.12g}"
+        )
+        duration = self.times[-1] if self.times else self.duration
+        time = "as [motion] acceleration allows" if duration is None else f"in {duration:.12g} s"
+        rest = f", then {self.dwell:.12g} s of rest" if self.dwell else ""
+        return f"{what} {time}{rest}{', anywhere in the workspace' if self.anywhere else ''}"
 
     def motion(self, robot: Manipulator, middle: Array, acceleration: float) -> Motion:
         """Return the motion of a machine about a pose, at this acceleration if no time is given."""

@@ -13,10 +13,11 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.spec import ROUNDING, WorkspaceTable
+from pteron.design.region import placed_pose, workspace_region
+from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.kernels import Array
-from pteron.workspace import Box, Cylinder, Proof, Region, prove
+from pteron.workspace import Box, Proof, Region, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.samples import Samples, fixed_samples
 
@@ -69,7 +70,8 @@ class ProvedCube:
 
 def place_words(center: Array) -> str:
     """Return a place in words: "(0, 0, -812.4) mm"."""
-    return f"({', '.join(f'{round(1000.0 * x, 1) + 0.0:g}' for x in center)}) mm"
+    told = ", ".join(f"{round(1000.0 * x, 1) + 0.0:g}" for x in center)
+    return f"({told}) mm" if len(center) > 1 else f"{told} mm"
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
     floating = design.task.spec.workspace if design.task.floats else None
     for pose in design.task.orientations:
         if floating is None:
-            ends = (_whole(pose, center + side * edge) for side in (-0.5, 0.5))
+            ends = (placed_pose(pose, center + side * edge) for side in (-0.5, 0.5))
             region: Region = Box(*ends)
         else:
             share = edge / design.task.shape[1]
@@ -184,19 +186,6 @@ def workspace_proofs(design: Design) -> tuple[Proof, ...]:
         nearly = whole if smaller is None else _proof(design, smaller)
         found.append(nearly if nearly.holds else whole)
     return tuple(found)
-
-
-def workspace_region(asked: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
-    """Return a workspace that has its place, at the orientation of a pose, or a share of it."""
-    if asked.shape == "cylinder":
-        assert asked.radius is not None  # the shape says so
-        assert asked.height is not None
-        x, y, z = np.eye(3)["xyz".index(asked.axis)].tolist()
-        center = _whole(pose, np.array(asked.center))
-        return Cylinder(center, share * asked.radius, share * asked.height, (x, y, z))
-    low, high = (np.array(end) for end in asked.ends)
-    inset = 0.5 * (1.0 - share) * (high - low)
-    return Box(_whole(pose, low + inset), _whole(pose, high - inset))
 
 
 def counterexamples(design: Design, center: Array, edge: float) -> Samples:
@@ -236,8 +225,3 @@ def _least(design: Design, proof: Proof) -> float:
         return UNKNOWN
     rows = design.task.conditions.rows(design.geometry, proof.counterexample, design.side)
     return min(UNKNOWN, float(np.nan_to_num(rows, nan=UNKNOWN).min()))
-
-
-def _whole(pose: Array, position: Array) -> tuple[float, ...]:
-    """Return a position with the angle of a pose."""
-    return (*position.tolist(), *pose[len(position) :].tolist())

@@ -26,7 +26,7 @@ COVERS: dict[Cover, str] = {
     "places": "at {places} sampled poses",
     "directions": "exact over all directions, at {places} sampled poses",
     "bound": "bounded from above over all directions, to first order, at {places} sampled poses",
-    "cycles": "at {times} times of the cycles",
+    "cycles": "at {times} times of the cycles{places}",
 }
 """How far a quantity is known, in words."""
 
@@ -197,26 +197,26 @@ _OWN = {
     ),
     "cycle_force": Quantity(
         "N or N m",
-        "greatest force of a drive over the cycles, in the time that they are given",
-        lambda d: max(one.peak_forces.max() for one in d.sizings),
+        "greatest force of a drive over the cycles, one after the other with their rests",
+        lambda d: d.sizing.peak_forces.max(),
         cover="cycles",
     ),
     "cycle_speed": Quantity(
         "m/s or rad/s",
         "greatest speed of a joint over the cycles",
-        lambda d: max(one.peak_speeds.max() for one in d.sizings),
+        lambda d: d.sizing.peak_speeds.max(),
         cover="cycles",
     ),
     "cycle_energy": Quantity(
         "J",
         "energy that the drives give while they drive, all cycles once",
-        lambda d: sum(one.given_energy.sum() for one in d.sizings),
+        lambda d: d.sizing.given_energy.sum(),
         cover="cycles",
     ),
     "motor_margin": Quantity(
         "",
-        "least over joints and cycles of what the best motor of the list can do over what it must",
-        lambda d: min(fit.margin for fit in best_motors(d.sizings, d.task.motors)),
+        "least over joints of what the best motor of the list can do over what the cycles ask",
+        lambda d: min(fit.margin for fit in best_motors(d.sizing, d.task.motors)),
         cover="cycles",
     ),
 }

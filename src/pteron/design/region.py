@@ -8,6 +8,7 @@ import numpy as np
 
 from pteron.design.spec import WorkspaceTable
 from pteron.kernels import Array
+from pteron.workspace import Box, Cylinder, Region
 from pteron.workspace.samples import Shape
 
 _RING = 24
@@ -66,3 +67,21 @@ def _positions(workspace: WorkspaceTable, count: int) -> Array:
     positions = np.empty((len(found), 3))
     positions[:, order] = found
     return np.asarray(positions + np.array(workspace.center))
+
+
+def workspace_region(asked: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
+    """Return a workspace that has its place, at the orientation of a pose, or a share of it."""
+    if asked.shape == "cylinder":
+        assert asked.radius is not None  # the shape says so
+        assert asked.height is not None
+        x, y, z = np.eye(3)["xyz".index(asked.axis)].tolist()
+        center = placed_pose(pose, np.array(asked.center))
+        return Cylinder(center, share * asked.radius, share * asked.height, (x, y, z))
+    low, high = (np.array(end) for end in asked.ends)
+    inset = 0.5 * (1.0 - share) * (high - low)
+    return Box(placed_pose(pose, low + inset), placed_pose(pose, high - inset))
+
+
+def placed_pose(pose: Array, position: Array) -> tuple[float, ...]:
+    """Return a position with the angle of a pose."""
+    return (*position.tolist(), *pose[len(position) :].tolist())

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pteron.design.cycle_loads import best_motors
+from pteron.design.cycle_loads import MotorMargin, best_motors
 from pteron.design.design import Design
 from pteron.design.differences import (
     Change,
@@ -22,7 +22,6 @@ from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
-from pteron.motion import Fit
 
 if TYPE_CHECKING:
     import polars as pl
@@ -77,23 +76,30 @@ class ReportedDesign(Proved):
         return f"workspace placed about {place_words(design.cube.center)}"
 
     @property
+    def lacking(self) -> list[str]:
+        """The quantities that it does not have, and why."""
+        found = ((name, self.design.lack(name)) for name in self.design.task.asked)
+        return [f"{name}: none, because {lack}" for name, lack in found if lack]
+
+    @property
     def covers(self) -> list[str]:
-        """Each quantity that was asked for, how far it is known, and which motors serve."""
+        """The quantities that were asked for by how far they are known, and the motors."""
         design, task = self.design, self.design.task
-        lines = []
+        known: dict[str, list[str]] = {}
         for name in task.asked:
             value = design.quantity(name)
-            told = Change(name, value, value, task.unit(name)).shown(value)
-            if lack := design.lack(name):
-                lines.append(f"{name}: none, because {lack}")
-            else:
-                lines.append(f"{name} {told}: {design.cover(name)}")
+            if not design.lack(name):
+                told = Change(name, value, value, task.unit(name)).shown(value)
+                known.setdefault(design.cover(name), []).append(f"{name} {told}")
+        lines = [*self.lacking, *(f"{', '.join(told)}: {how}" for how, told in known.items())]
         if task.motors and "motor_margin" in task.asked and not design.lack("motor_margin"):
-            lines += map(_motor_words, best_motors(design.sizings, task.motors))
+            asked = (r.least for r in task.spec.requirements if r.quantity == "motor_margin")
+            least = max((one for one in asked if one is not None), default=1.0)
+            lines += map(_motor_words, best_motors(design.sizing, task.motors, least))
         return lines
 
 
-def _motor_words(fit: Fit) -> str:
+def _motor_words(fit: MotorMargin) -> str:
     return (
         f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.4g} can do "
         f"{fit.margin:.3g} times what it must, least in {fit.scarcest}"

@@ -332,6 +332,7 @@ def asked_words(spec: Spec) -> list[str]:
     ]
     if spec.payload is not None:
         lines.append(f"a payload of {spec.payload.mass:.12g} kg")
+    lines += [f"cycle {k}: {one.words}" for k, one in enumerate(spec.cycles, start=1)]
     speed, acceleration = spec.motion.speed, spec.motion.acceleration
     if {"force", "speed", "drive_load"} & set(spec.asked):
         lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")
