@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import product
 
 import numpy as np
 
 from pteron.design.quantities import COVERS, quantities
-from pteron.design.region import workspace_poses, workspace_region
+from pteron.design.region import placed_pose, workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING, WorkspaceTable
 from pteron.design.task import Task
 from pteron.design.worst_cases import worst_forces, worst_speeds
@@ -19,8 +21,15 @@ from pteron.kinematics.sampling import joint_limits, search_ball
 from pteron.manipulator import Manipulator, parameters
 from pteron.motion import Motion, Sizing, size
 from pteron.renamed import former_attribute
+from pteron.workspace import Box, Region
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.samples import cube, shape_samples
+
+_STARTS = 2
+"""Worst sampled poses about which a worse one is sought."""
+
+_ROUNDS = 4
+"""Halvings of the distance at which it is sought."""
 
 _IN_CUBE = 5
 """Sample poses along each edge of the largest cube, where that stands for the workspace."""
@@ -52,12 +61,12 @@ class Design:
         """Its numbers (G,), in the order of `equations.machine.numbers`."""
         return np.array(numbers(self.robot))
 
-    def values(self, what: str) -> Array:
-        """Return a function's first output at these poses."""
+    def values(self, what: str, poses: Array | None = None) -> Array:
+        """Return a function's first output at poses, those of `poses` if none are given."""
         function = self.task.function(what)
         own = {"geometry": self.geometry, "parameters": parameters(self.robot)}
         given = {name: value for name, value in own.items() if name in function.fixed}
-        found = function(self.poses, **given)
+        found = function(self.poses if poses is None else poses, **given)
         return np.asarray(found[0] if isinstance(found, tuple) else found)
 
     @cached_property
@@ -99,16 +108,52 @@ class Design:
         payload = self.task.spec.payload
         return self.robot if payload is None else payload.on(self.robot)
 
-    @cached_property
-    def forces(self) -> Array:
-        """The greatest force of each drive (N, n) at these poses, over all directions, N or N m."""
+    def forces(self, poses: Array) -> Array:
+        """Return the greatest force of each drive (N, n) over all directions, N or N m."""
         motion = self.task.spec.motion
-        return worst_forces(self.carrying, self.poses, motion.speed, motion.acceleration)
+        return worst_forces(self.carrying, poses, motion.speed, motion.acceleration)
 
-    @cached_property
-    def speeds(self) -> Array:
-        """The greatest speed of each joint (N, n) at these poses, over all directions."""
-        return worst_speeds(self.robot, self.poses, self.task.spec.motion.speed)
+    def speeds(self, poses: Array) -> Array:
+        """Return the greatest speed of each joint (N, n) over all directions."""
+        return worst_speeds(self.robot, poses, self.task.spec.motion.speed)
+
+    def region(self, pose: Array) -> Region:
+        """Return the workspace, or the cube, at the orientation of a pose."""
+        if self.workspace is not None:
+            return workspace_region(self.workspace, pose)
+        half = 0.5 * self.cube.edge
+        return Box(*(placed_pose(pose, self.cube.center + side * half) for side in (-1.0, 1.0)))
+
+    def worst(self, of: Callable[[Design, Array], Array], sign: float) -> float:
+        """Return the greatest, or for the sign -1 the least, value of a function of poses (N, m).
+
+        It is taken at the sampled poses, then nearer and nearer about the worst of them; NaN where
+        one of them has none.
+        """
+        values = sign * of(self, self.poses)
+        if np.isnan(values).any():
+            return np.nan
+        lengths, workspace = len(self.robot.platform.lengths), self.task.spec.workspace
+        offsets = np.zeros((3**lengths, self.robot.freedom))
+        offsets[:, :lengths] = list(product((-1.0, 0.0, 1.0), repeat=lengths))
+        starts = np.argsort(values, kind="stable")[-_STARTS:]
+        worst, most = self.poses[starts], values[starts]
+        regions = [self.region(pose) for pose in worst]
+        low, high = np.stack([region.box for region in regions], axis=1)
+        step = (high - low) / (workspace.samples if workspace is not None else _IN_CUBE)
+        for _ in range(_ROUNDS):
+            step = step / 2.0
+            around = np.clip(worst[:, None] + step[:, None] * offsets, low[:, None], high[:, None])
+            for region, pose, own in zip(regions, worst, around, strict=True):
+                own[~region.holds(own)] = pose
+            found = sign * of(self, around.reshape(-1, self.robot.freedom))
+            found = np.nan_to_num(found, nan=-np.inf).reshape(len(worst), -1)
+            best = found.argmax(axis=1)
+            here = np.arange(len(worst))
+            better = found[here, best] > most
+            worst = np.where(better[:, None], around[here, best], worst)
+            most = np.maximum(most, found[here, best])
+        return sign * float(most.max())
 
     @cached_property
     def cycles(self) -> tuple[Motion, ...]:

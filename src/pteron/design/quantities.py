@@ -14,18 +14,26 @@ from pteron.design.cycle_loads import best_motors, shortest_time
 from pteron.design.worst_cases import worst_position_errors
 from pteron.errors import shown
 from pteron.indices import INDICES, Index, stiffness
+from pteron.kernels import Array
+from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 from pteron.workspace import clearance
 
-Cover = Literal["machine", "proved", "places", "directions", "bound", "cycles"]
+Cover = Literal["machine", "proved", "lattice", "places", "directions", "bound", "cycles"]
 """How far a quantity is known: see `COVERS`."""
 
 COVERS: dict[Cover, str] = {
     "machine": "of the machine alone, exact",
     "proved": "found, and proved",
-    "places": "at {places} sampled poses",
-    "directions": "exact over all directions, at {places} sampled poses",
-    "bound": "bounded from above over all directions, to first order, at {places} sampled poses",
+    "lattice": "at {places} sampled poses",
+    "places": "at {places} sampled poses, and about the worst of them",
+    "directions": (
+        "exact over all directions, at {places} sampled poses and about the worst of them"
+    ),
+    "bound": (
+        "bounded from above over all directions, to first order, at {places} sampled poses and "
+        "about the worst of them"
+    ),
     "cycles": "at {times} times of the cycles{places}",
 }
 """How far a quantity is known, in words."""
@@ -53,7 +61,20 @@ class Quantity:
     about: str
     of: Callable[[Any], float]
     of_machine: Callable[[Manipulator], float] | None = None
-    cover: Cover = "places"
+    cover: Cover = "lattice"
+
+
+def _sampled(
+    unit: str,
+    about: str,
+    at: Callable[[Any, Array], Array],
+    *,
+    least: bool = False,
+    cover: Cover = "places",
+) -> Quantity:
+    """Return the greatest or least of a function of a design and poses (N, m) in the workspace."""
+    sign = -1.0 if least else 1.0
+    return Quantity(unit, about, lambda design: design.worst(at, sign), cover=cover)
 
 
 def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> Quantity:
@@ -82,47 +103,34 @@ def _size(design: Any) -> float:
     return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
 
 
-def _type_i(design: Any) -> float:
-    squares = design.values("squared_type_i")
-    least = float(squares.min())
-    return float(np.sqrt(least)) if least >= 0.0 else float("nan")
+def _type_i(design: Any, poses: Array) -> Array:
+    squares = design.values("squared_type_i", poses).min(axis=-1)
+    return np.asarray(np.where(squares >= 0.0, np.sqrt(np.abs(squares)), np.nan))
 
 
-def _type_ii(design: Any) -> float:
-    measures = design.values("type_ii")
-    crossed = measures.min() < 0.0 < measures.max()
-    return 0.0 if crossed else float(np.abs(measures).min())
-
-
-def _clearance(design: Any) -> float:
-    distances = clearance(design.robot, design.poses, on_failure="nan").distances
-    return float(distances.min(initial=np.inf))
+def _type_ii(design: Any, poses: Array) -> Array:
+    return np.asarray(np.maximum(design.side * design.values("type_ii", poses), 0.0))
 
 
 def _stroke(design: Any) -> float:
     return float((design.strokes / design.reference_strokes).max())
 
 
-def _drive_load(design: Any) -> float:
+def _drive_load(design: Any, poses: Array) -> Array:
     """Return the greatest share of what drives can do, force or speed."""
-    shares = [0.0]
-    for i, leg in enumerate(design.robot.legs):
-        drive = leg.drive
-        if drive is not None and drive.max_force is not None:
-            shares.append(float(design.forces[:, i].max()) / drive.max_force)
-        if drive is not None and drive.max_speed is not None:
-            shares.append(float(design.speeds[:, i].max()) / drive.max_speed)
-    return float(np.max(shares))
+    drives = [leg.drive or Drive() for leg in design.robot.legs]
+    forces = design.forces(poses) / [drive.max_force or np.inf for drive in drives]
+    speeds = design.speeds(poses) / [drive.max_speed or np.inf for drive in drives]
+    return np.asarray(np.maximum(forces, speeds).max(axis=-1))
 
 
-def _stiffness(design: Any) -> float:
+def _stiffness(design: Any, poses: Array) -> Array:
     elastic = design.task.spec.elasticity.elasticity
-    return float(stiffness(design.robot, design.poses, elastic, on_failure="nan").least.min())
+    return np.asarray(stiffness(design.robot, poses, elastic, on_failure="nan").least)
 
 
-def _accuracy(design: Any) -> float:
-    tolerances = design.task.spec.errors.tolerances
-    return float(worst_position_errors(design.robot, design.poses, tolerances).max())
+def _accuracy(design: Any, poses: Array) -> Array:
+    return worst_position_errors(design.robot, poses, design.task.spec.errors.tolerances)
 
 
 def _cycle_time(design: Any) -> float:
@@ -148,10 +156,13 @@ _OWN = {
     "size": Quantity(
         "m", "diagonal of the box that holds all joints at the poses of the workspace", _size
     ),
-    "type_i": Quantity("", "least type-I measure of a leg in the workspace", _type_i),
-    "type_ii": Quantity("", "least type-II measure in the workspace", _type_ii),
-    "clearance": Quantity(
-        "m", "least distance of two bodies in the workspace, with the file's radii", _clearance
+    "type_i": _sampled("", "least type-I measure of a leg in the workspace", _type_i, least=True),
+    "type_ii": _sampled("", "least type-II measure in the workspace", _type_ii, least=True),
+    "clearance": _sampled(
+        "m",
+        "least distance of two bodies in the workspace, with the file's radii",
+        lambda d, poses: clearance(d.robot, poses, on_failure="nan").least,
+        least=True,
     ),
     "stroke": Quantity(
         "",
@@ -159,34 +170,38 @@ _OWN = {
         "them, over its travel in the machine to begin with",
         _stroke,
     ),
-    "speed": Quantity(
+    "speed": _sampled(
         "m/s or rad/s",
         "greatest speed of a joint, at [motion] speed in any direction",
-        lambda d: d.speeds.max(),
+        lambda d, poses: d.speeds(poses).max(axis=-1),
         cover="directions",
     ),
-    "force": Quantity(
+    "force": _sampled(
         "N or N m",
         "greatest force of a drive, at [motion] speed and acceleration in any directions",
-        lambda d: d.forces.max(),
+        lambda d, poses: d.forces(poses).max(axis=-1),
         cover="directions",
     ),
-    "drive_load": Quantity(
+    "drive_load": _sampled(
         "",
         "greatest of these forces and speeds over what the file says a drive can do",
         _drive_load,
         cover="directions",
     ),
-    "stiffness": Quantity(
-        "N/m", "least stiffness at the tool, in its worst direction", _stiffness, cover="directions"
-    ),
-    "deflection": Quantity(
-        "m",
-        "most that the tool gives way under [elasticity] force",
-        lambda d: d.task.spec.elasticity.force / _stiffness(d),
+    "stiffness": _sampled(
+        "N/m",
+        "least stiffness at the tool, in its worst direction",
+        _stiffness,
+        least=True,
         cover="directions",
     ),
-    "accuracy": Quantity(
+    "deflection": _sampled(
+        "m",
+        "most that the tool gives way under [elasticity] force",
+        lambda d, poses: d.task.spec.elasticity.force / _stiffness(d, poses),
+        cover="directions",
+    ),
+    "accuracy": _sampled(
         "m", "most that the tool may be off by all [errors] together", _accuracy, cover="bound"
     ),
     "cycle_time": Quantity(
@@ -230,11 +245,12 @@ def quantities() -> dict[str, Quantity]:
 
 def _worst(index: Index) -> Quantity:
     """Return the worst value of an index over the workspace."""
-    extreme, word = (np.min, "least") if index.better == "more" else (np.max, "greatest")
-    return Quantity(
+    word = "least" if index.better == "more" else "greatest"
+    return _sampled(
         index.unit,
         f"{word} {index.title} in the workspace",
-        lambda design: float(extreme(design.values(index.name))),
+        lambda design, poses: design.values(index.name, poses),
+        least=index.better == "more",
     )
 
 

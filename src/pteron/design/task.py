@@ -25,9 +25,9 @@ from pteron.workspace.conditions import conditions
 from pteron.workspace.samples import Shape, cube
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
 
-_FORCES = "of all directions and places"
-"""What drives' forces and speeds are over, in the plan of a search that asks for them: searches
-that took those along axes at corners cannot be resumed."""
+_WORST = "about the worst sampled poses too, forces and speeds over all directions"
+"""Where quantities are taken, in the plan of a search that asks for sampled ones: earlier searches,
+which took them elsewhere, cannot be resumed."""
 
 _LATER = {"payload", "cycles", "errors", "elasticity", "motors"}
 """Keys that a spec may have since; without them its plan is as it was."""
@@ -101,8 +101,9 @@ class Task:
         plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
-        if {"force", "speed", "drive_load"} & set(self.asked):
-            plan["forces"] = _FORCES
+        known = quantities()
+        if {known[name].cover for name in self.asked} & {"places", "directions", "bound"}:
+            plan["quantities"] = _WORST
         return plan
 
     @cached_property

@@ -7,6 +7,7 @@ are given. A pose that the machine does not reach gives NaN.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations, product
 from math import sqrt
 
@@ -122,6 +123,7 @@ def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Toleranc
     return np.array([float(np.abs(units @ part).sum(axis=1).max()) for part in parts]) / cosine
 
 
+@lru_cache(maxsize=4)
 def _directions(count: int) -> tuple[Array, float]:
     """Return unit vectors (D, count), and the cosine of the angle within which each other has one.
 

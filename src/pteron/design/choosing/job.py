@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from pteron.bodies.tables import Count, Number, Six, Table, Three, Two
-from pteron.design.spec import Floor, Positive
+from pteron.design.loads import Positive
+from pteron.design.spec import Floor
 from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
 
