@@ -127,6 +127,9 @@ def test_it_is_exact_without_noise(name, processing):
     )
     size = np.sqrt((make_log(name).forces ** 2).mean(axis=0))
     assert (found.residual < 1e-8 * size).all()
+    texts = [", ".join(f"{x:.9g}" for x in np.ravel(v)) for v in found.arguments(machine(name))]
+    call = "set_payload({{{}}}, {{{}}}, {{{}}},".format(*texts)
+    assert found.call(machine(name)).startswith(call)
     # The machine that carries it has what was found on its platform.
     carried = found.carried_by(machine(name)).platform.inertia
     own = machine(name).platform.inertia

@@ -20,12 +20,14 @@ from pteron.manipulator.tables import (
     ReadingTable,
     StribeckTable,
     TiltingTable,
+    ToolTable,
     leg_table,
 )
 
 TABLES: dict[str, type[Table]] = {
     "the machine": MachineTable,
     "radii": RadiiTable,
+    "tools": ToolTable,
     "platform": PlatformTable,
     "a platform that tilts": TiltingTable,
     "bars": Bar,

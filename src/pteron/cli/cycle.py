@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import check_rate, load_robot, parsed_list
-from pteron.cli.motion_argument import given_pose, loaded, replayed
+from pteron.cli.motion_argument import Carried, given_pose, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
@@ -49,7 +50,8 @@ def cycle(
     jerk: str | None = None,
     tool_speed: float | None = None,
     tool_acceleration: float | None = None,
-    payload: float = 0.0,
+    payload: str | None = None,
+    tool: str | None = None,
     out: str | None = None,
     elbows: str | None = None,
     json: bool = False,
@@ -107,7 +109,8 @@ def cycle(
     """
     from pteron.motion import limits_of
 
-    machine = loaded(load_robot(robot, elbows), payload)
+    carried = Carried.of(payload, tool)
+    machine = carried.on(load_robot(robot, elbows))
     check_rate(rate)
     if out is not None:
         from pteron.tables import check_output
@@ -155,7 +158,7 @@ def cycle(
             )
         else:
             motion = standard_motion(machine, around, scale, limits, duration, optimal, step)
-    _deliver(machine, way, motion, limits, payload, out=out, as_json=json)
+    _deliver(machine, way, motion, limits, carried, out=out, as_json=json)
 
 
 def _expect_fitting(way: str, given: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
@@ -173,7 +176,7 @@ def _deliver(
     way: str,
     motion: Motion,
     limits: MotionLimits,
-    payload: float,
+    carried: Carried,
     *,
     out: str | None,
     as_json: bool,
@@ -197,7 +200,7 @@ def _deliver(
         data = {
             "robot": machine.name,
             "kind": way,
-            "payload": payload,
+            **asdict(carried),
             "duration": motion.duration,
             "samples": len(motion.time),
             "start": motion.pose[0].tolist(),

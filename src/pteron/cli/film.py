@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pteron.cli.arguments import STANDARD, load_robot
-from pteron.cli.motion_argument import cycle_of, loaded
+from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.terminal import plain, show, show_json, written
 from pteron.errors import DataError
@@ -23,7 +23,8 @@ def film(
     size: str = "960x720",
     turns: float = 0.0,
     forces: bool = False,
-    payload: float = 0.0,
+    payload: str | None = None,
+    tool: str | None = None,
     elbows: str | None = None,
     json: bool = False,
 ) -> None:
@@ -42,7 +43,6 @@ def film(
     --size WIDTHxHEIGHT: Width and height, pixels, both even.
     --turns: How often the eye goes round the machine; not of planar ones.
     --forces: Draw the drives' forces below.
-    --payload: At the tool's centre point, kg: the forces carry it.
 
     Examples
     --------
@@ -57,7 +57,8 @@ def film(
 
     checked_film(out)
     sides = _sides(size)
-    carrying = loaded(machine, payload)
+    carried = Carried.of(payload, tool)
+    machine, carrying = carried.mounted(machine), carried.on(machine)
     with spinner(f"A cycle of {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         state = motion.pose, motion.velocity, motion.acceleration

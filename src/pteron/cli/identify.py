@@ -73,7 +73,8 @@ def identify(
     """Identify a machine from recorded motions, and say whether the result can be trusted.
 
     With --payload, what a payload adds is found from the motion recorded with it and without: in
-    one log whose column payload is 0, then 1, or in two logs, such as without.csv with.csv.
+    one log whose column payload is 0, then 1, or in two logs, without.csv and with.csv, each with
+    that column, 0 throughout or 1. What is found is printed as the call set_payload of exported C.
 
     The folder gets identification.html to read, identification.json with all numbers, and the
     machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
@@ -220,6 +221,7 @@ def _show(result: Identification, files: Written) -> None:
         _errors(result),
         _values(result),
         *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
+        *_payload(result),
         *(f"[yellow]Note:[/yellow] {plain(one.message)}" for one in result.findings),
         *written(*files.paths),
     )
@@ -259,6 +261,18 @@ def _values(result: Identification) -> Table:
         rest = () if _narrow() else (relative, row.unit)
         made.add_row(plain(row.name), value, half, *rest, marks[row.status])
     return made
+
+
+def _payload(result: Identification) -> list[str]:
+    """Return how a controller and the commands take the payload that was found."""
+    from pteron.identification.payload import payload_in
+
+    found = payload_in(result)
+    if found is None:
+        return []
+    if not (found.real and found.felt):
+        return ["The payload is no real body's, or is not felt: record it longer, or faster."]
+    return [plain(f"The payload: {found.call(result.robot)}")]
 
 
 def _narrow() -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import STANDARD, parsed_numbers
@@ -92,14 +93,57 @@ def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any
     return values
 
 
-def loaded(robot: Manipulator, payload: float) -> Manipulator:
-    """Return a machine with a payload, kg."""
-    from pteron.motion import with_payload
-    from pteron.motion.payload import payload_warning
+@dataclass(frozen=True)
+class Carried:
+    """What --tool and --payload say that the platform carries."""
 
-    if doubt := payload_warning(robot, payload):
-        note(f"Warning: {doubt}")
-    return with_payload(robot, payload)
+    payload: float = 0.0
+    payload_center: tuple[float, ...] | None = None
+    payload_inertia: tuple[float, ...] = ()
+    tool: str | None = None
+
+    @classmethod
+    def of(cls, payload: str | None, tool: str | None) -> Carried:
+        """Read the options: a mass, perhaps its centre, and perhaps its inertia."""
+        if payload is None:
+            return cls(tool=tool)
+        mass, *more = payload.split("@")
+        try:
+            parts = [tuple(float(word) for word in part.split(",")) for part in more]
+            carried, count = float(mass), len(parts[0]) if parts else 3
+        except ValueError:
+            carried, count = 0.0, 0
+        if count != 3 or len(more) > 2:
+            raise DataError(
+                f"--payload: {payload!r} given; MASS, MASS@X,Y,Z or MASS@X,Y,Z@INERTIA expected, "
+                "kg, m and kg m^2, such as 0.5@0,0,-0.03"
+            )
+        return cls(carried, *parts, tool=tool)
+
+    def __str__(self) -> str:
+        """Return it in words behind a machine's name, empty if there is nothing."""
+        tool = [] if self.tool is None else [f"tool {self.tool}"]
+        at = "" if self.payload_center is None else f" at {_told(self.payload_center)} m"
+        told = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
+        return f" with {' and '.join(told)}" if told else ""
+
+    def on(self, robot: Manipulator) -> Manipulator:
+        """Return the machine with it."""
+        from pteron.motion import with_payload
+        from pteron.motion.payload import payload_warning
+
+        robot = self.mounted(robot)
+        body = self.payload, self.payload_center, self.payload_inertia or 0.0
+        carrying = with_payload(robot, *body)
+        if doubt := payload_warning(robot, self.payload):
+            note(f"Warning: {doubt}")
+        return carrying
+
+    def mounted(self, robot: Manipulator) -> Manipulator:
+        """Return the machine with the tool alone."""
+        from pteron.motion import with_tool
+
+        return robot if self.tool is None else with_tool(robot, self.tool)
 
 
 def note_unlikely(
@@ -130,3 +174,7 @@ def _check_rates(robot: Manipulator, rows: Table) -> None:
             f"{rows.source}: its poses go {far:.3g} m or rad, its velocities {meant:.3g} in the "
             "same time; t must be in s, and velocities per s"
         )
+
+
+def _told(values: Sequence[float]) -> str:
+    return f"({', '.join(f'{value:g}' for value in values)})"

@@ -33,7 +33,10 @@ ROBOT: A machine of the catalog (see pteron catalog) or a TOML file.
 --out FILE: Write the result to a .csv or .parquet file.
 --elbows SIGNS: The working mode, one sign a leg, such as ++-+.
 --on-failure: Stop at a row that fails, or leave its results empty.
---payload: At the tool's centre point, kg.
+--payload MASS@X,Y,Z: What the platform carries, kg, such as 0.5, which is at the tool's centre
+    point; 0.5@0,0,-0.03 has its centre of mass there in the platform's frame, m, and
+    0.5@0,0,-0.03@2e-4 its inertia about that, kg m^2. [default: none]
+--tool NAME: Mount a tool of the machine's file, one of its [[tools]].
 --cycle CYCLE: adept, the standard pick-and-place cycle, or a table of a motion.
 --duration: Of the standard cycle, s. [default: 10 m/s^2 at the tool]
 --scheduler ADDRESS: A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.

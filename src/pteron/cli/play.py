@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pteron.cli.arguments import STANDARD, load_robot
-from pteron.cli.motion_argument import loaded, played
+from pteron.cli.motion_argument import Carried, played
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import plain, show, show_json
 from pteron.errors import DataError
@@ -22,7 +22,8 @@ def play(
     *,
     out: str = "motion.html",
     cycle: str | None = None,
-    payload: float = 0.0,
+    payload: str | None = None,
+    tool: str | None = None,
     elbows: str | None = None,
     json: bool = False,
 ) -> None:
@@ -51,7 +52,7 @@ def play(
     """
     from pteron.report.write import checked_page, write_motion_page
 
-    machine = loaded(load_robot(robot, elbows), payload)
+    machine = Carried.of(payload, tool).on(load_robot(robot, elbows))
     if motion is not None and cycle is not None:
         raise DataError("MOTION and --cycle given; give one of them")
     checked_page(out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -9,7 +10,7 @@ from typer import Exit
 
 from pteron.cli.arguments import STANDARD, check_rate, load_robot
 from pteron.cli.destination import Destination
-from pteron.cli.motion_argument import cycle_of, loaded
+from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import is_terminal, note, plain, show, table, write
 from pteron.errors import DataError
@@ -31,7 +32,8 @@ def simulate(
     *,
     cycle: str = STANDARD,
     controller: Name = "computed-torque",
-    payload: float = 0.0,
+    payload: str | None = None,
+    tool: str | None = None,
     cycles: int = 1,
     duration: float | None = None,
     rate: float = 1000.0,
@@ -86,7 +88,10 @@ def simulate(
     check_rate(rate)
     destination = Destination(out, "simulation")
     destination.check()
-    carrying = loaded(machine, payload)
+    carried = Carried.of(payload, tool)
+    carrying = carried.on(machine)
+    at_tool = carried.payload_center is None
+    machine = carried.mounted(machine) if at_tool else carrying
     believed = None if model is None else _model(machine, model, elbows)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
@@ -99,18 +104,19 @@ def simulate(
                 "what happens with --anyway"
             )
         how: dict[str, Any] = {"sensors": Sensors(encoder=encoder), "delay": delay, "step": step}
-        how |= {"model": believed, "payload": payload, "method": method}
+        how |= {"model": believed, "payload": carried.payload if at_tool else 0.0, "method": method}
         found = simulated(machine, motion, acts, **how)
+        found = replace(found, payload=found.payload * 0.0 + carried.payload)
     for text in overloads:
         note(f"Warning: {text}")
     if found.stopped:
         note(f"Stopped {found.stopped}")
-    data = _data(found, controller, cycle, payload)
+    data = _data(found, controller, cycle, carried)
     destination.deliver(
         found.table(),
         data,
         lambda: _pictures(found),
-        partial(_tell, found, data, out),
+        partial(_tell, found, data, carried, out),
         as_json=json,
     )
     if found.stopped:
@@ -158,7 +164,7 @@ def _overloads(loaded: Manipulator, motion: Motion) -> tuple[str, ...]:
     return overloads(loaded, drive_forces(loaded, *state, smooth=True), rates)
 
 
-def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dict[str, Any]:
+def _data(found: Simulation, controller: str, cycle: str, carried: Carried) -> dict[str, Any]:
     import numpy as np
 
     robot, error = found.robot, found.error
@@ -170,7 +176,7 @@ def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dic
         "robot": robot.name,
         "cycle": cycle,
         "controller": controller,
-        "payload": payload,
+        **asdict(carried),
         "duration": float(found.time[-1]),
         "samples": len(found.time),
         "step": None if np.isnan(found.step) else found.step,
@@ -206,18 +212,17 @@ def _pictures(found: Simulation) -> dict[str, str]:
     return {"tracking.svg": svg_file(tracking), "forces.svg": svg_file(forces)}
 
 
-def _tell(found: Simulation, data: dict[str, Any], out: str | None) -> None:
+def _tell(found: Simulation, data: dict[str, Any], carried: Carried, out: str | None) -> None:
     """Print for a person; without --out a pipe gets the table."""
     if is_terminal() or out is not None:
-        _show(found, data)
+        _show(found, data, carried)
     else:
         write(found.table().write_csv())
 
 
-def _show(found: Simulation, data: dict[str, Any]) -> None:
+def _show(found: Simulation, data: dict[str, Any], carried: Carried) -> None:
     """Print for a person: how well it follows, and what its drives do."""
     robot = found.robot
-    carried = f" with {data['payload']:g} kg" if data["payload"] else ""
     steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
     errors = (
         (row["coordinate"], *(f"{1e6 * row[key]:.3g} u{unit}" for key in ("largest", "rms")))
@@ -232,7 +237,7 @@ def _show(found: Simulation, data: dict[str, Any]) -> None:
         drives.append((str(row["leg"]), *sizes, f"{row['at_its_limit']:.1%}" if limited else "-"))
     names = ("leg", "peak force", "RMS force", "peak speed", "peak power", "at its limit")
     show(
-        f"[bold]{plain(robot.name)}[/bold]{carried}, cycle {plain(data['cycle'])}, "
+        f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, cycle {plain(data['cycle'])}, "
         f"{plain(data['controller'])}: {data['duration']:.4g} s in {steps}",
         table("error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
         table(*names, rows=drives, numbers=names),

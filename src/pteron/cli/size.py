@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import rich.table
 from typer import Exit
 
 from pteron.cli.arguments import STANDARD, load_robot
 from pteron.cli.destination import Destination
-from pteron.cli.motion_argument import cycle_of, loaded
+from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.pose_ranges import pose_ranges
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, table
@@ -43,7 +43,8 @@ def size(
     robot: str,
     *,
     cycle: list[str] | None = None,
-    payload: float = 0.0,
+    payload: str | None = None,
+    tool: str | None = None,
     duration: float | None = None,
     dwell: list[float] | None = None,
     within: str | None = None,
@@ -107,16 +108,17 @@ def size(
     where = within or ("workspace" if cycles == [STANDARD] else "here")
     places: Any = {"workspace": "workspace", "here": None}
     places = places[where] if where in places else _box(machine, where)
-    carrying = loaded(machine, payload)
+    carried = Carried.of(payload, tool)
+    carrying = carried.on(machine)
     with spinner(f"Sizing the drives of {machine.name}"):
-        motions = [cycle_of(machine, one, duration) for one in cycles]
+        motions = [cycle_of(carrying, one, duration) for one in cycles]
         how: dict[str, Any] = {"dwell": dwell or [0.0], "friction": friction}
         found = sized(carrying, motions, places=places, **how)
         fits = choose(found, chosen, margin=margin)
     lacking = [*_weak(found, margin), *_unserved(found, fits, margin)]
     for text in lacking:
         note(f"Warning: {text}")
-    asked = _Asked(" and ".join(cycles), payload, where, margin)
+    asked = _Asked(" and ".join(cycles), carried, where, margin)
     # A list of motors is what its choice is asked for.
     destination.deliver(
         _fits_table(found, fits) if fits and out is None else found.table(),
@@ -134,7 +136,7 @@ class _Asked:
     """What was asked for, in the words of the options."""
 
     cycle: str
-    payload: float
+    carried: Carried
     within: str
     margin: float
 
@@ -185,7 +187,10 @@ def _data(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> dict[str, Any]
     total = found.power.sum(axis=-1)
     return {
         "robot": found.robot.name,
-        **asdict(asked),
+        "cycle": asked.cycle,
+        "within": asked.within,
+        "margin": asked.margin,
+        **asdict(asked.carried),
         "duration": found.duration,
         "dwell": found.dwell,
         "drives": found.table().to_dicts(),
@@ -246,14 +251,14 @@ def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
 
 def _show(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> None:
     """Print for a person: loads, power, motors, and the choice."""
-    carried = f" with {asked.payload:g} kg" if asked.payload else ""
     rest = f", {found.dwell:g} s of it at rest" if found.dwell else ""
     places = (
         f"The greatest of {len(found.places)} places and turns of the cycle, within "
         f"{plain(asked.within.replace('workspace', 'the workspace'))}."
     )
     show(
-        f"[bold]{plain(found.robot.name)}[/bold]{carried}, cycle {plain(asked.cycle)}: "
+        f"[bold]{plain(found.robot.name)}[/bold]{plain(str(asked.carried))}, "
+        f"cycle {plain(asked.cycle)}: "
         f"{found.duration:.4g} s{rest}",
         *([places] if found.places else []),
         _loads(found),
@@ -313,10 +318,10 @@ def _places(found: Sizing) -> list[rich.table.Table]:
     """Return where each leg's force and speed are greatest."""
     rows = []
     for one in _worst(found):
-        pose = " ".join(f"{value:.4g}" for value in np.round(one["pose"], 6) + 0.0)
+        pose = " ".join(f"{round(value, 6) + 0.0:.4g}" for value in one["pose"])
         leg = str(one["leg"]) if one["quantity"] == "peak_force" else ""
         rows.append(
-            (leg, _NAMED[one["quantity"]], pose, f"{np.degrees(one['turn']) % 360:.4g} deg")
+            (leg, _NAMED[one["quantity"]], pose, f"{math.degrees(one['turn']) % 360:.4g} deg")
         )
     names = "leg", "is greatest", f"about {' '.join(found.robot.coordinates)}", "turned"
     return [table(*names, rows=rows, numbers=("leg", "turned"))] if rows else []

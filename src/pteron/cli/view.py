@@ -12,6 +12,7 @@ from typing import Any
 from typer import echo
 
 from pteron.cli.arguments import load_robot
+from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show_json
 
@@ -23,7 +24,8 @@ def view(
     robot: str,
     *,
     motion: str | None = None,
-    payload: float = 0.0,
+    payload: str | None = None,
+    tool: str | None = None,
     compare: str | None = None,
     enlarge: float | None = None,
     host: str = "127.0.0.1",
@@ -55,12 +57,20 @@ def view(
     pteron view robot.toml --motion log.csv --port 9000 --no-browser
     pteron view calibrated/robot.toml --compare robot.toml --enlarge 50
     """
-    machine = load_robot(robot, elbows)
+    carried = Carried.of(payload, tool)
+    machine = carried.mounted(load_robot(robot, elbows))
+    if carried.payload_center is not None:  # the page's own payload is at the tool
+        machine, carried = carried.on(load_robot(robot, elbows)), Carried()
     with spinner(f"Preparing {machine.name}"):
         from pteron.viewer import view as opened
         from pteron.viewer.guard import is_here
 
-        shown: Any = {"motion": motion, "payload": payload, "compare": compare, "enlarge": enlarge}
+        shown: Any = {
+            "motion": motion,
+            "payload": carried.payload,
+            "compare": compare,
+            "enlarge": enlarge,
+        }
         viewer = opened(machine, host=host, port=port, **shown)
     # Ctrl-C is the usual way to end it.
     with viewer, suppress(KeyboardInterrupt):

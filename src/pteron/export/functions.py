@@ -30,6 +30,7 @@ from pteron.export.descriptions import (
 )
 from pteron.export.identified_parameters import Identified, base_program, read_identified
 from pteron.export.node_names import node_names
+from pteron.export.tools import tool_tables
 from pteron.kernels import (
     FUNCTIONS as COMPILED,
     LOADED,
@@ -247,6 +248,8 @@ def _exported(
     fixed = {name: table.values for name, table in zip(shared, tables, strict=True)}
     if specialised:
         given, tables = with_values(given, fixed), ()
+    elif what == _PAYLOAD:
+        tables += tuple(tool_tables(robot))
     graph = graph_of(given.function, given.inputs)
     machine = Machine.of(robot)
     states = _states(robot, given.inputs, fixed, controller)

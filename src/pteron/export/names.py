@@ -26,16 +26,16 @@ _TAKEN = {"all", "clean", "depend", "help", "install", "package", "test"} | {
 
 def prefix_of(robot: Manipulator) -> str:
     """Return the machine's name as an identifier of C and the stem of files."""
-    name = _safe(robot.name, "_")
+    name = safe_name(robot.name, "_")
     return name if name and not name[0].isdigit() else f"robot_{name}".rstrip("_")
 
 
 def identifier(robot: Manipulator) -> str:
     """Return a machine's name as an identifier in XML and the stem of XML files."""
-    return _safe(robot.name, "-") or "robot"
+    return safe_name(robot.name, "-") or "robot"
 
 
-def _safe(name: str, separator: str) -> str:
+def safe_name(name: str, separator: str) -> str:
     """Return a name in small ASCII letters, digits and a separator; empty if it has none.
 
     A name that is long, or loses more than its capitals and which separator it has, gets a

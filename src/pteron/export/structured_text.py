@@ -17,6 +17,7 @@ from pteron.export.descriptions import banner
 from pteron.export.functions import Asked, Exported, chosen, listed
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.names import prefix_of
+from pteron.export.tools import tool_lines
 from pteron.kernels import Graph, Port
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -123,6 +124,8 @@ def export_st(
 def _block(robot: Manipulator, name: str, item: Exported) -> str:
     comments = [*banner(robot, "Structured Text"), "", item.summary]
     comments.append(f"{item.operations} arithmetic operations.")
+    if item.name.startswith("set_payload"):
+        comments += tool_lines(robot)
     if any(node.operation == "atan2" for node in item.graph.nodes):
         comments.append("It calls ATAN2(y, x), which some controllers have in a library only.")
     return function_block(

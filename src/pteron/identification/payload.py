@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.bodies.inertia import PlanarInertia, SpatialInertia
+from pteron.bodies.inertia import PlanarInertia, SpatialInertia, inertia_count
 from pteron.bodies.parameters import LENGTH_POWERS
 from pteron.errors import DataError, ModelError
 from pteron.identification.errors import LogError
@@ -35,6 +36,9 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.payload import with_payload
 from pteron.reduction import BaseParameters
 from pteron.renamed import former_attribute
+
+if TYPE_CHECKING:
+    from pteron.identification.result import Identification
 
 _BOTH = frozenset(f"{name}_L" for name in LENGTH_POWERS)
 """Names of a payload's values: m_L, mgx_L, mgy_L, I_L, and those under a platform that tilts."""
@@ -121,9 +125,33 @@ class Payload:
         ModelError
             If no real body has its inertia.
         """
+        return with_payload(robot, *self.arguments(robot))
+
+    def arguments(self, robot: RobotLike) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
+        """Return its mass, centre of mass and central inertia, 0 where the forces show none.
+
+        `with_payload` takes them, and so does `set_payload` of exported code.
+        """
+        mass = np.nan if self.mass is None else self.mass
         center = (*(self.center_of_mass or ()), 0.0, 0.0, 0.0)[:3]
-        given = np.nan if self.mass is None else self.mass
-        return with_payload(robot, given, center, self.central_inertia or 0.0)
+        count = inertia_count(as_manipulator(robot).platform.inertia.kinds)
+        return mass, center, self.central_inertia or (0.0,) * count
+
+    def call(self, robot: RobotLike) -> str:
+        """Return the call of exported C that takes it, and the option of the commands.
+
+        Examples
+        --------
+        ``set_payload({0.35}, {0.017, -0.026, 0}, {0.0008}, parameters, loaded_parameters)``
+        """
+        mass, center, inertia = (
+            ", ".join(f"{value:.9g}" for value in np.ravel(part)) for part in self.arguments(robot)
+        )
+        option = "@".join((mass, center, inertia)).replace(" ", "")
+        return (
+            f"set_payload({{{mass}}}, {{{center}}}, {{{inertia}}}, parameters, loaded_parameters) "
+            f"in exported C; --payload {option} on the command line"
+        )
 
     @property
     def real(self) -> bool:
@@ -255,6 +283,25 @@ def identify_payload(
     hidden, too_many = unseen(model, estimate.deviations)
     if too_many:
         raise with_findings(too_little_motion(model, hidden, estimate, plans, fit[0]), fit)
+    return _payload(
+        model, estimate, isolate_faults(model, estimate, fit, plans), [one.findings for one in fit]
+    )
+
+
+def payload_in(found: Identification) -> Payload | None:
+    """Return the payload that `identify` found beside the machine; None without its mass."""
+    if "m_L" not in found.estimate.names:
+        return None
+    return _payload(found.model, found.estimate, found.fault_isolation, [found.findings])
+
+
+def _payload(
+    model: Model,
+    estimate: Estimate,
+    isolation: FaultIsolation,
+    findings: Sequence[Sequence[Finding]],
+) -> Payload:
+    """Return the payload among the values of a fit."""
     names = tuple(name for name in estimate.names if name in _BOTH)
     chosen = [estimate.names.index(name) for name in names]
 
@@ -272,8 +319,8 @@ def identify_payload(
         covariance=estimate.covariance[np.ix_(chosen, chosen)],
         estimate=estimate,
         residual=estimate.noise,
-        fault_isolation=isolate_faults(model, estimate, fit, plans),
-        findings=tuple(finding for one in fit for finding in one.findings),
+        fault_isolation=isolation,
+        findings=tuple(chain.from_iterable(findings)),
     )
 
 

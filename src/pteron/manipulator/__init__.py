@@ -16,7 +16,8 @@ from pteron.manipulator.parameters import (
 )
 from pteron.manipulator.radii import Radii as Radii
 from pteron.manipulator.saving import save as save
+from pteron.manipulator.tool import Tool as Tool
 from pteron.manipulator.variants import turned as turned, working_modes as working_modes
 from pteron.public import publish as _publish
 
-_publish(__name__, checked=True, classes=("Manipulator",))
+_publish(__name__, checked=True, classes=("Manipulator", "Tool"))

@@ -18,6 +18,7 @@ from pteron.legs.circles import perpendicular_to
 from pteron.legs.installed import kind_named, kind_names
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
+from pteron.manipulator.tool import Tool
 from pteron.platforms import Bar, Geared, Platform
 from pteron.platforms.kinds import TILTING
 from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
@@ -102,6 +103,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
     table = machine.platform or reading.rest(platform_table(motion), carried)
     platform = table and reading.platform(table)
     radii = machine.radii and reading.built("radii.", lambda: Radii(**machine.radii.model_dump()))
+    tools = reading.parts("tools", machine.tools or [], Tool)
     given = document.get("legs")
     legs = given if isinstance(given, list) else []
     built: list[Any] = [reading.leg(i, leg) for i, leg in enumerate(legs, start=1)]
@@ -109,9 +111,9 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
         # What was told already is not told again.
         name = "?" if machine.name is None else machine.name
         known = built if machine.legs is not None else [None] * len(platform.coordinates)
-        reading.faults += faults_of(name, platform, known)
+        reading.faults += faults_of(name, platform, known, tools)
         if not reading.faults:
-            return Manipulator(name, platform, tuple(built), machine.gravity, radii)
+            return Manipulator(name, platform, tuple(built), machine.gravity, radii, tuple(tools))
     subject = shown(source, bare=True, longest=1000)
     raise ModelError(told(reading.faults), subject=subject, faults=reading.faults)
 
@@ -157,9 +159,9 @@ class _Reading:
             return None
 
     def parts(self, key: str, given: Sequence[Any], kind: Callable[..., _Built]) -> list[_Built]:
-        """Return those of the platform's parts in a list of tables that can be."""
+        """Return those of the parts in a list of tables that can be."""
         found = [
-            self.built(f"platform.{key}, item {i}: ", partial(kind, **dict(part)))
+            self.built(f"{key}, item {i}: ", partial(kind, **dict(part)))
             for i, part in enumerate(given, start=1)
         ]
         return [part for part in found if part is not None]
@@ -178,8 +180,8 @@ class _Reading:
             given |= {"axis": table.axis or (0.0, 0.0, 1.0), "angle_order": table.angles or "rpy"}
             given |= {"center": table.center, "second_axis": table.second_axis}
         else:
-            more["bars"] = tuple(self.parts("bars", table.bars or [], Bar))
-            more["geared"] = tuple(self.parts("geared", table.geared or [], Geared))
+            more["bars"] = tuple(self.parts("platform.bars", table.bars or [], Bar))
+            more["geared"] = tuple(self.parts("platform.geared", table.geared or [], Geared))
             given["slides"] = bool(table.slides)
             if table.motion is None or table.axis is None:
                 return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from pteron.legs import LegKind
 from pteron.legs.protocol import breaches
 from pteron.manipulator.names import name_faults
 from pteron.manipulator.radii import Radii
+from pteron.manipulator.tool import Tool, tool_faults
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import Unit
 from pteron.platforms.parts import HeldPoint
@@ -52,6 +53,8 @@ class Manipulator:
         Acceleration of gravity in the base frame, m/s^2.
     radii : Radii, optional
         How thick its bodies are, for `pteron.workspace.clearance`.
+    tools : tuple of Tool
+        Tools that the platform can carry; `pteron.motion.with_tool` mounts one.
 
     Raises
     ------
@@ -65,6 +68,7 @@ class Manipulator:
     legs: tuple[LegKind, ...]
     gravity: Vector = STANDARD_GRAVITY
     radii: Radii | None = None
+    tools: tuple[Tool, ...] = ()
 
     def __hash__(self) -> int:
         """Hash once: the public functions look machines up at every call."""
@@ -72,7 +76,7 @@ class Manipulator:
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.platform, self.legs, self.gravity, self.radii))
+        return hash(tuple(getattr(self, field.name) for field in fields(self)))
 
     def __getstate__(self) -> dict[str, Any]:
         # Texts hash differently in every process.
@@ -80,10 +84,11 @@ class Manipulator:
 
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
-        if faults := faults_of(self.name, self.platform, legs):
+        if faults := faults_of(self.name, self.platform, legs, self.tools):
             raise ModelError(told(faults), faults=faults)
         legs = tuple(leg.under(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
+        object.__setattr__(self, "tools", tuple(self.tools))
         object.__setattr__(self, "platform", _held(self.platform, legs))
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
@@ -178,9 +183,14 @@ class Manipulator:
         return {n: u for what in names for n, u in zip(names[what], units[what], strict=True)}
 
 
-def faults_of(name: object, platform: Platform, legs: Sequence[LegKind | None]) -> list[str]:
+def faults_of(
+    name: object,
+    platform: Platform,
+    legs: Sequence[LegKind | None],
+    tools: Sequence[Tool] = (),
+) -> list[str]:
     """Return all that is wrong with a machine, a line each; a leg that is None is wrong itself."""
-    found = list(name_faults(name))
+    found = [*name_faults(name), *tool_faults(platform, tools)]
     freedom = len(platform.coordinates)
     if len(legs) != freedom:
         found.append(

@@ -58,6 +58,10 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
     radii = {} if robot.radii is None else {"radii": asdict(robot.radii)}
     legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
     machine = {"name": robot.name, "gravity": robot.gravity, **radii}
+    if robot.tools:
+        machine["tools"] = [
+            {k: v for k, v in asdict(tool).items() if v is not None} for tool in robot.tools
+        ]
     machine |= {"platform": platform, "legs": legs}
     found: dict[str, Any] = _plain(machine)
     return found

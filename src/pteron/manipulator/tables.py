@@ -20,6 +20,7 @@ from pteron.bodies.tables import (
     Number,
     PlanarBody,
     RodBody,
+    Six,
     Slider,
     SpatialBody,
     Table,
@@ -179,6 +180,22 @@ class RadiiTable(Table):
     platform: Number = Field(0.0, description="of the platform's arms, m")
 
 
+class ToolTable(Table):
+    """`[[tools]]`: a tool that the platform can carry, which --tool and `with_tool` mount."""
+
+    name: str = Field(description="what it is called")
+    point: Three = Field((0.0, 0.0, 0.0), description="its centre point in the platform frame, m")
+    mass: Number = Field(0.0, description="kg")
+    center_of_mass: Three | None = Field(
+        None, description="in the platform frame, m; its point if left out", examples=[[0.0] * 3]
+    )
+    central_inertia: Number | Six = Field(
+        0.0,
+        description="about its own centre of mass, kg m^2: along axis; where the platform tilts "
+        "[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]",
+    )
+
+
 class MachineTable(Table):
     """The whole file; each of `legs` is read by its own kind."""
 
@@ -190,6 +207,11 @@ class MachineTable(Table):
         None,
         description="how thick the bodies are round their centre lines, m: for clearances",
         examples=[{"guide": 0.01, "upper": 0.01, "lower": 0.008, "platform": 0.01}],
+    )
+    tools: list[ToolTable] = Field(
+        [],
+        description="tools that the platform can carry, beside what it is",
+        examples=[[{"name": "gripper", "point": [0.0, 0.0, -0.08], "mass": 0.3}]],
     )
     platform: PlatformTable = Field(description="what the legs carry")
     legs: list[Any] = Field(description="one table for each freedom of the platform")

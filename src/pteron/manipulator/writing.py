@@ -66,7 +66,7 @@ def _block(name: str, model: type[Table], given: Mapping[str, Any], explained: b
         if isinstance(value, list) and value and isinstance(value[0], Mapping):
             part = get_args(fields[key].annotation)[0]
             for one in value:
-                inner += ["", *_block(f"[{name}.{key}]", part, one, explained)]
+                inner += ["", *_block(f"[{f'{name}.' * bool(name)}{key}]", part, one, explained)]
         else:
             entries.append((f"{key} = {_toml(value)}", fields.get(key)))
     if explained:

@@ -10,7 +10,7 @@ from pteron.motion.joint_points import (
 )
 from pteron.motion.motion import Motion as Motion
 from pteron.motion.overloads import overloads as overloads
-from pteron.motion.payload import with_payload as with_payload
+from pteron.motion.payload import with_payload as with_payload, with_tool as with_tool
 from pteron.motion.simulation import (
     Sensors as Sensors,
     Simulation as Simulation,

@@ -29,6 +29,54 @@ def payload_warning(robot: Manipulator, mass: float) -> str:
     )
 
 
+def with_tool(robot: RobotLike, name: str) -> Manipulator:
+    """Return the machine with one of the tools of its file mounted.
+
+    The tool's centre point becomes `platform.tool`, and its body is part of the platform, as with
+    `with_payload`; the other tools are gone.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    name : str
+        The name of one of `robot.tools`.
+
+    Returns
+    -------
+    Manipulator
+
+    Raises
+    ------
+    DataError
+        If the machine has no such tool.
+    ModelError
+        If no body has the tool's inertia.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> import pteron
+    >>> from pteron.manipulator import Tool
+    >>> from pteron.motion import with_tool
+    >>> gripper = Tool("gripper", (0.0, 0.0, -0.08), 0.3, (0.0, 0.0, -0.03))
+    >>> robot = with_tool(replace(pteron.load("delta"), tools=(gripper,)), "gripper")
+    >>> robot.platform.tool
+    (0.0, 0.0, -0.08)
+    """
+    robot = as_manipulator(robot)
+    found = {tool.name: tool for tool in robot.tools}
+    if name not in found:
+        known = f"; it has {', '.join(found)}" if found else ", nor any other; add one as [[tools]]"
+        raise DataError(f"tool: {robot.name} has no tool {name!r}{known}")
+    tool = found[name]
+    bare = replace(robot, platform=replace(robot.platform, tool=tool.point), tools=())
+    try:
+        return with_payload(bare, tool.mass, tool.center, tool.central_inertia)
+    except (DataError, ModelError) as error:
+        raise ModelError(f"tool {name}: {error.message}", subject=robot.name) from None
+
+
 def with_payload(
     robot: RobotLike,
     mass: float,

@@ -1,0 +1,60 @@
+"""Numbers of a machine's tools as `set_payload` takes them: constants of C, lines of a comment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pteron.bodies.inertia import inertia_count
+from pteron.export.names import marked, safe_name
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator, Tool
+
+if TYPE_CHECKING:
+    from pteron.export.functions import NumberTable
+
+_TENSOR = "Ixx Ixy Ixz Iyy Iyz Izz"
+
+
+def tool_tables(robot: Manipulator) -> Iterator[NumberTable]:
+    """Yield each tool's mass, centre of mass and inertia as constants: arguments of a call."""
+    from pteron.export.functions import NumberTable
+
+    taken: set[str] = set()
+    for tool in robot.tools:
+        stem = f"tool_{safe_name(tool.name, '_')}"
+        stem = marked(stem, tool.name, len(stem) + 7) if stem in taken else stem
+        taken.add(stem)
+        for name, values in _arguments(robot, tool).items():
+            units = {"mass": ("kg",), "center": ("x, m", "y, m", "z, m")}.get(name)
+            kinds = _TENSOR.split() if len(values) > 1 else ["I"]
+            units = units or tuple(f"{kind}, kg m^2" for kind in kinds)
+            yield NumberTable(
+                f"{stem}_{name}", f"{_told(tool)}: {name} of set_payload.", units, values
+            )
+
+
+def tool_lines(robot: Manipulator) -> list[str]:
+    """Return a line for each tool: the arguments of `set_payload` while it is mounted."""
+    lines = []
+    for tool in robot.tools:
+        given = (
+            f"{name} := [{', '.join(map(repr, values.tolist()))}]"
+            for name, values in _arguments(robot, tool).items()
+        )
+        lines.append(f"{_told(tool)}: {', '.join(given)}.")
+    return lines
+
+
+def _arguments(robot: Manipulator, tool: Tool) -> dict[str, Array]:
+    count = inertia_count(robot.platform.inertia.kinds)
+    inertia = np.zeros(count) + np.array(tool.central_inertia)
+    return {"mass": np.array([tool.mass]), "center": np.array(tool.center), "inertia": inertia}
+
+
+def _told(tool: Tool) -> str:
+    """Return a tool's name and point for a comment, which the name cannot end."""
+    name = "".join(c if " " <= c <= "~" and c not in "*()" else "?" for c in tool.name)
+    return f"Tool {name}, its centre point at {' '.join(f'{x:g}' for x in tool.point)} m"

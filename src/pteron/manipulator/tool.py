@@ -1,0 +1,100 @@
+"""`Tool`: a tool that a machine's platform can carry, with its centre point and its inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pteron.bodies.inertia import inertia_count
+from pteron.bodies.vectors import Vector, number, numbers, vector
+from pteron.errors import ModelError
+from pteron.manipulator.names import name_faults
+from pteron.platforms import Platform
+from pteron.toml import told
+
+_SPATIAL = 6
+"""Numbers of a tensor: Ixx, Ixy, Ixz, Iyy, Iyz, Izz."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool: a body that the platform carries where it is mounted, and its centre point.
+
+    `pteron.motion.with_tool` mounts it; a controller's `set_payload` takes its last three numbers.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    point : vector
+        Its centre point in the platform's frame, m.
+    mass : float
+        kg; 0 of one that is in the platform's mass already.
+    center_of_mass : vector, optional
+        In the platform's frame, m; by default its centre point.
+    central_inertia : float or sequence of float
+        About its own centre of mass, kg m^2: along the platform's axis; of a platform that tilts
+        Ixx, Ixy, Ixz, Iyy, Iyz and Izz in the platform's frame. 0 is a point mass.
+
+    Raises
+    ------
+    ModelError
+        If it has no name, the mass is negative, or what must be a number is none.
+    """
+
+    name: str
+    point: Vector = (0.0, 0.0, 0.0)
+    mass: float = 0.0
+    center_of_mass: Vector | None = None
+    central_inertia: float | tuple[float, ...] = 0.0
+
+    def __post_init__(self) -> None:
+        faults, given = list(name_faults(self.name)), self.central_inertia
+        sound = {
+            "point": lambda: vector(self.point, "point"),
+            "mass": lambda: _not_negative(self.mass),
+            "center_of_mass": lambda: (
+                None
+                if self.center_of_mass is None
+                else vector(self.center_of_mass, "center_of_mass")
+            ),
+            "central_inertia": lambda: (
+                numbers(given, "central_inertia", _SPATIAL)
+                if isinstance(given, Sequence)
+                else number(given, "central_inertia")
+            ),
+        }
+        for key, value in sound.items():
+            try:
+                object.__setattr__(self, key, value())
+            except ModelError as error:
+                faults += error.faults
+        if faults:
+            raise ModelError(told(faults), faults=faults)
+
+    @property
+    def center(self) -> Vector:
+        """Its centre of mass in the platform's frame, m."""
+        return self.point if self.center_of_mass is None else self.center_of_mass
+
+
+def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
+    """Yield what is wrong with a machine's tools."""
+    names = [tool.name for tool in tools]
+    for i, tool in enumerate(tools, start=1):
+        if tool.name in names[: i - 1]:
+            yield f"tools, item {i}: name: {tool.name!r} is listed twice; give each its own name"
+        several = isinstance(tool.central_inertia, tuple)
+        if tool.central_inertia != 0.0 and several != (inertia_count(platform.inertia.kinds) > 1):
+            wanted = "Ixx, Ixy, Ixz, Iyy, Iyz, Izz" if platform.tilts else "one number"
+            yield (
+                f"tools, item {i}: central_inertia: {tool.central_inertia} given, {wanted} "
+                f"expected for a {platform.motion} platform"
+            )
+
+
+def _not_negative(value: object) -> float:
+    mass = number(value, "mass")
+    if mass < 0.0:
+        raise ModelError(f"mass: {mass:g} kg is negative; give 0 or more")
+    return mass
