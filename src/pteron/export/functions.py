@@ -249,7 +249,7 @@ def _exported(
     if specialised:
         given, tables = with_values(given, fixed), ()
     elif what == _PAYLOAD:
-        tables += tuple(tool_tables(robot))
+        tables += tuple(NumberTable(*table) for table in tool_tables(robot))
     graph = graph_of(given.function, given.inputs)
     machine = Machine.of(robot)
     states = _states(robot, given.inputs, fixed, controller)

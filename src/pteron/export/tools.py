@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +11,14 @@ from pteron.export.names import marked, safe_name
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, Tool
 
-if TYPE_CHECKING:
-    from pteron.export.functions import NumberTable
-
 _TENSOR = "Ixx Ixy Ixz Iyy Iyz Izz"
 
 
-def tool_tables(robot: Manipulator) -> Iterator[NumberTable]:
-    """Yield each tool's mass, centre of mass and inertia as constants: arguments of a call."""
-    from pteron.export.functions import NumberTable
+def tool_tables(robot: Manipulator) -> Iterator[tuple[str, str, tuple[str, ...], Array]]:
+    """Yield each tool's mass, centre of mass and inertia as constants: arguments of a call.
 
+    Each is a name, a comment, a comment for each number, and the numbers.
+    """
     taken: set[str] = set()
     for tool in robot.tools:
         stem = f"tool_{safe_name(tool.name, '_')}"
@@ -31,9 +28,7 @@ def tool_tables(robot: Manipulator) -> Iterator[NumberTable]:
             units = {"mass": ("kg",), "center": ("x, m", "y, m", "z, m")}.get(name)
             kinds = _TENSOR.split() if len(values) > 1 else ["I"]
             units = units or tuple(f"{kind}, kg m^2" for kind in kinds)
-            yield NumberTable(
-                f"{stem}_{name}", f"{_told(tool)}: {name} of set_payload.", units, values
-            )
+            yield f"{stem}_{name}", f"{_told(tool)}: {name} of set_payload.", units, values
 
 
 def tool_lines(robot: Manipulator) -> list[str]:
