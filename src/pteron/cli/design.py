@@ -32,8 +32,9 @@ def design(
     """Search for the dimensions of a machine that are best for what is asked of it.
 
     The file names the machine to begin with, the numbers that may change, what must be kept
-    (a workspace, floors and limits) and what is to be large or small: the largest cube, the links'
-    length, an index, the drives' force, ... A search of several objectives has a front of best
+    (a workspace, which may float, floors and limits) and what is bounded, large or small: the
+    largest cube, the links' length, an index, accuracy, stiffness, forces with a payload, cycles
+    and a list of motors, ... A search of several objectives has a front of best
     designs, each better than any other in something.
 
     A folder gets front.csv, front.parquet, front.png, report.md with what changed and what is

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -14,12 +15,13 @@ from pteron.design.quantities import quantities
 from pteron.design.region import workspace_shape
 from pteron.design.spec import FloorsTable, Spec
 from pteron.design.variables import Variable, moved, variables_of
-from pteron.errors import DataError, ModelError
+from pteron.errors import DataError, ModelError, UnlikelyValue
 from pteron.kernels import Array, Kernel, compile
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
 from pteron.maps.plan import RESULTS
 from pteron.motion import Motor, read_motors
+from pteron.motion.payload import payload_warning
 from pteron.toml import told
 from pteron.workspace.conditions import conditions
 from pteron.workspace.samples import Shape, cube
@@ -85,6 +87,8 @@ class Task:
             faults.append(f"motors: {error}")
         if faults:
             raise DataError(told(faults), subject=spec.source)
+        if spec.payload is not None and (text := payload_warning(robot, spec.payload.mass)):
+            warnings.warn(text, UnlikelyValue, stacklevel=2)
         return cls(spec, robot, variables, motors)
 
     def __getstate__(self) -> dict[str, Any]:
