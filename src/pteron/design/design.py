@@ -270,7 +270,8 @@ class Design:
             with alike(self.task.robot):
                 found = float(quantity.of(self))
         except PteronError as error:
-            return np.nan, str(error)
+            where = "in a cycle, " if quantity.cover == "cycles" else ""
+            return np.nan, f"{where}{error}"
         if not np.isnan(found):
             return found, ""
         out = int((~np.isfinite(self.joints).all(axis=-1)).sum())

@@ -190,7 +190,10 @@ def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError
     for name in (name for name in nearest.columns if name.startswith(MISSES) and row[name] > 0.0):
         if name == f"{MISSES}workspace":
             what = "the workspace" if task.spec.workspace else "a cube"
-            told.append(f"{what} is not kept ({_worst_condition(design)})")
+            if task.floats and 0.0 < design.scale < 1.0:
+                told.append(f"{what} fits nowhere, {design.scale:.3g} times its size does")
+            else:
+                told.append(f"{what} is not kept ({_worst_condition(design)})")
         else:
             asked = task.spec.requirements[int(name.split()[1]) - 1]
             told.append(f"{asked.words} is missed, {_value(design, asked.quantity, row)}")

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from pteron.bodies.inertia import inertia_count
 from pteron.bodies.tables import Number, Six, Table, Three
 from pteron.indices import ALUMINIUM, STEEL, Elasticity, Section, Tolerances
 from pteron.kernels import Array
@@ -34,6 +35,12 @@ def _numbers(given: Any) -> Any:
     return [given] if isinstance(given, int | float) else given
 
 
+def _one_or_six(given: Any) -> Any:
+    if isinstance(given, list | tuple) and len(given) != 6:
+        raise ValueError(f"{len(given)} numbers given, 1 or 6 expected: Ixx Ixy Ixz Iyy Iyz Izz")
+    return given
+
+
 Each = Annotated[tuple[Least, ...], BeforeValidator(_numbers), Field(min_length=1)]
 """One number of 0 or more for all legs, or one a leg."""
 
@@ -41,15 +48,20 @@ Each = Annotated[tuple[Least, ...], BeforeValidator(_numbers), Field(min_length=
 class PayloadTable(Table):
     """`[payload]`: what the platform carries."""
 
-    mass: Least = Field(description="kg")
+    mass: Least = Field(0.0, description="kg")
     center: Three | None = Field(
         None, description="its centre of mass in the platform's frame, m; the tool if left out"
     )
-    inertia: Number | Six = Field(0.0, description="about its centre of mass, kg m^2")
+    inertia: Annotated[Number | Six, BeforeValidator(_one_or_six)] = Field(
+        0.0, description="about its centre of mass, kg m^2: one number, or the tensor's six"
+    )
 
     def on(self, robot: Manipulator) -> Manipulator:
-        """Return a machine that carries it."""
-        return with_payload(robot, self.mass, self.center, self.inertia)
+        """Return a machine that carries it; a number is of a ball where the platform tilts."""
+        given = self.inertia
+        tensor = given if isinstance(given, tuple) else (given, 0.0, 0.0, given, 0.0, given)
+        tilts = inertia_count(robot.platform.inertia.kinds) > 1
+        return with_payload(robot, self.mass, self.center, tensor if tilts else tensor[5])
 
 
 class CycleTable(Table):

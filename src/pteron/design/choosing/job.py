@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
-from pteron.bodies.tables import Count, Number, Six, Table, Three, Two
-from pteron.design.loads import Positive
+from pteron.bodies.tables import Count, Number, Table, Three, Two
+from pteron.design.loads import PayloadTable, Positive
 from pteron.design.spec import Floor
 from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
@@ -72,14 +72,6 @@ class WorkspaceTable(Table):
         if self.turn is not None and not self.turn[0] < self.turn[1]:
             raise ValueError(f"turn: {list(self.turn)} given, [low, high] expected, rad")
         return self
-
-
-class PayloadTable(Table):
-    """`[payload]`: what the platform carries."""
-
-    mass: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="kg")
-    center: Three | None = Field(None, description="in the platform's frame, m; else the tool")
-    inertia: Number | Six = Field(0.0, description="about its centre of mass, kg m^2")
 
 
 class CycleTable(Table):
