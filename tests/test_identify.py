@@ -503,6 +503,15 @@ def test_the_grade_is_that_of_the_worst_actuator(error, noise, grade):
     assert ("worst" in " ".join(verdict.reasons)) == (grade != "trustworthy")
 
 
+def test_a_trusted_error_above_the_noise_is_told_beside_it():
+    told, quiet = (
+        " ".join(verdict_of([prediction((0.04, 0.01), noise)], repeats=False).reasons)
+        for noise in ((0.02, 0.01), (0.03, 0.01))
+    )
+    assert "actuator 1 is 2 times the noise: the model misses 3.5 % of its force beyond" in told
+    assert "times the noise" not in quiet
+
+
 @pytest.mark.parametrize(
     ("uncertain", "spoiled", "grade"),
     [

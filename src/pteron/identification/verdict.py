@@ -181,7 +181,12 @@ def _of_prediction(prediction: Prediction) -> Opinion:
             f"without them the NRMS is {robust} %, which is what counts."
         )
         found.steps.append("Forces stand out: --estimator huber counts such samples less.")
-    if found.grade != "trustworthy":
+    if found.grade == "trustworthy" and ratio[worst] > AT_THE_FLOOR:
+        found.reasons.append(
+            f"The error of actuator {worst + 1} is {ratio[worst]:.2g} times the noise: the model "
+            f"misses {missed[worst]:.1f} % of its force beyond it; up to {SMALL:g} % is trusted."
+        )
+    elif found.grade != "trustworthy":
         found.reasons.append(
             f"Actuator {worst + 1} is the worst: the model misses {missed[worst]:.1f} % of its "
             f"force beyond the noise; up to {SMALL:g} % is trusted, above {LARGE:g} % not."

@@ -35,7 +35,8 @@ def screw_lengths(robot: RobotLike, pose: PoseLike) -> PerJoint:
     -------
     array, shape (..., n)
         m: a motor that turns its screw for a length L is to go to L less this. 0 for legs without
-        `screw_lead`.
+        `screw_lead`. LinuxCNC's genhexkins goes to L and this: there `screw-lead` has the other
+        sign.
 
     Examples
     --------
