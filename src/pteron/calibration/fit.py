@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 _START = 1e-4
 """Noise that is assumed before any is found, m and rad."""
 
-_FLOOR = 1e-7
+FLOOR = 1e-7
 """Least noise, m and rad: with less, rounding would outweigh the tolerances."""
 
 _CHUNK = 4096
@@ -159,7 +159,7 @@ class Fitter:
         setup = self.given.setup.noise
         sought = [kind for kind in self.given.kinds if kind not in setup]
         guess, total = self.begin, np.zeros(len(self.prior))
-        noise = {kind: max(setup.get(kind, _START), _FLOOR) for kind in KINDS}
+        noise = {kind: max(setup.get(kind, _START), FLOOR) for kind in KINDS}
         if before is not None:
             guess, total, noise = before.guess, before.total, before.noise
         kept = np.ones(len(self.given), dtype=bool)
@@ -350,5 +350,5 @@ class Fitter:
             values = np.abs(fit.residuals[own])
             rms = float(np.sqrt((values**2).sum() / max(left, 1.0)))
             middle = float(np.median(values)) / 0.6745 * np.sqrt(count / max(left, 1.0))
-            found[kind] = max(middle if rms > 2.0 * middle and count > 20 else rms, _FLOOR)
+            found[kind] = max(middle if rms > 2.0 * middle and count > 20 else rms, FLOOR)
         return found

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.calibration.fit import BEYOND, Fit, Fitter
+from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
 from pteron.calibration.guess import Block, Guess, Unknown
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.result import Finding
@@ -108,7 +108,8 @@ def _shown(
     left = remaining(r)
     # Noise that was found has the fault in it: a middle row's is nearer the truth.
     squares = np.einsum("nk,nk->n", left, left) / np.maximum(at.measured.sum(axis=1), 1)
-    variance = max(float(np.median(squares)) / 0.6, 1e-12)
+    least = min(FLOOR / fit.noise[kind] for kind in given.kinds) ** 2
+    variance = max(float(np.median(squares)) / 0.6, least)
 
     def score(columns: Array) -> tuple[float, Array]:
         """Return how the squared residuals fall with columns (N, K, c), and their amounts."""
