@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mechanisms import NIGHTLY
 from PIL import Image
+from scipy.spatial import ConvexHull
 from test_viewer import opened, slide, wait_for
 from tilting import machine
 
@@ -168,3 +169,13 @@ def test_a_report_has_slices_of_angles_and_the_tilt(name, tmp_path):
     text = page.read_text("utf-8")
     for words in ("<figcaption>roll, pitch</figcaption>", "to every side", "<b>R</b><sub>z</sub>"):
         assert words in text
+
+
+def test_a_platform_that_is_not_flat_is_drawn_as_its_hull():
+    robot = pteron.load("rubin-m2-hexapod")
+    (part,) = joint_points(robot, pteron.random_poses(robot, 2)).parts
+    a, b, c = np.moveaxis(part.corners[1][part.triangles], 1, 0)
+    volume = (np.cross(a, b) * c).sum() / 6.0  # of a closed surface seen from outside
+    assert volume == pytest.approx(ConvexHull(part.corners[1]).volume)
+    flat = pteron.load("wrist")
+    assert joint_points(flat, pteron.random_poses(flat, 2)).parts[0].triangles is None

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull  # type: ignore[import-untyped]
 
 from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics
@@ -19,6 +21,9 @@ _SAME = 1e-9
 
 _COINCIDENT = 1e-9
 """Distance within which two points of the platform count as one, m."""
+
+_FLAT = 1e-6
+"""Thickness over width of a part below which it is flat."""
 
 _SPARE = 0.25
 """Length of a guide without limits, beyond what poses use, as a share of the leg's size."""
@@ -34,6 +39,21 @@ class Part(NamedTuple):
     """(..., 3): P, or the hinge of a part that does not turn."""
     corners: Array
     """(..., k, 3), in order round the platform's axis; none is at the hub."""
+
+    @property
+    def triangles(self) -> NDArray[np.intp] | None:
+        """The faces (F, 3) about all corners, as numbers of these; None where they lie in a plane.
+
+        Seen from outside their corners follow each other anticlockwise.
+        """
+        corners = self.corners.reshape(-1, *self.corners.shape[-2:])[0]
+        away = corners - corners.mean(axis=0)
+        if len(away) < 4 or np.linalg.matrix_rank(away, _FLAT * np.abs(away).max()) < 3:
+            return None
+        hull = ConvexHull(away)
+        a, b, c = np.moveaxis(away[hull.simplices], 1, 0)
+        inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
+        return np.asarray(np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices))
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,6 @@ _SQUARES = 10.0
 Box = tuple[float, float, float, float]
 """Left, bottom, width and height, as shares of a figure."""
 
-_FLAT = 1e-6
-"""Thickness over width of an outline below which it is flat."""
-
 _NONE = 1e-9
 """Share of gravity that lies in a plane, below which none is drawn there."""
 
@@ -234,19 +231,12 @@ def _block(center: Array, along: Array, size: float) -> list[Array]:
 
 def _draw_part(sheet: MachineAxes, part: Part) -> None:
     if len(part.corners) > 2:
-        sheet.faces(_flat_faces(part.corners), REACH, 0.55)
+        solid = part.triangles
+        faces = [part.corners] if solid is None else list(part.corners[solid])
+        sheet.faces(faces, REACH, 0.55)
     for corner in part.corners:
         sheet.line(np.array([part.hub, corner]), REACH, 2.4, raised=-2e-3)
     sheet.mark(part.hub, PAPER, REACH, 5.0)
-
-
-def _flat_faces(outline: Array) -> list[Array]:
-    """Return an outline (k, 3) as one face where it is flat, else as triangles about its middle."""
-    middle = outline.mean(axis=0)
-    sizes = np.linalg.svd(outline - middle)[1]
-    if len(outline) == 3 or sizes[-1] <= _FLAT * sizes[0]:
-        return [outline]
-    return [np.array([middle, *pair]) for pair in pairwise([*outline, outline[0]])]
 
 
 def _draw_frame(sheet: MachineAxes, points: JointPoints, size: float, angle: str) -> None:

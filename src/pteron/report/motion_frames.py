@@ -157,7 +157,14 @@ def scene(
         "bars": [None if bar is None else seen(APART * bar) for bar in points.bars],
         "rams": points.rams,
         "base": seen(base_outline(home, guides)),
-        "parts": [{"hub": seen(part.hub), "corners": seen(part.corners)} for part in points.parts],
+        "parts": [
+            {
+                "hub": seen(part.hub),
+                "corners": seen(part.corners),
+                "triangles": None if part.triangles is None else part.triangles.tolist(),
+            }
+            for part in points.parts
+        ],
         "position": seen(points.reference),
         "tool": seen(points.tool) if any(robot.platform.tool) else None,
         "time": _plain(shown.time),

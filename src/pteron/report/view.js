@@ -28,7 +28,7 @@
   const chains = deep(data.chains), slides = data.slides;
   const first = chains.map((lines) => lines.map((chain) => chain[0]));
   // The platform's parts: arms from a hub to corners, in each frame.
-  const parts = data.parts.map((part) => ({ hub: deep(part.hub), corners: deep(part.corners) }));
+  const parts = data.parts.map((part) => ({ ...part, hub: deep(part.hub), corners: deep(part.corners) }));
   const position = deep(data.position), tool = data.tool && deep(data.tool), base = deep(data.base);
   const way = data.closed ? (tool || position).concat([(tool || position)[0]]) : tool || position;
   const baseAxes = deep([[1, 0, 0], [0, 1, 0], [0, 0, 1]]).slice(0, data.planar ? 2 : 3);
@@ -232,7 +232,8 @@
     else if (base.length > 1) put(base, () => line(...base, colors.rail, Math.max(2.5, 0.011 * size * pixel(base[0])[3])), -0.03);
     for (const part of parts) {
       const hub = part.hub[k], plate = part.corners[k];
-      if (plate.length > 2) put(plate, () => solid(prism(plate, axes[k][2], 0.014 * size), colors.reach, 0.85));
+      const faces = () => part.triangles ? part.triangles.map((three) => three.map((i) => plate[i])) : prism(plate, axes[k][2], 0.014 * size);
+      if (plate.length > 2) put(plate, () => solid(faces(), colors.reach, 0.85));
       for (const corner of plate) put([hub, corner], () => line(hub, corner, colors.reach, Math.max(2, 0.012 * size * pixel(corner)[3])));
       put([hub], () => ball(hub, colors.reach, 0.009 * size), 0.012);
     }

@@ -21,7 +21,7 @@ from pteron.motion import Guide, JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_points
 from pteron.plots.canvas import GRID, INK, LEG_COLORS, MUTED, REACH
 from pteron.plots.machine_drawing import grid_step
-from pteron.viewer.meshes import Mesh, ball, cube, cylinder, fan
+from pteron.viewer.meshes import Mesh, ball, cube, cylinder
 from pteron.viewer.solids import (
     Copies,
     arrows,
@@ -89,8 +89,8 @@ class Scene:
         self._add_copies("balls", ball(), moving.balls)
         if len(moving.blocks.positions):
             self._add_copies("blocks", cube(), moving.blocks)
-        for k, outline in enumerate(moving.faces):
-            self._add_mesh(f"face{k}", fan(outline), REACH, 0.5)
+        for k, face in enumerate(moving.faces):
+            self._add_mesh(f"face{k}", face, REACH, 0.5)
         count = robot.joint_count * points.chain.shape[-2]
         for name, most in (("screws", count), ("forces", robot.joint_count)):
             none = np.zeros((most, 3))
@@ -111,9 +111,9 @@ class Scene:
         self._place("balls", moving.balls)
         if "blocks" in self._nodes:
             self._place("blocks", moving.blocks)
-        for k, outline in enumerate(moving.faces):
+        for k, (corners, _) in enumerate(moving.faces):
             if f"face{k}" in self._nodes:
-                self._nodes[f"face{k}"].vertices = fan(outline)[0].astype(np.float32)
+                self._nodes[f"face{k}"].vertices = corners.astype(np.float32)
         self._show_compared(points, state.pose)
         if self._nodes["screws"].visible:
             self._place_arrows("screws", *self._screws(state, points))
@@ -189,8 +189,8 @@ class Scene:
         still = still_solids(points, self._guides, self.size, corner)
         self._add_copies("still-bars", cylinder(), still.bars)
         self._add_copies("still-balls", ball(), still.balls)
-        for k, outline in enumerate(still.faces):
-            self._add_mesh(f"base{k}", fan(outline), MUTED, 0.18)
+        for k, face in enumerate(still.faces):
+            self._add_mesh(f"base{k}", face, MUTED, 0.18)
         self._add_grid(points, low, high)
         gravity = np.array(self._robot.gravity)
         if points.plane is not None:

@@ -20,6 +20,7 @@ from pteron.motion import Guide, JointPoints
 from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH
 from pteron.plots.machine_drawing import base_outline, rods
 from pteron.plots.space_axes import upright
+from pteron.viewer.meshes import Mesh, fan
 
 _LINK, _ROD, _ARM, _GUIDE, _AXIS = 0.011, 0.006, 0.007, 0.008, 0.003
 _JOINT, _CYLINDER = 0.016, 0.014
@@ -73,12 +74,12 @@ class Copies:
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """The bodies of a machine; a face (k, 3) is the outline of a plane part of the platform."""
+    """The bodies of a machine; faces are of the platform's parts, or of the base."""
 
     bars: Copies
     balls: Copies
     blocks: Copies
-    faces: tuple[Array, ...]
+    faces: tuple[Mesh, ...]
 
 
 def machine_size(points: JointPoints, guides: Sequence[Guide]) -> float:
@@ -111,7 +112,8 @@ def moving_solids(points: JointPoints, guides: Sequence[Guide], size: float) -> 
     bars.append((points.reference, points.tool, _ROD * size, REACH))
     balls.append((points.tool, 0.8 * _JOINT * size, INK))
     balls.append((points.reference, 0.8 * _JOINT * size, PAPER))
-    faces = tuple(part.corners for part in points.parts if len(part.corners) > 2)
+    parts = [(part.corners, part.triangles) for part in points.parts if len(part.corners) > 2]
+    faces = tuple(fan(corners) if solid is None else (corners, solid) for corners, solid in parts)
     return Solids(_bars(bars), _balls(balls), _blocks(blocks, size), faces)
 
 
@@ -135,7 +137,9 @@ def still_solids(
         bars.append((start, end, _ARM * size, MUTED))
     for axis in np.eye(3):
         bars.append((corner, corner + _FRAME * size * axis, _AXIS * size, INK))
-    return Solids(_bars(bars), _balls(balls), _blocks([], size), (base,) if len(base) > 2 else ())
+    return Solids(
+        _bars(bars), _balls(balls), _blocks([], size), (fan(base),) if len(base) > 2 else ()
+    )
 
 
 def arrows(
