@@ -132,6 +132,15 @@ def test_every_machine_has_motions_that_keep_the_limits(name: str):
         assert margins(joints, limits).kept
 
 
+def test_rams_of_little_stroke_have_motions_too():
+    """Some random centers keep the limits so barely that no motion about them does."""
+    robot = pteron.load("rubin-m2-hexapod")
+    motion = random_excitation(robot, harmonics=2, period=4.0, seed=1)
+    assert margins(motion, Limits.of(robot)).kept
+    poses = motion.at(np.linspace(0.0, 4.0, 50)).pose
+    assert (np.ptp(poses, axis=0) > 1e-5).all()
+
+
 @pytest.mark.parametrize("name", gated(["five-bar", "par4"]))
 def test_a_motion_of_every_machine_can_be_improved(name: str):
     found = optimal_excitation(

@@ -109,7 +109,8 @@ def _shown(
     # Noise that was found has the fault in it: a middle row's is nearer the truth.
     squares = np.einsum("nk,nk->n", left, left) / np.maximum(at.measured.sum(axis=1), 1)
     least = min(FLOOR / fit.noise[kind] for kind in given.kinds) ** 2
-    variance = max(float(np.median(squares)) / 0.6, least)
+    took = float(np.trace(covariance @ (flat.T @ flat))) / at.measured.sum()  # by the fit
+    variance = max(float(np.median(squares)) / (0.6 * (1.0 - took)), least)
 
     def score(columns: Array) -> tuple[float, Array]:
         """Return how the squared residuals fall with columns (N, K, c), and their amounts."""

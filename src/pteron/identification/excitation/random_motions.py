@@ -118,10 +118,16 @@ def random_excitation(
 
     for _ in range(_HALVINGS):
         rest = still(middle + offset)
-        if is_clear(rest, limits, 2, _COARSE_CLEAR):
-            return _largest(rest, shape, limits)
+        if is_clear(rest, limits, 2, _COARSE_CLEAR) and (found := _largest(rest, shape, limits)):
+            return found
         offset = 0.5 * offset
-    return _largest(still(middle), shape, limits)
+    found = _largest(still(middle), shape, limits)
+    if found is None:
+        raise ModelError(
+            f"limits: no motion of {robot.name} about its home pose keeps them all; loosen those "
+            "that it barely keeps at rest"
+        )
+    return found
 
 
 def sizes(robot: Manipulator, space: Space) -> Array:
@@ -159,8 +165,8 @@ def within_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None
     return _scaled(motion, low)
 
 
-def _largest(still: FourierMotion, shape: Array, limits: Limits) -> FourierMotion:
-    """Return the motion of that shape about a center, as large as it can be."""
+def _largest(still: FourierMotion, shape: Array, limits: Limits) -> FourierMotion | None:
+    """Return the motion of that shape about a center, as large as it can be; None without room."""
 
     def sized(scale: float) -> FourierMotion:
         return still.with_coefficients(np.vstack([still.center, scale * shape]))
@@ -175,13 +181,7 @@ def _largest(still: FourierMotion, shape: Array, limits: Limits) -> FourierMotio
         high *= 2.0
     for _ in range(_BISECTIONS):
         low, high = _halved(kept, low, high)
-    found = within_limits(sized(low), limits)
-    if found is None or low == 0.0:
-        raise ModelError(
-            f"limits: no motion of {still.robot.name} about its home pose keeps them all; loosen "
-            "those that it barely keeps at rest"
-        )
-    return found
+    return within_limits(sized(low), limits) if low else None
 
 
 def _halved(kept: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
