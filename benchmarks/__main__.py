@@ -45,6 +45,7 @@ _SCRIPTS = {
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",
     "Maps of eight million poses": "maps.py",
+    "A machine for a job": "choosing.py",
     "Twenty thousand damaged files": "mutants.py",
     "From a log to a running machine": "identification/chain.py",
     "An owner's way": "identification/owner.py",

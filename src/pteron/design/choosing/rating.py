@@ -59,7 +59,7 @@ class Rating:
         Quantities by name: objectives, margins, error, deflection.
     misses : dict
         By how much each bound is missed, as a share of it: empty where all is kept.
-    told : list of str
+    told : dict
         The same in words.
     robot : Manipulator or None
         The machine with its drives, without payload.
@@ -76,7 +76,7 @@ class Rating:
     values: Array
     figures: dict[str, float] = field(default_factory=dict)
     misses: dict[str, float] = field(default_factory=dict)
-    told: list[str] = field(default_factory=list)
+    told: dict[str, str] = field(default_factory=dict)
     robot: Manipulator | None = None
     middle: Array = field(default_factory=lambda: np.zeros(0))
     options: tuple[Option, ...] = ()
@@ -126,7 +126,7 @@ class Case:
             robot, found.middle = self.kind.machine(values)
         except ModelError:
             found.stage = 1
-            _miss(found, "machine", 1.0, "there is no such machine")
+            _miss(found, "machine", 1.0, "numbers that no machine has")
             return found
         found.robot = robot
         for stage, judge in enumerate((self._reach, self._room, self._drive, self._rest), start=1):
@@ -143,9 +143,10 @@ class Case:
         measure = np.asarray(numeric(robot, "type_ii")(poses)[0])
         least = float(squares.min())
         found.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
-        _below(found, "squared type-I measure", least, (_FLOOR * floors.type_i) ** 2)
         if least < 0.0:
+            _miss(found, "reach", 1.0 - least, "a leg that does not reach the whole workspace")
             return
+        _below(found, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
         sign = np.sign(np.nanmedian(measure))
         lowest = float((sign * measure).min())
         found.figures["type_ii"] = lowest
@@ -154,7 +155,7 @@ class Case:
         _below(found, "passive joints' margin to their limits", share, 0.0)
         joints = inverse_kinematics(robot, poses, on_failure="nan")
         if not np.isfinite(joints).all():
-            _miss(found, "reach", 1.0, "a leg does not reach the workspace")
+            _miss(found, "reach", 1.0, "a leg that does not reach the whole workspace")
             return
         legs = []
         for leg, low, high in zip(robot.legs, joints.min(axis=0), joints.max(axis=0), strict=True):
@@ -191,7 +192,7 @@ class Case:
         if cell.low is not None and cell.high is not None:
             beyond = np.maximum(cell.low - (center + low), center + high - cell.high)
             if beyond.max() > 0.0:
-                _miss(found, "cell", beyond.max(), f"it is {beyond.max():.3g} m beyond the cell")
+                _miss(found, "cell", beyond.max(), f"parts {beyond.max():.3g} m outside the cell")
         if self.job.keep_out:
             ends = np.linspace(0.0, 1.0, _STEPS)[:, None, None]
             along = points[..., :-1, :][..., None, :, :]
@@ -200,7 +201,7 @@ class Case:
                 inside = np.minimum(lines - box.low, box.high - lines).min(axis=-1) + cell.margin
                 depth = float(np.nanmax(inside, initial=-1.0))
                 if depth > 0.0:
-                    _miss(found, "keep-out", depth, f"it is {depth:.3g} m inside a keep-out box")
+                    _miss(found, "keep-out", depth, f"parts {depth:.3g} m inside a keep-out box")
 
     def _drive(self, found: Rating) -> None:
         """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
@@ -214,7 +215,7 @@ class Case:
             if self.job.stiffness is not None:
                 gives = compliances(robot, found.middle + self.corners, self.sections(found))
         except PteronError:
-            _miss(found, "loads", 1.0, "it does not reach a cycle")
+            _miss(found, "loads", 1.0, "a singularity or the edge of its reach on a cycle")
             return
         options: list[Option | None] = [None] * robot.joint_count
         asked, near = self.job.motors.margin, 0.0
@@ -342,8 +343,8 @@ def _of(found: Rating) -> Manipulator:
 
 def _miss(found: Rating, name: str, share: float, told: str) -> None:
     """Note that a bound is missed."""
-    found.misses[name] = max(found.misses.get(name, 0.0), float(share))
-    found.told.append(told)
+    if share > found.misses.get(name, 0.0):
+        found.misses[name], found.told[name] = float(share), told
 
 
 def _below(found: Rating, name: str, value: float, least: float) -> None:

@@ -27,6 +27,9 @@ _DIRECTIONS = 4
 _IN_CYCLE = 49
 """Samples of a cycle."""
 
+_SHARES = np.linspace(1.0, 0.0, 21)
+"""Shares of the way to a corner at which a cycle is tried."""
+
 _INSIDE = 1e-9
 """Metres by which a cycle may leave the workspace."""
 
@@ -179,8 +182,11 @@ def _fitting(job: Job, points: Array, anywhere: bool) -> Iterator[tuple[Array, f
         ]
         shifts = np.array(list(product(*ends))) if anywhere else np.zeros((1, 3))
         for shift in shifts:
-            if _holds(job, half, turned + shift):
-                yield shift, float(turn)
+            # Of a cylinder the corner of its box is outside: as far towards it as can be.
+            for share in _SHARES:
+                if _holds(job, half, turned + share * shift):
+                    yield share * shift, float(turn)
+                    break
 
 
 def _holds(job: Job, half: Array, points: Array) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from math import isfinite
 
 from pteron.design.choosing.choose import Choice
 from pteron.design.choosing.job import Job
@@ -24,9 +23,10 @@ _MARGINS = {"rated_margin": "rated torque", "peak_margin": "peak torque", "speed
 
 def cells(one: Verdict) -> dict[str, str]:
     """Return a row's numbers by their headings, rounded; of a machine that serves."""
-    found = {"margin": f"{min(one.figures[name] for name in _MARGINS):.2f}"}
+    least = min(one.figures[name] for name in _MARGINS if name in one.figures)
+    found = {"margin": f"{least:.2f}"}
     for name, (heading, factor) in _FIGURES.items():
-        if (value := one.figures.get(name)) is not None and isfinite(value):
+        if (value := one.figures.get(name)) is not None:
             found[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
     return found
 
@@ -45,7 +45,8 @@ def dimensions(one: Verdict) -> str:
 
 def margins(one: Verdict) -> str:
     """Return the drives' margins and the place of the least, in a line."""
-    told = ", ".join(f"{word} {one.figures[name]:.2f}" for name, word in _MARGINS.items())
+    known = {word: one.figures[name] for name, word in _MARGINS.items() if name in one.figures}
+    told = ", ".join(f"{word} {value:.2f}" for word, value in known.items())
     return f"{told}; least at {one.worst}" if one.worst else told
 
 

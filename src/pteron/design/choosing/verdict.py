@@ -102,7 +102,7 @@ def judged(case: Case, found: list[Rating]) -> Verdict:
     counts = len(found), len(good)
     if not good:
         nearest = min(found, key=lambda one: one.cost(objectives[0]))
-        return Verdict(case.kind.name, False, tuple(nearest.told), *counts)
+        return Verdict(case.kind.name, False, tuple(nearest.told.values()), *counts)
     why = ""
     for one in good[:_TRIED]:
         proofs = _proofs(case, one)
@@ -113,7 +113,7 @@ def judged(case: Case, found: list[Rating]) -> Verdict:
             why = _exceeded(case, found)
             if not why:
                 return found
-    return Verdict(case.kind.name, False, (f"the nearest design is {why}",), *counts)
+    return Verdict(case.kind.name, False, (f"no proof ({why})",), *counts)
 
 
 def _exceeded(case: Case, found: Verdict) -> str:
@@ -123,7 +123,8 @@ def _exceeded(case: Case, found: Verdict) -> str:
     for name, asked in bounds.items():
         if asked is not None and figures[name] > asked.most:
             return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * asked.most:g} mm asked"
-    least = min(figures[name] for name in ("rated_margin", "peak_margin", "speed_margin"))
+    names = ("rated_margin", "peak_margin", "speed_margin")
+    least = min(figures.get(name, np.inf) for name in names)
     return f"not so: the drives' margin is {least:.3g} at {found.worst}" if least < 1.0 else ""
 
 
@@ -200,7 +201,7 @@ def _verdict(
         *counts,
         _proof_words(case, proofs),
         _dimensions(robot),
-        figures | times,
+        {name: value for name, value in (figures | times).items() if np.isfinite(value)},
         tuple(option.name for option in one.options),
         worst,
         tuple({name: r.figures[name] for name in objectives} for r in best),
