@@ -26,7 +26,7 @@ def notebook(request):
 def test_each_is_in_the_list_in_this_order():
     listed = re.findall(r"^(\d-[\w-]+)$", (FOLDER / "index.md").read_text("utf-8"), re.MULTILINE)
     assert listed == [path.stem for path in NOTEBOOKS]
-    assert [name[0] for name in listed] == list("12345678")
+    assert [name[0] for name in listed] == list("123456789")
 
 
 def test_it_is_valid_and_names_no_kernel_but_the_usual_one(notebook):
