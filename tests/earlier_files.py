@@ -13,11 +13,13 @@ from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
 from pteron.design import read_spec, search, survey
+from pteron.errors import OutputError
 from pteron.identification import read_log
 from pteron.maps import load_map, map_index, pose_grid
 from pteron.motion import read_motors
@@ -95,11 +97,11 @@ def index_map(path):
 
 
 def continued(path):
-    """Return what comes of a map, search or survey that was ended, and what of it was kept."""
+    """Return what comes of a map that was ended, and what of it was kept."""
     with TemporaryDirectory() as folder:
         place = copytree(path, Path(folder) / path.name)
         kept = _files(place)
-        found = continued_map(place) if path.suffix == ".zarr" else continued_design(place)
+        found = continued_map(place)
         new = _files(place)
         assert kept <= new
         return {"kept": len(kept), "computed": len(new - kept), **found}
@@ -121,11 +123,13 @@ def continued_map(path):
     }
 
 
-def continued_design(path):
-    """Evaluate the designs of a search or a survey that are left."""
+def refused(path):
+    """Return how a search or a survey that was ended is refused: its quantities changed."""
     spec = read_spec(DESIGN / "five-bar.toml")
-    front = search(spec, folder=path) if path.name == "search" else survey(spec, 256, path)
-    return {"values": front.values.tolist(), "objectives": front.objectives.tolist()}
+    with TemporaryDirectory() as folder, pytest.raises(OutputError) as caught:
+        place = copytree(path, Path(folder) / path.name)
+        search(spec, folder=place) if path.name == "search" else survey(spec, 256, place)
+    return str(caught.value).partition("holds ")[2]
 
 
 def surfaces(path):
@@ -157,7 +161,7 @@ def motion(path):
     return {
         "forces": command("forces", FIVE_BAR, "--table", path)[::10],
         "cycle": command("cycle", FIVE_BAR, "--table", path),
-        "drives": command("size", FIVE_BAR, "--cycle", path)["drives"],
+        "drives": command("size", FIVE_BAR, "--cycle", path, "--friction", 0)["drives"],
     }
 
 
@@ -168,7 +172,8 @@ FILES = {
     "identified machines": (identified_machine, sorted((FOLDER / "identified").glob("*/*.toml"))),
     "maps": (index_map, sorted(MAPS.glob("map.*"))),
     "surfaces": (surfaces, sorted(MAPS.glob("*.vtk"))),
-    "continued": (continued, [MAPS / "continued.zarr", DESIGN / "search", DESIGN / "survey"]),
+    "continued": (continued, [MAPS / "continued.zarr"]),
+    "refused": (refused, [DESIGN / "search", DESIGN / "survey"]),
     "motions": (motion, sorted((FOLDER / "tables").iterdir())),
 }
 """For each kind of file a function that reads one, and the files."""

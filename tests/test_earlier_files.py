@@ -1,4 +1,6 @@
-"""Files that version 0.1 wrote: each is read to the same values, and what was ended goes on.
+"""Files that version 0.1 wrote: each is read to the same values; a map that was ended goes on.
+
+A search that was ended is refused: its quantities are others since.
 
 The C code that version 0.1 exported: the present one declares and returns the same.
 

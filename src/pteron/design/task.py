@@ -107,7 +107,7 @@ class Task:
             plan["motors"] = [vars(motor) for motor in self.motors]
         known = quantities()
         if {known[name].cover for name in self.asked} & {"places", "directions", "bound"}:
-            plan["quantities"] = _WORST
+            plan["definition of its quantities"] = _WORST
         return plan
 
     @cached_property
