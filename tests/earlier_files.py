@@ -7,6 +7,7 @@
 import json
 import re
 import tomllib
+from functools import partial
 from pathlib import Path
 from shutil import copytree
 from tempfile import TemporaryDirectory
@@ -126,9 +127,11 @@ def continued_map(path):
 def refused(path):
     """Return how a search or a survey that was ended is refused: its quantities changed."""
     spec = read_spec(DESIGN / "five-bar.toml")
-    with TemporaryDirectory() as folder, pytest.raises(OutputError) as caught:
+    with TemporaryDirectory() as folder:
         place = copytree(path, Path(folder) / path.name)
-        search(spec, folder=place) if path.name == "search" else survey(spec, 256, place)
+        run = search if path.name == "search" else partial(survey, count=256)
+        with pytest.raises(OutputError) as caught:
+            run(spec, folder=place)
     return str(caught.value).partition("holds ")[2]
 
 
