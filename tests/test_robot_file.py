@@ -1,5 +1,6 @@
 """`pteron new` and docs/robot-file.md: both say of every key what its declaration says."""
 
+import json
 import re
 import runpy
 import tomllib
@@ -7,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG
+import tomlkit
+from mechanisms import CATALOG, gated
 from pydantic import TypeAdapter
 
 import pteron
@@ -15,6 +17,7 @@ from pteron import Manipulator, OutputError
 from pteron.legs import KINDS
 from pteron.manipulator import with_dimensions
 from pteron.manipulator.explained import explained
+from pteron.manipulator.saving import document_of
 from pteron.manipulator.tables import PlatformTable, leg_table
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -141,6 +144,89 @@ def test_dimensions_are_what_a_file_written_by_hand_gives(program):
         np.testing.assert_allclose(leg.upper.values, [tube, tube * 0.125, 0.0, crank])
         np.testing.assert_allclose(leg.lower.values, [rods, -rods * 0.275, rod])
     assert program("check", "robot.toml").exit_code == 0
+
+
+def bar(length, start, count, axes):
+    """Return the body of steel rods of 10 mm from x = start of its frame."""
+    mass, middle = count * 7850.0 * np.pi * 0.005**2 * length, start + length / 2.0
+    about = mass * (0.005**2 / 4.0 + length**2 / 12.0 + middle**2)
+    return {"mass": mass, "center_of_mass": [middle, 0.0][:axes], "inertia": about}
+
+
+def leg_by_hand(name, azimuth, base, platform, crank, rod):
+    """Return the table of a leg at an azimuth, rad."""
+    c, s = float(np.cos(azimuth)), float(np.sin(azimuth))
+    keys = {
+        "guide_point": [base * c, base * s, 0.0],
+        "platform_point": [platform * c, platform * s, 0.0],
+        "lower_length": rod,
+        "limits": [-2.0, 2.5],
+    }
+    if name == "3-rrr":
+        keys |= {"type": "RRR", "direction": [0.0, 0.0, 1.0], "zero_direction": [1.0, 0.0, 0.0]}
+        keys["lower"] = bar(rod, -rod, 1, 2)
+    else:
+        keys |= {"rods": 2, "lower": bar(rod, -rod, 2, 1)}
+    if name == "linear-delta":
+        keys |= {"type": "PSS", "slider_direction": [0.0, 0.0, 1.0], "elbow": -1}
+        return keys | {"slider": {"mass": 0.12}, "bar_direction": [-s, c, 0.0]}
+    if name == "delta":
+        level, down = 0.9956794417434706, -0.09285714452539878
+        keys |= {"type": "RSS", "direction": [s, -c, 0.0], "elbow": 1}
+        keys["zero_direction"] = [level * c, level * s, down]
+    return keys | {"upper_length": crank, "upper": bar(crank, 0.0, 1, 2)}
+
+
+@pytest.mark.parametrize(
+    ("name", "azimuths", "sizes"),
+    [
+        ("delta", (0, 120, 240), (0.25, 0.06, 0.28, 0.7)),
+        ("linear-delta", (210, 330, 90), (0.25, 0.06, 0.0, 0.7)),
+        ("3-rrr", (210, 330, 90), (0.25, 0.06, 0.2, 0.15)),
+    ],
+)
+def test_new_machines_are_those_of_sines_and_cosines(program, name, azimuths, sizes):
+    options = dict(zip(("base-radius", "platform-radius", "crank", "rod"), sizes, strict=True))
+    given = [f"--{key}={size}" for key, size in options.items() if size]
+    stock = "steel-rod:10" if sizes[2] else "lower=steel-rod:10"
+    more = ["--limits=-2:2.5", f"--mass-from={stock}", "--out=new.toml"]
+    assert program("new", name, *given, *more).exit_code == 0
+    made = pteron.load("new.toml")
+    legs = [leg_by_hand(name, np.radians(azimuth), *sizes) for azimuth in azimuths]
+    hand = document_of(made) | {"legs": legs, "platform": document_of(CATALOG[name])["platform"]}
+    Path("hand.toml").write_text(tomlkit.dumps(hand), encoding="utf-8")
+    expected = pteron.load("hand.toml")
+    for one, other in zip(made.legs, expected.legs, strict=True):
+        assert (type(one), one.limits, one.elbow) == (type(other), other.limits, other.elbow)
+        for key in one.metres:
+            np.testing.assert_allclose(one.metres[key], other.metres[key], rtol=0, atol=1e-11)
+    exact = {"rtol": 1e-10, "atol": 1e-12}
+    np.testing.assert_allclose(pteron.parameters(made), pteron.parameters(expected), **exact)
+    state = pteron.random_poses(expected, 3, seed=0), *np.ones((2, 3, made.freedom))
+    forces = [pteron.inverse_dynamics(robot, *state) for robot in (made, expected)]
+    np.testing.assert_allclose(*forces, rtol=1e-8)
+
+
+def own_dimensions(robot, factor):
+    """Return options of `new` with a machine's own dimensions times a factor."""
+    points = np.array([leg.guide_point for leg in robot.legs])
+    flat = np.eye(3) - np.outer(robot.platform.axis, robot.platform.axis)
+    radius = np.linalg.norm((points - points.mean(axis=0)) @ flat, axis=1).max()
+    found = ["--base-radius", f"{factor * radius:.9g}"] if radius > 1e-9 else []
+    for option, key in (("--crank", "upper_length"), ("--rod", "lower_length")):
+        lengths = [getattr(leg, key) for leg in robot.legs if hasattr(leg, key)]
+        if lengths and min(lengths) == max(lengths):
+            found += [option, f"{factor * lengths[0]:.9g}"]
+    return found
+
+
+@pytest.mark.parametrize("name", gated(pteron.catalog(), ["3-prr", "five-bar", "tripteron"]))
+def test_new_machines_of_every_kind_pass_the_check(program, name):
+    given = own_dimensions(pteron.load(name), 1.02)
+    assert program("new", name, *given, "--out", "new.toml").exit_code == 0
+    checked = program("check", "new.toml", "--json")
+    assert checked.exit_code == 0, checked.output
+    assert json.loads(checked.stdout)["home_reserve"] > 0.0
 
 
 @pytest.mark.parametrize("name", sorted(set(CATALOG) - {"five-bar"}))

@@ -8,9 +8,11 @@ import pytest
 from mechanisms import CATALOG, gated
 
 import pteron
+from pteron.manipulator import with_dimensions
 from pteron.manipulator.variants import with_elbows
 from pteron.workspace import Box, home_pose, pose_margins, prove
 from pteron.workspace.machine_warnings import elbow_warnings, machine_warnings
+from pteron.workspace.mode_places import mode_places
 
 
 def mirrored(robot):
@@ -56,10 +58,19 @@ def test_a_shaft_that_makes_many_turns_has_the_limits_it_has():
 @pytest.mark.parametrize("name", gated(["delta", "delta-4", "h4", "par4"], ["delta", "h4"]))
 def test_elbows_that_raise_a_hanging_machine_are_doubted(name):
     upside = mirrored(CATALOG[name])
-    (told,) = elbow_warnings(upside, home_pose(upside))
+    modes = mode_places(upside, home_pose(upside))
+    (told,) = elbow_warnings(modes)
     assert told.startswith("elbow: the platform stands ")
     assert told.endswith("is that the working mode that is meant?")
-    assert elbow_warnings(CATALOG[name], home_pose(CATALOG[name])) == ()
+    (named,), (likely,) = ([m for m in modes if getattr(m, key)] for key in ("named", "likely"))
+    assert (named.place, likely.place) == ("above", "below")
+    assert f"with elbows {likely.signs} it hangs" in told
+    right = mode_places(CATALOG[name], home_pose(CATALOG[name]))
+    assert elbow_warnings(right) == ()
+    (named,) = (mode for mode in right if mode.named)
+    assert named.likely
+    assert named.place == "below"
+    assert named.pose.tolist() == home_pose(CATALOG[name]).tolist()
 
 
 @pytest.mark.parametrize(
@@ -69,7 +80,19 @@ def test_elbows_that_raise_a_hanging_machine_are_doubted(name):
     ),
 )
 def test_machines_that_stand_or_have_no_such_side_are_not(name):
-    assert elbow_warnings(CATALOG[name], home_pose(CATALOG[name])) == ()
+    modes = mode_places(CATALOG[name], home_pose(CATALOG[name]))
+    assert elbow_warnings(modes) == ()
+    if name == "linear-delta":
+        assert [mode.place for mode in modes if mode.named] == ["below"]
+
+
+def test_a_steep_linear_delta_is_at_home_on_its_axis():
+    """Beyond its own towers it has more margin."""
+    steep = with_dimensions("linear-delta", base_radius=0.1, platform_radius=0.05, rod=0.4)
+    home = home_pose(steep)
+    assert home[:2].tolist() == [0.0, 0.0]
+    beside = pose_margins(steep, [0.0, 0.315, 0.015]).least
+    assert 0.3 < pose_margins(steep, home).least < 0.7 * beside
 
 
 def test_the_home_of_a_symmetric_machine_is_on_its_axis():

@@ -153,7 +153,9 @@ def check(file: str, *, elbows: str | None = None, json: bool = False) -> None:
     """Check a machine's file and say what the machine is.
 
     It fails if the file is not valid, telling all its faults, if the machine is singular at every
-    pose, or if no pose is in reach of all its legs. What is possible but unlikely, such as a length
+    pose, or if no pose is in reach of all its legs. It says where the platform is in each working
+    mode, above its base, below or inside, which is the file's and which is likely meant; of more
+    than eight modes the file's, its opposite, and those with all elbows alike. What is possible but unlikely, such as a length
     in millimetres or a centre of mass beyond its link, is told as a warning.
 
     Arguments
@@ -193,6 +195,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.workspace import home_pose, limited_joints, pose_margins
     from pteron.workspace.drive_warnings import load_warnings
     from pteron.workspace.machine_warnings import elbow_warnings
+    from pteron.workspace.mode_places import mode_places
     from pteron.workspace.screw_lengths import screw_warnings
 
     # Refuses a singular layout, and one without a common reach with by how much legs miss it
@@ -200,6 +203,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     layout = architecture(robot)
     loose = () if layout.holds is not False else (_LOOSE,)
     position = home[: len(robot.platform.lengths)]
+    modes = mode_places(robot, home)
     return {
         **_machine(robot),
         "gravity": list(robot.gravity),
@@ -209,11 +213,14 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "tool": list(robot.platform.tool),
         "home_pose": home.tolist(),
         "home_reserve": float(pose_margins(robot, home).least),
+        "working_modes": [
+            picked(mode, "elbows=signs place depth pose margin named likely") for mode in modes
+        ],
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": layout.holds,
         "self_motions": list(layout.self_motions),
         "doubts": [
-            *(*unlikely, *loose, *elbow_warnings(robot, home)),
+            *(*unlikely, *loose, *elbow_warnings(modes)),
             *(*load_warnings(robot, home), *screw_warnings(robot)),
         ],
     }
@@ -258,6 +265,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         *_drives(robot),
         *singular,
         f"Home pose: {_vector(found['home_pose'])}, margin {found['home_reserve']:.2f} of 1",
+        *_modes(found["working_modes"]),
         *_passive(found["limited_joints"]),
         *tool,
         *(f"The platform can move with its rams held {text}" for text in found["self_motions"]),
@@ -273,6 +281,20 @@ def _drives(robot: Manipulator) -> list[Table]:
     rows = drive_rows(robot.legs)
     cells = ((name, *texts) for name, texts in rows)
     return [table("drive", *legs, rows=cells, numbers=legs)] if rows else []
+
+
+def _modes(modes: list[dict[str, Any]]) -> list[Table]:
+    """Return where the platform is in each working mode."""
+    rows = []
+    for mode in modes:
+        said = [*["the file's"] * mode["named"], *["likely"] * mode["likely"]]
+        where = ("beyond limits", "-", "-")
+        if mode["margin"] > 0.0:
+            at = f"({' '.join(f'{value:.3g}' for value in mode['pose'])})"
+            where = (f"{mode['place']} the base", at, f"{mode['margin']:.2f}")
+        rows.append((mode["elbows"], *where, ", ".join(said)))
+    headings = ("elbows", "platform", "e.g. at", "margin", "which")
+    return [table(*headings, rows=rows, numbers=headings[:4])] if rows else []
 
 
 def _passive(joints: list[dict[str, Any]]) -> list[Table]:

@@ -118,7 +118,8 @@ class Carried:
                 f"--payload: {payload!r} given; MASS, MASS@X,Y,Z or MASS@X,Y,Z@INERTIA expected, "
                 "kg, m and kg m^2, such as 0.5@0,0,-0.03"
             )
-        return cls(carried, *parts, tool=tool)
+        center = parts[0] if parts else None
+        return cls(carried, center, parts[1] if len(parts) > 1 else (), tool)
 
     def __str__(self) -> str:
         """Return it in words behind a machine's name, empty if there is nothing."""

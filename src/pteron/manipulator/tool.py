@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from pteron.bodies.inertia import inertia_count
@@ -50,7 +50,7 @@ class Tool:
 
     def __post_init__(self) -> None:
         faults, given = list(name_faults(self.name)), self.central_inertia
-        sound = {
+        sound: dict[str, Callable[[], object]] = {
             "point": lambda: vector(self.point, "point"),
             "mass": lambda: _not_negative(self.mass),
             "center_of_mass": lambda: (

@@ -54,7 +54,7 @@ _DEGREES = (30.0, 15.0, 5.0, 1.0)
 _WORTH = 0.99
 """Share of the best margin from which on a simpler pose is preferred."""
 
-_AXIS = 0.75
+_AXIS = 0.1
 """Share of the best margin from which on a pose on the axis of a machine's symmetry is
 preferred."""
 
@@ -88,7 +88,7 @@ def home_pose(robot: RobotLike) -> Array:
         sliders are nearest to their guide points, and cranks to their zero; or the middle between
         them, if that has 90 %. A platform that tilts is level, all its angles 0, if the best level
         pose has 75 %. Of a machine that a turn about the platform's axis leaves as it is, it is on
-        that axis, if the best place there has 75 %.
+        that axis, if the best place there has 10 %.
 
     Raises
     ------

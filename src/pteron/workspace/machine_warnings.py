@@ -10,16 +10,13 @@ import numpy as np
 
 from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.vectors import Vector, cross
-from pteron.errors import PteronError
 from pteron.kernels import Array
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
-from pteron.manipulator.variants import with_elbows
 from pteron.platforms import Platform
 from pteron.workspace.drive_warnings import drive_warnings
-from pteron.workspace.home import home_pose
-from pteron.workspace.margins import pose_margins
+from pteron.workspace.mode_places import ModePlace
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
@@ -27,13 +24,6 @@ _LARGE = 10.0
 _UNLIKE = 20.0
 """Greatest ratio of a link's central inertia to a uniform bar's, or the inverse: two masses at its
 ends have 3."""
-
-_UPRIGHT = 0.1
-"""Height of the platform over its base, as a share of a leg's length, from which it is clearly
-above or below."""
-
-_ALIKE = 0.7
-"""Share of the margin in one working mode from which on another serves as well."""
 
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
@@ -76,35 +66,20 @@ def machine_warnings(robot: Manipulator) -> tuple[str, ...]:
     return tuple(found)
 
 
-def elbow_warnings(robot: Manipulator, home: Array) -> tuple[str, ...]:
-    """Return a warning that the other working mode may be meant, where the platform stands upright.
+def elbow_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
+    """Return a warning that another working mode may be meant, where the platform stands upright.
 
-    Most machines hang below their base. One that stands above it, and whose other elbows would let
-    it hang there with much the same margin, was perhaps given the wrong ones.
+    Most machines hang below their base. One that stands above it, and that would hang there with
+    other elbows and much the same margin, was perhaps given the wrong ones.
     """
-    down, base = np.array(robot.gravity), np.mean([leg.guide_point for leg in robot.legs], axis=0)
-    others = [-leg.elbow if len(leg.branches) > 1 else leg.elbow for leg in robot.legs]
-    directions = robot.platform.directions
-
-    def below(pose: Array) -> float:
-        depth = down @ (pose[: len(directions)] @ directions - base)
-        return float(depth / (hypot(*robot.gravity) or 1.0))
-
-    least = _UPRIGHT * max(leg.size for leg in robot.legs)
-    if not below(home) < -least or others == [leg.elbow for leg in robot.legs]:
-        return ()
-    other = with_elbows(robot, others)
-    try:
-        hanging = home_pose(other)
-    except PteronError:
-        return ()
-    worth = float(pose_margins(other, hanging).least) / float(pose_margins(robot, home).least)
-    if below(hanging) < least or worth < _ALIKE:
+    named = next((mode for mode in modes if mode.named), None)
+    likely = next((mode for mode in modes if mode.likely), None)
+    if named is None or likely is None or (named.place, likely.place) != ("above", "below"):
         return ()
     return (
-        f"elbow: the platform stands {-below(home):.2g} m above its base at {_pose(home)}; with "
-        f"the other elbows it hangs {below(hanging):.2g} m below it at {_pose(hanging)}: is that "
-        "the working mode that is meant?",
+        f"elbow: the platform stands {-named.depth:.2g} m above its base at {_pose(named.pose)}; "
+        f"with elbows {likely.signs} it hangs {likely.depth:.2g} m below it at "
+        f"{_pose(likely.pose)}: is that the working mode that is meant?",
     )
 
 

@@ -1,0 +1,110 @@
+"""Where the platform of a machine is in its working modes: above its base, below or inside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import prod
+
+import numpy as np
+
+from pteron.kernels import Array, bare
+from pteron.kinematics import inverse_kinematics, random_poses
+from pteron.manipulator import Manipulator, working_modes
+from pteron.manipulator.variants import with_elbows
+from pteron.workspace.margins import pose_margins
+
+_DRAWN = 300
+"""Random poses at which the modes are compared."""
+
+_MOST = 8
+"""Most modes that are compared all; of more the file's own, its opposite, all + and all -."""
+
+_UPRIGHT = 0.1
+"""Height of the platform over its base, as a share of a leg's length, from which it is clearly
+above or below."""
+
+_LEVEL = 1e-9
+"""Share of gravity along the platform's directions of motion up to which it moves level."""
+
+_ALIKE = 0.7
+"""Share of the best margin from which on a mode serves as well: of those one hangs, most likely."""
+
+
+@dataclass(frozen=True)
+class ModePlace:
+    """A working mode at the best of random poses.
+
+    Attributes
+    ----------
+    elbows : tuple of int
+        The sides of its elbows.
+    place : {"above", "below", "inside"}
+        Where the platform is there, seen along gravity from the base: the guide points, or where
+        sliders are on their guides.
+    depth : float
+        How far below it, m; negative above.
+    pose : array, shape (m,)
+        The pose, m and rad.
+    margin : float
+        The least margin there (see `pose_margins`).
+    named : bool
+        Whether it is the file's own.
+    likely : bool
+        Whether it is the one that is likely meant: one that hangs below the base and has nearly the
+        best margin, else that with the best; the file's own among equals.
+    """
+
+    elbows: tuple[int, ...]
+    place: str
+    depth: float
+    pose: Array
+    margin: float
+    named: bool
+    likely: bool
+
+    @property
+    def signs(self) -> str:
+        """Its elbows as --elbows takes them, such as ++-."""
+        return "".join("+" if sign > 0 else "-" for sign in self.elbows)
+
+
+def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
+    """Return where the platform is in each working mode, at home in the file's own.
+
+    None of a machine that has one mode, or that gravity does not tell above from below.
+    """
+    own = tuple(leg.elbow for leg in robot.legs)
+    choices = [leg.branches for leg in robot.legs]
+    down, directions = np.array(robot.gravity), robot.platform.directions
+    upright = _LEVEL * float(np.linalg.norm(down))
+    if prod(map(len, choices)) == 1 or not np.linalg.norm(directions @ down) > upright:
+        return ()
+    modes = [tuple(leg.elbow for leg in mode.legs) for mode in working_modes(robot)]
+    if len(modes) > _MOST:
+        other = tuple(-s if len(c) > 1 else s for s, c in zip(own, choices, strict=True))
+        modes = list(dict.fromkeys([own, other, modes[0], modes[-1]]))
+    poses = np.vstack([random_poses(bare(robot), _DRAWN, type_i=0.0, type_ii=0.0), home])
+    least = _UPRIGHT * max(leg.size for leg in robot.legs)
+    found = []
+    for signs in modes:
+        mode = with_elbows(robot, signs)
+        margins = np.nan_to_num(pose_margins(mode, poses).least, nan=-1.0)
+        best = len(poses) - 1 if signs == own else int(margins.argmax())
+        depth = _depth(mode, poses[best])
+        place = "below" if depth > least else "above" if depth < -least else "inside"
+        found.append((signs, place, depth, poses[best], float(margins[best])))
+    most = max(margin for *_, margin in found)
+    alike = [one for one in found if one[-1] >= _ALIKE * most]
+    hanging = [one for one in alike if one[1] == "below"] or alike
+    likely = own if own in [one[0] for one in hanging] else max(hanging, key=lambda one: one[-1])[0]
+    return tuple(ModePlace(*one, one[0] == own, one[0] == likely) for one in found)
+
+
+def _depth(robot: Manipulator, pose: Array) -> float:
+    """Return how far P is below the mean of the guide points, or of the sliders on them, m."""
+    base = np.zeros(3)
+    for leg, q in zip(robot.legs, inverse_kinematics(robot, pose), strict=True):
+        slides = leg.joint.unit == "m" and leg.joint_axis is not None
+        base += np.array(leg.guide_point) + (q * np.array(leg.joint_axis) if slides else 0.0)
+    away = robot.platform.at(pose)[0] - base / len(robot.legs)
+    return float(away @ np.array(robot.gravity) / np.linalg.norm(robot.gravity))
