@@ -155,8 +155,9 @@ def check(file: str, *, elbows: str | None = None, json: bool = False) -> None:
     It fails if the file is not valid, telling all its faults, if the machine is singular at every
     pose, or if no pose is in reach of all its legs. It says where the platform is in each working
     mode, above its base, below or inside, which is the file's and which is likely meant; of more
-    than eight modes the file's, its opposite, and those with all elbows alike. What is possible but unlikely, such as a length
-    in millimetres or a centre of mass beyond its link, is told as a warning.
+    than eight modes the file's, its opposite, and those with all elbows alike. What is possible
+    but unlikely, such as a length in millimetres or a centre of mass beyond its link, is told as a
+    warning.
 
     Arguments
     ---------
