@@ -46,8 +46,8 @@ class Part(NamedTuple):
 
         Seen from outside their corners follow each other anticlockwise.
         """
-        corners = self.corners.reshape(-1, *self.corners.shape[-2:])[0]
-        away = corners - corners.mean(axis=0)
+        corners = self.corners[(0,) * (self.corners.ndim - 2)]
+        away = corners - corners[:1]
         if len(away) < 4 or np.linalg.matrix_rank(away, _FLAT * np.abs(away).max()) < 3:
             return None
         hull = ConvexHull(away)
