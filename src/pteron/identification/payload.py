@@ -138,12 +138,7 @@ class Payload:
         return mass, center, self.central_inertia or (0.0,) * count
 
     def call(self, robot: RobotLike) -> str:
-        """Return the call of exported C that takes it, and the option of the commands.
-
-        Examples
-        --------
-        ``set_payload({0.35}, {0.017, -0.026, 0}, {0.0008}, parameters, loaded_parameters)``
-        """
+        """Return the call of exported C that takes it, and the option of the commands."""
         mass, center, inertia = (
             ", ".join(f"{value:.9g}" for value in np.ravel(part)) for part in self.arguments(robot)
         )

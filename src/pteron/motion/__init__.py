@@ -19,11 +19,11 @@ from pteron.motion.simulation import (
     simulate as simulate,
 )
 from pteron.motion.sizing.drive_loads import (
-    DriveMargin as DriveMargin,
     Sizing as Sizing,
     best_ratio as best_ratio,
     best_ratios as best_ratios,
 )
+from pteron.motion.sizing.drive_margins import DriveMargin as DriveMargin
 from pteron.motion.sizing.gearing import Span as Span
 from pteron.motion.sizing.motor_choice import Fit as Fit, choose as choose
 from pteron.motion.sizing.motors import Motor as Motor, read_motors as read_motors

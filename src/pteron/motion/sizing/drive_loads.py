@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
@@ -18,6 +18,7 @@ from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.motion.sizing.drive_margins import DriveMargin, drive_margins
 from pteron.motion.sizing.places import Place
 from pteron.shapes import PerJoint
 
@@ -36,24 +37,6 @@ _SAME = 1e-9
 
 _NONE = 1e-9
 """Share of the drives' energy below which its net sum counts as zero: rounding."""
-
-
-class DriveMargin(NamedTuple):
-    """A limit of a drive in the machine's file over what the cycle asks of it, at the joint."""
-
-    leg: int
-    limit: str
-    """The keys of the file: "rated_torque and ratio", "max_force" or "max_speed"."""
-    quantity: str
-    """What it bounds: "rms_force", "peak_force" or "peak_speed"."""
-    most: float
-    needed: float
-    unit: str
-
-    @property
-    def margin(self) -> float:
-        """The limit over what is needed: from 1 on it is enough."""
-        return self.most / self.needed if self.needed > 0.0 else math.inf
 
 
 @dataclass(frozen=True, repr=False)
@@ -282,40 +265,15 @@ class Sizing:
     @cached_property
     def margins(self) -> tuple[DriveMargin, ...]:
         """The limits of the drives in the machine's file over what the cycle asks, leg by leg."""
-        found = []
-        for i, (leg, drive) in enumerate(zip(self.robot.legs, self.drives, strict=True)):
-            force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
-            limits = (
-                ("rated_torque and ratio", "rms_force", drive.rated_force, self.rms_forces, force),
-                ("max_force", "peak_force", drive.max_force, self.peak_forces, force),
-                ("max_speed", "peak_speed", drive.max_speed, self.peak_speeds, speed),
-            )
-            found += [
-                DriveMargin(i + 1, key, quantity, most, float(needed[i]), unit)
-                for key, quantity, most, needed, unit in limits
-                if most is not None
-            ]
-        return tuple(found)
+        needed = {name: self._most(name) for name in ("rms_force", "peak_force", "peak_speed")}
+        return drive_margins(self.robot, needed)
 
     @cached_property
     def overloads(self) -> tuple[str, ...]:
         """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
-        told = []
-        for one in sorted(self.margins, key=lambda one: one.quantity == "rms_force"):
-            needed = f"{one.needed:.4g} {one.unit}"
-            if one.margin >= 1.0:
-                continue
-            if one.quantity == "rms_force":
-                told.append(
-                    f"leg {one.leg}: the cycle takes {needed} root mean square{self.where(one)}, "
-                    f"but the motor gives {one.most:.4g} {one.unit} all the time ({one.limit})"
-                )
-            else:
-                told.append(
-                    f"leg {one.leg}: the motion takes up to {needed}{self.where(one)}, but its "
-                    f"drive gives {one.most:g} {one.unit} ({one.limit})"
-                )
-        return tuple(told)
+        beyond = [one for one in self.margins if one.margin < 1.0]
+        beyond.sort(key=lambda one: one.quantity == "rms_force")
+        return tuple(one.told(self.where(one)) for one in beyond)
 
     def where(self, one: DriveMargin) -> str:
         """Return in words at which of several places a margin is so small; else an empty text."""

@@ -1,0 +1,63 @@
+"""`DriveMargin`: what a drive of the machine's file can do over what a cycle asks of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+from pteron.shapes import PerJoint
+
+
+class DriveMargin(NamedTuple):
+    """A limit of a drive in the machine's file over what the cycle asks of it, at the joint."""
+
+    leg: int
+    limit: str
+    """The keys of the file: "rated_torque and ratio", "max_force" or "max_speed"."""
+    quantity: str
+    """What it bounds: "rms_force", "peak_force" or "peak_speed"."""
+    most: float
+    needed: float
+    unit: str
+
+    @property
+    def margin(self) -> float:
+        """The limit over what is needed: from 1 on it is enough."""
+        return self.most / self.needed if self.needed > 0.0 else math.inf
+
+    def told(self, where: str) -> str:
+        """Return in a line that the limit is too small for what is needed at a place."""
+        needed = f"{self.needed:.4g} {self.unit}"
+        if self.quantity == "rms_force":
+            return (
+                f"leg {self.leg}: the cycle takes {needed} root mean square{where}, but the motor "
+                f"gives {self.most:.4g} {self.unit} all the time ({self.limit})"
+            )
+        return (
+            f"leg {self.leg}: the motion takes up to {needed}{where}, but its drive gives "
+            f"{self.most:g} {self.unit} ({self.limit})"
+        )
+
+
+def drive_margins(robot: Manipulator, needed: Mapping[str, PerJoint]) -> tuple[DriveMargin, ...]:
+    """Return the margins of the limits that the file has, leg by leg.
+
+    `needed` has what a cycle takes of each joint (n,), by quantity.
+    """
+    found = []
+    for i, leg in enumerate(robot.legs):
+        drive, force = leg.drive or Drive(), leg.joint.force_unit
+        limits = (
+            ("rated_torque and ratio", "rms_force", drive.rated_force, force),
+            ("max_force", "peak_force", drive.max_force, force),
+            ("max_speed", "peak_speed", drive.max_speed, f"{leg.joint.unit}/s"),
+        )
+        found += [
+            DriveMargin(i + 1, key, quantity, most, float(needed[quantity][i]), unit)
+            for key, quantity, most, unit in limits
+            if most is not None
+        ]
+    return tuple(found)
