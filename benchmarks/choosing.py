@@ -9,6 +9,7 @@ a plain random search has ten times the evaluations. `--quick` does two kinds an
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,13 +22,15 @@ import pteron
 from pteron.controllers import CONTROLLERS
 from pteron.design import Choice, Job, Verdict, choose_machine, read_job
 from pteron.design.choosing.choose import cases_of
+from pteron.design.choosing.rating import Rating
 from pteron.design.choosing.search import search_kind
 from pteron.dynamics import drive_forces
 from pteron.indices import Tolerances, pose_error
 from pteron.kernels import Array, alike
 from pteron.kinematics import inverse_kinematics, joint_rates
+from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion import along, line_path, simulate, with_payload
+from pteron.motion import along, limits_of, line_path, simulate, with_payload
 from pteron.workspace import pose_margins
 
 _FILE = Path(__file__).parent.parent / "examples" / "task.toml"
@@ -41,9 +44,11 @@ def main() -> None:
     job = read_job(_FILE)
     if quick():
         job = changed(job, kinds=["delta", "linear-delta"], search={"evaluations": 60})
-    begin = time.perf_counter()
+    begin, before = time.perf_counter(), os.times()
     choice = choose_machine(job, workers=1 if quick() else 2)
-    print(f"{len(choice.verdicts)} kinds in {time.perf_counter() - begin:.0f} s")
+    work = sum(os.times()[:4]) - sum(before[:4])
+    took = time.perf_counter() - begin
+    print(f"{len(choice.verdicts)} kinds in {took:.0f} s, {work:.0f} s of processors' time")
     for one in choice.verdicts:
         if one.serves:
             print(f"{one.kind}: {told(choice, one)}; {checked(job, one)}")
@@ -81,7 +86,7 @@ def checked(job: Job, one: Verdict) -> str:
     assert margins.type_ii.min() >= job.floors.type_ii
     # Without backlash, which a machine's file does not have; the verdict's own figure has it.
     assert job.accuracy is not None
-    ratios = np.array([leg.drive.ratio for leg in robot.legs])
+    ratios = np.array([drive.gear for drive in drives_of(robot)])
     errors = Tolerances((np.pi / job.accuracy.counts_per_turn / ratios).tolist())
     error = float(pose_error(robot, poses, errors).position.max())
     assert max(error, one.figures["error"]) <= job.accuracy.most
@@ -127,13 +132,18 @@ def random_cycles(
 
 def drive_margins(robot: Manipulator, *state: Array) -> tuple[float, float, float]:
     """Return what drives can do over what a motion asks: peak and rated torque, speed."""
-    drives = [leg.drive for leg in robot.legs]
+    limits, rated = limits_of(robot), [drive.rated_force or 0.0 for drive in drives_of(robot)]
     forces, rates = drive_forces(robot, *state), joint_rates(robot, *state[:2]).actuated
     return (
-        float(([d.max_force for d in drives] / np.abs(forces).max(axis=0)).min()),
-        float(([d.rated_force for d in drives] / np.sqrt((forces**2).mean(axis=0))).min()),
-        float(([d.max_speed for d in drives] / np.abs(rates).max(axis=0)).min()),
+        float((limits.force / np.abs(forces).max(axis=0)).min()),
+        float((rated / np.sqrt((forces**2).mean(axis=0))).min()),
+        float((limits.speed / np.abs(rates).max(axis=0)).min()),
     )
+
+
+def drives_of(robot: Manipulator) -> list[Drive]:
+    """Return the drives of a chosen machine, which has one for each leg."""
+    return [leg.drive for leg in robot.legs if leg.drive is not None]
 
 
 def random_motions(job: Job, robot: Manipulator, poses: Array, rng: np.random.Generator) -> float:
@@ -144,8 +154,7 @@ def random_motions(job: Job, robot: Manipulator, poses: Array, rng: np.random.Ge
         ways *= size / np.linalg.norm(ways, axis=1, keepdims=True)
         states.append(np.pad(ways, ((0, 0), (0, robot.freedom - 3))))
     forces = drive_forces(robot, poses, *states)
-    most = np.array([leg.drive.max_force for leg in robot.legs])
-    return float((most / np.abs(forces).max(axis=0)).min())
+    return float((limits_of(robot).force / np.abs(forces).max(axis=0)).min())
 
 
 def driven(job: Job, robot: Manipulator, one: Verdict) -> str:
@@ -155,8 +164,7 @@ def driven(job: Job, robot: Manipulator, one: Verdict) -> str:
     motion = along(robot, path, duration=cycle.duration)
     control = CONTROLLERS["computed_torque"]
     found = simulate(robot, motion, control, payload=job.payload.mass, step=2e-4)
-    most = np.array([leg.drive.max_force for leg in robot.legs])
-    used = float((np.abs(found.forces) / most).max())
+    used = float((np.abs(found.forces) / limits_of(robot).force).max())
     behind = (found.pose - motion.at(found.time)[0])[:, :3]
     assert found.stopped is None
     assert used < 1.0
@@ -184,7 +192,7 @@ def against_chance() -> None:
     print(f"at worst {max(ratios):.3f} of what chance finds")
 
 
-def least(ratings: list, objective: str) -> float:
+def least(ratings: list[Rating], objective: str) -> float:
     """Return the least objective of designs that keep all that is asked."""
     return min((one.figures[objective] for one in ratings if not one.misses), default=np.inf)
 

@@ -100,6 +100,8 @@ def test_kinds_are_those_that_can_do_the_motion():
         ({"cycles": [{"points": [[0, 0], [1, 0]], "duration": 1.0}]}, "points of 3 numbers"),
         ({"payload": {"mass": -1.0}}, "mass"),
         ({"nonsense": 1}, "nonsense"),
+        ({"links": {"upper": ["wood"]}}, "is no stock"),
+        ({"cell": {"low": [0, 0, 0], "high": [1, 1, 1]}}, "need [workspace] center"),
     ],
 )
 def test_a_bad_job_is_refused_in_a_line(keys, told, tmp_path):

@@ -99,4 +99,5 @@ def _show(found: Choice) -> None:
         if not one.serves:
             near = plain("; ".join(one.why))
             show(f"[bold]{one.kind}[/bold] falls out: the nearest design has {near}")
-    show(*(f"[dim]{plain(line)}[/dim]" for line in assumed(found)))
+    if serving:
+        show(*(f"[dim]{plain(line)}[/dim]" for line in assumed(found)))

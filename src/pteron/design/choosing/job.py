@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, Table, Three, Two
 from pteron.design.loads import PayloadTable, Positive
 from pteron.design.spec import Floor
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, ModelError, shown
+from pteron.manipulator.dimensions import Stock
 from pteron.toml import read_toml, validated
 
 _ABSENT = "no such file; it should describe what a machine must do"
@@ -172,6 +174,16 @@ class LinksTable(Table):
     plate: Positive = Field(0.006, description="thickness of an aluminium platform, m")
     carriage: Positive = Field(0.4, description="mass of what slides on a guide, kg")
 
+    @field_validator("upper", "lower")
+    @classmethod
+    def _known(cls, names: list[str]) -> list[str]:
+        for name in names:
+            try:
+                Stock.of(name)
+            except ModelError as error:
+                raise ValueError(error.message) from None
+        return names
+
 
 class FloorsTable(Table):
     """`[floors]`: least measures of every pose of the workspace, each 1 at best."""
@@ -212,7 +224,9 @@ class Job(Table):
     links: LinksTable = Field(default_factory=lambda: LinksTable.model_validate({}))
     floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
     most: BoundTable = Field(default_factory=lambda: BoundTable.model_validate({}))
-    kinds: list[str] | None = Field(None, description="to choose from; else all that can do it")
+    kinds: Annotated[list[str], Field(min_length=1)] | None = Field(
+        None, description="to choose from; else all that can do it"
+    )
     objectives: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
         ["price"], description=f"what is to be small: {', '.join(OBJECTIVES)}"
     )
@@ -245,9 +259,14 @@ class Job(Table):
                 yield f"cycles[{k}]: points of {self.lengths} numbers expected, as the workspace's"
         if (self.cell.low is None) != (self.cell.high is None):
             yield "cell: low and high go together"
-        if self.cell.low is not None and self.workspace.center is None:
-            yield "cell: low and high need [workspace] center; a workspace that floats has height "
-            "and footprint"
+        elif self.cell.low is not None and self.workspace.center is None:
+            yield (
+                "cell: low and high need [workspace] center; of a workspace that floats give "
+                "footprint and height"
+            )
+        for k, cycle in enumerate(self.cycles, start=1):
+            if any(a == b for a, b in pairwise(cycle.points)):
+                yield f"cycles[{k}]: two points that follow each other are the same"
 
     @property
     def lengths(self) -> int:

@@ -109,10 +109,10 @@ def judged(case: Case, found: list[Rating]) -> Verdict:
         bad = next((p for p in proofs if p.counterexample is not None), None)
         why = str(bad)
         if bad is None:
-            found = _verdict(case, one, proofs, counts, front(good, shown_objectives(objectives)))
-            why = _exceeded(case, found)
+            made = _verdict(case, one, proofs, counts, front(good, shown_objectives(objectives)))
+            why = _exceeded(case, made)
             if not why:
-                return found
+                return made
     return Verdict(case.kind.name, False, (f"no proof ({why})",), *counts)
 
 
