@@ -109,6 +109,7 @@ class Case:
         self.job, self.kind, self.options = job, kind, options
         self.poses = sample_poses(job, kind.robot)
         self.corners = sample_poses(job, kind.robot, 2)
+        self.outline = sample_poses(job, kind.robot, 3)
         self.cycles = cycles_of(job, kind.robot)
         self.half = half_sides(job)
 
@@ -320,7 +321,7 @@ class Case:
         asked = self.job.motion
         everywhere = np.zeros((2, n))
         if asked.acceleration or asked.speed:
-            poses = middle + self.corners
+            poses = middle + self.outline
             heavy = (replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
             speed = max(asked.speed, 1e-6)
             everywhere[0] = worst_forces(robot, poses, speed, asked.acceleration).max(axis=0)

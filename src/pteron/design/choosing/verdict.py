@@ -276,16 +276,16 @@ def _margins(
             least, worst, place = float(every[k]), cycle.words(k), (cycle, k)
     asked = case.job.motion
     if asked.acceleration or asked.speed:
-        corners = one.middle + case.corners
-        speed = max(asked.speed, _NOTHING)
-        forces = np.maximum(worst_forces(robot, corners, speed, asked.acceleration), _NOTHING)
-        rates = np.maximum(worst_speeds(robot, corners, speed), _NOTHING)
+        places = sample_poses(case.job, robot, _DENSE)
+        poses, speed = one.middle + places, max(asked.speed, _NOTHING)
+        forces = np.maximum(worst_forces(robot, poses, speed, asked.acceleration), _NOTHING)
+        rates = np.maximum(worst_speeds(robot, poses, speed), _NOTHING)
         peak, fast = float((most / forces).min()), float((fastest / rates).min())
         found["peak_margin"] = min(found["peak_margin"], peak)
         found["speed_margin"] = min(found["speed_margin"], fast)
         if min(peak, fast) < least:
             at = (most / forces).min(axis=-1) if peak < fast else (fastest / rates).min(axis=-1)
-            corner = case.corners[int(at.argmin())][: len(robot.platform.lengths)]
+            corner = places[int(at.argmin())][: len(robot.platform.lengths)]
             told = ", ".join(f"{1e3 * x:+.0f}" for x in corner)
             worst = f"the motion in any direction, at ({told}) mm"
     return found, worst, place
