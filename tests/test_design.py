@@ -469,7 +469,7 @@ def test_the_plan_of_an_older_search_stays(task):
     assert not {"payload", "cycles", "errors", "elasticity", "motors"} & set(plan["spec"])
     boxed = workspace_spec(objectives=[{"minimise": "force"}])
     assert "sides" not in Task.of(boxed).plan["spec"]["workspace"]
-    assert "over all directions" in Task.of(boxed).plan["quantities"]
+    assert "over all directions" in Task.of(boxed).plan["definition of its quantities"]
 
 
 def test_the_shortest_time_brings_a_drive_to_its_limit():

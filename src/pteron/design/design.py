@@ -25,7 +25,7 @@ from pteron.workspace import Box, Region
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.samples import cube, shape_samples
 
-_STARTS = 2
+_STARTS = 8
 """Worst sampled poses about which a worse one is sought."""
 
 _ROUNDS = 4
@@ -91,10 +91,23 @@ class Design:
     @cached_property
     def poses(self) -> Array:
         """Poses of the required workspace, or of the cube where none is required, (N, m)."""
+        return self.lattice(self._samples)
+
+    @cached_property
+    def fine_poses(self) -> Array:
+        """Poses of the same half as far apart, for what has many local extremes."""
+        return self.lattice(2 * self._samples - 1)
+
+    @property
+    def _samples(self) -> int:
+        return _IN_CUBE if self.workspace is None else self.workspace.samples
+
+    def lattice(self, count: int) -> Array:
+        """Return poses (N, m) of the workspace, or the cube, `count` along each side."""
         if self.workspace is not None:
-            return workspace_poses(self.workspace, self.task.orientations)
+            return workspace_poses(self.workspace, self.task.orientations, count)
         shape = cube(len(self.cube.center))
-        lattice = shape_samples(shape, self.task.orientations, _IN_CUBE)
+        lattice = shape_samples(shape, self.task.orientations, count)
         return lattice.at(self.cube.center, self.cube.edge)
 
     @cached_property
@@ -124,23 +137,26 @@ class Design:
         half = 0.5 * self.cube.edge
         return Box(*(placed_pose(pose, self.cube.center + side * half) for side in (-1.0, 1.0)))
 
-    def worst(self, of: Callable[[Design, Array], Array], sign: float) -> float:
+    def worst(
+        self, of: Callable[[Design, Array], Array], sign: float, *, fine: bool = False
+    ) -> float:
         """Return the greatest, or for the sign -1 the least, value of a function of poses (N, m).
 
         It is taken at the sampled poses, then nearer and nearer about the worst of them; NaN where
         one of them has none.
         """
-        values = sign * of(self, self.poses)
+        poses = self.fine_poses if fine else self.poses
+        values = sign * of(self, poses)
         if np.isnan(values).any():
             return np.nan
-        lengths, workspace = len(self.robot.platform.lengths), self.task.spec.workspace
+        lengths = len(self.robot.platform.lengths)
         offsets = np.zeros((3**lengths, self.robot.freedom))
         offsets[:, :lengths] = list(product((-1.0, 0.0, 1.0), repeat=lengths))
         starts = np.argsort(values, kind="stable")[-_STARTS:]
-        worst, most = self.poses[starts], values[starts]
+        worst, most = poses[starts], values[starts]
         regions = [self.region(pose) for pose in worst]
         low, high = np.stack([region.box for region in regions], axis=1)
-        step = (high - low) / (workspace.samples if workspace is not None else _IN_CUBE)
+        step = (high - low) / self._samples
         for _ in range(_ROUNDS):
             step = step / 2.0
             around = np.clip(worst[:, None] + step[:, None] * offsets, low[:, None], high[:, None])
@@ -233,7 +249,7 @@ class Design:
     def cover(self, name: str) -> str:
         """Return over what one of its quantities is known, in words."""
         kind = quantities()[name].cover
-        times, places = 0, str(len(self.poses))
+        times, places = 0, str(len(self.fine_poses if kind == "fine" else self.poses))
         if kind == "cycles":
             times = sum(2 * len(motion.time) - 1 for motion in self.cycles)
             several = () if name == "cycle_time" else self.sizing.places

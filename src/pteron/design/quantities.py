@@ -19,7 +19,7 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 from pteron.workspace import clearance
 
-Cover = Literal["machine", "proved", "lattice", "places", "directions", "bound", "cycles"]
+Cover = Literal["machine", "proved", "lattice", "places", "fine", "directions", "bound", "cycles"]
 """How far a quantity is known: see `COVERS`."""
 
 COVERS: dict[Cover, str] = {
@@ -27,6 +27,7 @@ COVERS: dict[Cover, str] = {
     "proved": "found, and proved",
     "lattice": "at {places} sampled poses",
     "places": "at {places} sampled poses, and about the worst of them",
+    "fine": "at {places} sampled poses, and about the worst of them",
     "directions": (
         "exact over all directions, at {places} sampled poses and about the worst of them"
     ),
@@ -74,7 +75,8 @@ def _sampled(
 ) -> Quantity:
     """Return the greatest or least of a function of a design and poses (N, m) in the workspace."""
     sign = -1.0 if least else 1.0
-    return Quantity(unit, about, lambda design: design.worst(at, sign), cover=cover)
+    fine = cover == "fine"
+    return Quantity(unit, about, lambda d: d.worst(at, sign, fine=fine), cover=cover)
 
 
 def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> Quantity:
@@ -163,6 +165,7 @@ _OWN = {
         "least distance of two bodies in the workspace, with the file's radii",
         lambda d, poses: clearance(d.robot, poses, on_failure="nan").least,
         least=True,
+        cover="fine",
     ),
     "stroke": Quantity(
         "",

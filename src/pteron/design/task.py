@@ -106,7 +106,7 @@ class Task:
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
         known = quantities()
-        if {known[name].cover for name in self.asked} & {"places", "directions", "bound"}:
+        if {known[name].cover for name in self.asked} & {"places", "fine", "directions", "bound"}:
             plan["definition of its quantities"] = _WORST
         return plan
 
