@@ -208,8 +208,12 @@ class Scene:
         for i, (line, guide) in enumerate(zip(points.links, self._guides, strict=True), start=1):
             way = line[0] - points.reference
             beside = way - (way @ guide.axis) * guide.axis
-            ends = guide.path if guide.slides else line[:1]
-            # Of two sliders on one rail the second has its number at the other end.
+            ends = list(guide.path if guide.slides else line[:1])
+            # Of two sliders on one rail each has its number at the end that is nearer, if it can.
+            if sum(np.allclose(guide.path[0], other.path[0]) for other in self._guides) > 1:
+                ends = [
+                    ends[k] for k in np.linalg.norm(np.subtract(ends, line[0]), axis=1).argsort()
+                ]
             end = next((p for p in ends if not any(np.allclose(p, q) for q in taken)), ends[0])
             taken.append(end)
             away = beside / (np.linalg.norm(beside) or 1.0)
