@@ -155,6 +155,7 @@ ALLOWED = {
     ("report/", "an elbow"): "the working mode",
     ("viewer/", "an elbow"): "the working mode",
     ("workspace/machine_warnings.py", "an elbow"): "whether another working mode is meant",
+    ("workspace/mode_places.py", "an elbow"): "the working modes",
     ("workspace/modes.py", "an elbow"): "the working modes",
     ("workspace/orientations.py", "an elbow"): "the working modes",
     ("kinematics/direct.py", "an elbow"): "the working mode that a pose is in",

@@ -193,7 +193,10 @@ def test_a_motion_of_a_table_is_sized_as_it_is():
         ("size no-such-robot", ["no-such-robot"]),
         ("size delta --friction -1", ["friction: -1.0 given"]),
         ("size delta --dwell 1 --dwell 2", ["dwell: 2 rests given, and 1 motions"]),
-        ("size delta --within x=-0.01:0.01", ["the cycle fits nowhere", "0.02, 0, 0] (x y z"]),
+        (
+            "size delta --within x=0:0.02,y=0:0.02",
+            ["the cycle fits nowhere", "region [0.02, 0.02, "],
+        ),
         ("size delta --within q=1", ["q: is no coordinate of delta"]),
         ("size delta --within x=0:1:5", ["--within: NAME=LEAST:GREATEST expected"]),
     ],

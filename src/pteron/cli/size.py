@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from pteron.manipulator import Manipulator
-    from pteron.motion import Fit, Sizing
+    from pteron.motion import Fit, Motion, Sizing
     from pteron.workspace import Box
 
 _OVERLOADED = 1
@@ -78,8 +79,8 @@ def size(
         [default: adept]
     --dwell: Rest after each cycle, s; again for that after each of several.
     --within REGION: Where the cycle is done: workspace, here (as it stands), or a box of poses such
-        as x=-0.1:0.1,y=-0.1:0.1; what it leaves out is as at home. [default: workspace; here of a
-        table]
+        as x=-0.1:0.1,y=-0.1:0.1; along what it leaves out the cycle has the room that it takes as
+        it stands. [default: workspace; here of a table]
     --friction SHARE: Dry friction of a drive that has none in the file, over its largest force; 0
         leaves it out.
     --motors FILE: Choose from the motors in this CSV or TOML file.
@@ -107,13 +108,14 @@ def size(
     cycles = cycle or [STANDARD]
     where = within or ("workspace" if cycles == [STANDARD] else "here")
     places: Any = {"workspace": "workspace", "here": None}
-    places = places[where] if where in places else _box(machine, where)
+    spans = {} if where in places else _spans(machine, where)
     carried = Carried.of(payload, tool)
     carrying = carried.on(machine)
     with spinner(f"Sizing the drives of {machine.name}"):
         motions = [cycle_of(carrying, one, duration) for one in cycles]
+        region = _box(machine, spans, motions) if spans else places[where]
         how: dict[str, Any] = {"dwell": dwell or [0.0], "friction": friction}
-        found = sized(carrying, motions, places=places, **how)
+        found = sized(carrying, motions, places=region, **how)
         fits = choose(found, chosen, margin=margin)
     lacking = [*_weak(found, margin), *_unserved(found, fits, margin)]
     for text in lacking:
@@ -141,19 +143,32 @@ class _Asked:
     margin: float
 
 
-def _box(machine: Manipulator, text: str) -> Box:
-    """Return the box of poses that --within says, as at home where it says nothing."""
+def _spans(machine: Manipulator, text: str) -> dict[str, tuple[float, ...]]:
+    """Return the values and ranges of coordinates that --within says."""
     from pteron.maps.grid import expect_coordinates
-    from pteron.workspace import Box, home_pose
 
     held, ranges = pose_ranges(text, "--within")
     expect_coordinates(machine, held, ranges)
-    spans: dict[str, tuple[float, ...]] = {name: (value,) for name, value in held.items()} | ranges
-    if any(len(span) > 2 for span in spans.values()):
+    if any(len(span) > 2 for span in ranges.values()):
         raise DataError("--within: NAME=LEAST:GREATEST expected, such as x=-0.1:0.1,y=-0.1:0.1")
-    home = zip(machine.coordinates, home_pose(machine).tolist(), strict=True)
-    ordered = [spans.get(name, (value,)) for name, value in home]
-    return Box(tuple(span[0] for span in ordered), tuple(span[-1] for span in ordered))
+    return ranges | {name: (value, value) for name, value in held.items()}
+
+
+def _box(
+    machine: Manipulator, spans: dict[str, tuple[float, ...]], motions: Sequence[Motion]
+) -> Box:
+    """Return a box of poses, with room for a cycle at every turn along what has no span."""
+    import numpy as np
+
+    from pteron.workspace import Box
+
+    low, high = Box.around(np.vstack([motion.pose for motion in motions])).box
+    half, lengths = (high - low) / 2.0, ~machine.platform.angular
+    half[lengths] = np.linalg.norm(half[lengths])
+    middle = (low + high) / 2.0
+    taken = zip(machine.coordinates, middle - half, middle + half, strict=True)
+    ordered = [spans.get(name, (float(a), float(b))) for name, a, b in taken]
+    return Box(tuple(span[0] for span in ordered), tuple(span[1] for span in ordered))
 
 
 def _weak(found: Sizing, margin: float) -> list[str]:
