@@ -48,8 +48,8 @@ def main() -> None:
     choice = choose_machine(job, workers=1 if quick() else 2)
     work = sum(os.times()[:4]) - sum(before[:4])
     took = time.perf_counter() - begin
-    print(f"{len(choice.verdicts)} kinds in {took:.0f} s, {work:.0f} s of processors' time")
-    for one in choice.verdicts:
+    print(f"{len(choice.candidates)} kinds in {took:.0f} s, {work:.0f} s of processors' time")
+    for one in choice.candidates:
         if one.serves:
             print(f"{one.kind}: {told(choice, one)}; {checked(job, one)}")
         else:

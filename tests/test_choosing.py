@@ -77,7 +77,7 @@ def test_a_finished_kind_is_not_searched_again(chosen, tmp_path):
 
 
 def test_why_a_kind_falls_out_is_told():
-    (one,) = choose_machine(of(cell={"height": 0.05}, search={"evaluations": 12})).verdicts
+    (one,) = choose_machine(of(cell={"height": 0.05}, search={"evaluations": 12})).candidates
     assert not one.serves
     assert any("height" in text and "at most 0.05 m asked" in text for text in one.why)
 

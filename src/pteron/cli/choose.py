@@ -82,7 +82,7 @@ def _show(found: Choice) -> None:
     from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
 
     show("[bold]Asked[/bold]: " + plain("; ".join(asked(found.job))))
-    serving = [one for one in found.verdicts if one.serves]
+    serving = [one for one in found.candidates if one.serves]
     rows = {one.kind: cells(one) for one in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
     if serving:
@@ -95,7 +95,7 @@ def _show(found: Choice) -> None:
             f"  {plain(one.proved)}",
             f"  margins: {plain(margins(one))}",
         )
-    for one in found.verdicts:
+    for one in found.candidates:
         if not one.serves:
             near = plain("; ".join(one.why))
             show(f"[bold]{one.kind}[/bold] falls out: the nearest design has {near}")

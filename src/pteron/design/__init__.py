@@ -1,8 +1,8 @@
 """Searches for the best dimensions of a machine, or the best machine, with proofs."""
 
+from pteron.design.choosing.candidate import Candidate as Candidate
 from pteron.design.choosing.choose import Choice as Choice, choose_machine as choose_machine
 from pteron.design.choosing.job import Job as Job, read_job as read_job
-from pteron.design.choosing.verdict import Verdict as Verdict
 from pteron.design.design import Design as Design
 from pteron.design.differences import Change as Change
 from pteron.design.front import Front as Front

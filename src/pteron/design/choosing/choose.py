@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from pteron.atomic import write_text
+from pteron.design.choosing.candidate import Candidate, judged
 from pteron.design.choosing.drives import GEARBOXES, MOTORS, Options, read_lists
 from pteron.design.choosing.job import Job
 from pteron.design.choosing.kinds import Build, Kind, fitting_kinds
 from pteron.design.choosing.rating import Case
 from pteron.design.choosing.samples import half_sides
 from pteron.design.choosing.search import search_kind
-from pteron.design.choosing.verdict import Verdict, judged
 from pteron.design.evolution import one_thread
 from pteron.errors import DataError
 from pteron.json_values import json_ready
@@ -42,30 +42,30 @@ class Choice:
     ----------
     job : Job
         The job.
-    verdicts : tuple of Verdict
+    candidates : tuple of Candidate
         The best first, by the first objective; those that do not serve last.
     resumed : tuple of str
         Kinds that an earlier run had finished.
     """
 
     job: Job
-    verdicts: tuple[Verdict, ...]
+    candidates: tuple[Candidate, ...]
     resumed: tuple[str, ...] = ()
 
     @property
-    def best(self) -> Verdict | None:
+    def best(self) -> Candidate | None:
         """The best kind by the first objective; None where none serves."""
-        return self.verdicts[0] if self.verdicts and self.verdicts[0].serves else None
+        return self.candidates[0] if self.candidates and self.candidates[0].serves else None
 
     def robots(self) -> dict[str, str]:
         """Return the machines' files by their names."""
-        return {f"{one.kind}.toml": one.robot for one in self.verdicts if one.serves}
+        return {f"{one.kind}.toml": one.robot for one in self.candidates if one.serves}
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data, SI units."""
         found = {
             "objectives": list(self.job.objectives),
-            "kinds": [one.data() for one in self.verdicts],
+            "kinds": [one.data() for one in self.candidates],
             "job": self.job.model_dump(mode="json", exclude_none=True),
         }
         return dict(json_ready(found))
@@ -118,9 +118,9 @@ def choose_machine(
             progress(sum(shares.values()) / len(shares), name)
 
     left = {name: case for name, case in cases.items() if name not in found}
-    for name, verdict in _searched(left, workers, tell):
-        found[name] = verdict
-        kept.keep(verdict)
+    for name, candidate in _searched(left, workers, tell):
+        found[name] = candidate
+        kept.keep(candidate)
         tell(name, 1.0)
     objective = job.objectives[0]
     order = sorted(
@@ -160,7 +160,7 @@ def cases_of(job: Job) -> dict[str, Case]:
     }
 
 
-def _verdict(case: Case, progress: Callable[[float], None]) -> Verdict:
+def _candidate(case: Case, progress: Callable[[float], None]) -> Candidate:
     search = case.job.search
     with one_thread():
         return judged(case, search_kind(case, search.evaluations, search.seed, progress))
@@ -168,11 +168,11 @@ def _verdict(case: Case, progress: Callable[[float], None]) -> Verdict:
 
 def _searched(
     cases: Mapping[str, Case], workers: int, tell: Callable[[str, float], None]
-) -> Iterator[tuple[str, Verdict]]:
-    """Yield the verdicts as they are found, in as many processes."""
+) -> Iterator[tuple[str, Candidate]]:
+    """Yield the candidates as they are found, in as many processes."""
     if workers < 2 or len(cases) < 2:
         for name, case in cases.items():
-            yield name, _verdict(case, partial(tell, name))
+            yield name, _candidate(case, partial(tell, name))
         return
     context = get_context("spawn")
     done = context.Array("d", len(cases))
@@ -198,11 +198,11 @@ def _begin(shares: Any) -> None:
     _shares = shares
 
 
-def _in_process(case: Case, k: int) -> Verdict:
+def _in_process(case: Case, k: int) -> Candidate:
     def tell(share: float) -> None:
         _shares[k] = share
 
-    return _verdict(case, tell)
+    return _candidate(case, tell)
 
 
 class _Kept:
@@ -217,7 +217,7 @@ class _Kept:
         text = json.dumps([RESULTS, name, job, options], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
-    def find(self, name: str) -> Verdict | None:
+    def find(self, name: str) -> Candidate | None:
         """Return a kind that an earlier run has finished."""
         if self._folder is None or not (file := self._folder / f"{name}.json").is_file():
             return None
@@ -226,13 +226,13 @@ class _Kept:
             if data.pop("digest", None) != self._digest(name):
                 return None
             lists = {key: tuple(data[key]) for key in ("why", "drives", "front", "middle")}
-            return Verdict(**data | lists)
+            return Candidate(**data | lists)
         except (ValueError, TypeError, KeyError):
             return None
 
-    def keep(self, verdict: Verdict) -> None:
+    def keep(self, candidate: Candidate) -> None:
         """Keep a finished kind."""
         if self._folder is not None:
-            data = json_ready(verdict.data() | {"digest": self._digest(verdict.kind)})
+            data = json_ready(candidate.data() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_text(self._folder / f"{verdict.kind}.json", json.dumps(data, indent=1) + "\n")
+            write_text(self._folder / f"{candidate.kind}.json", json.dumps(data, indent=1) + "\n")

@@ -179,7 +179,7 @@ def power(option: Option) -> float:
 
 
 @dataclass(frozen=True)
-class Loads:
+class JointLoads:
     """The loads of the joints of one machine, rigid bodies alone.
 
     Attributes

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from pteron.bodies.inertia import inertia_count
-from pteron.design.choosing.drives import Loads, Option, Options
+from pteron.design.choosing.drives import JointLoads, Option, Options
 from pteron.design.choosing.job import OBJECTIVES, Job
 from pteron.design.choosing.kinds import Kind, slides
 from pteron.design.choosing.samples import Places, cycles_of, half_sides, sample_poses
@@ -296,7 +296,7 @@ class Case:
 
     def loads(
         self, robot: Manipulator, middle: Array, time: float | None
-    ) -> tuple[Loads, list[tuple[float, Array]]]:
+    ) -> tuple[JointLoads, list[tuple[float, Array]]]:
         """Return the loads of all cycles at all places, and of each the work and ways of joints."""
         n = robot.joint_count
         squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
@@ -329,7 +329,9 @@ class Case:
             everywhere[1] = spun.max(axis=0) / _HEAVY
             speeds = np.maximum(speeds, worst_speeds(robot, poses, speed).max(axis=0))
         every = np.concatenate(squares) if squares else np.zeros((1, n, 3))
-        return Loads(every, np.concatenate(forces), np.concatenate(rises), speeds, everywhere), work
+        return JointLoads(
+            every, np.concatenate(forces), np.concatenate(rises), speeds, everywhere
+        ), work
 
     def states(self, cycle: Places, middle: Array, duration: float) -> tuple[Array, Array, Array]:
         """Return the states (B, K, m) of a cycle that takes so long."""

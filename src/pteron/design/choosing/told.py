@@ -1,12 +1,12 @@
-"""A verdict in words and rounded numbers, as the table on the screen and the page have it."""
+"""A candidate in words and rounded numbers, as the table on the screen and the page have it."""
 
 from __future__ import annotations
 
 from collections import Counter
 
+from pteron.design.choosing.candidate import Candidate
 from pteron.design.choosing.choose import Choice
 from pteron.design.choosing.job import Job
-from pteron.design.choosing.verdict import Verdict
 
 _FIGURES = {
     "price": ("price", 1.0),
@@ -16,12 +16,12 @@ _FIGURES = {
     "moving_mass": ("mass (kg)", 1.0),
     "energy": ("energy (J)", 1.0),
 }
-"""Figures of a verdict that are shown: their headings and factors."""
+"""Figures of a candidate that are shown: their headings and factors."""
 
 _MARGINS = {"rated_margin": "rated torque", "peak_margin": "peak torque", "speed_margin": "speed"}
 
 
-def cells(one: Verdict) -> dict[str, str]:
+def cells(one: Candidate) -> dict[str, str]:
     """Return a row's numbers by their headings, rounded; of a machine that serves."""
     least = min(one.figures[name] for name in _MARGINS if name in one.figures)
     found = {"margin": f"{least:.2f}"}
@@ -31,19 +31,19 @@ def cells(one: Verdict) -> dict[str, str]:
     return found
 
 
-def drives(one: Verdict) -> str:
+def drives(one: Candidate) -> str:
     """Return motors and gearboxes in a line."""
     return ", ".join(f"{count} x {name}" for name, count in Counter(one.drives).items())
 
 
-def dimensions(one: Verdict) -> str:
+def dimensions(one: Candidate) -> str:
     """Return the dimensions of a machine in a line, mm."""
     own = ", ".join(f"{name} {1e3 * value:.0f}" for name, value in one.dimensions.items())
     whole = (f"{1e3 * one.figures[name]:.0f}" for name in ("width", "depth", "height"))
     return f"{own}; it moves within {' x '.join(whole)}"
 
 
-def margins(one: Verdict) -> str:
+def margins(one: Candidate) -> str:
     """Return the drives' margins and the place of the least, in a line."""
     known = {word: one.figures[name] for name, word in _MARGINS.items() if name in one.figures}
     told = ", ".join(f"{word} {value:.2f}" for word, value in known.items())

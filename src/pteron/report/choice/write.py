@@ -31,7 +31,7 @@ def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
 
 def page(choice: Choice) -> str:
     """Return the page as HTML without reference to another file."""
-    serving = [one for one in choice.verdicts if one.serves]
+    serving = [one for one in choice.candidates if one.serves]
     headings = list(dict.fromkeys(key for one in serving for key in cells(one)))
     figure = None
     if serving:
@@ -43,7 +43,7 @@ def page(choice: Choice) -> str:
     return template("choice/page.html.j2").render(
         choice=choice,
         serving=serving,
-        others=[one for one in choice.verdicts if not one.serves],
+        others=[one for one in choice.candidates if not one.serves],
         headings=headings,
         cells={one.kind: cells(one) for one in serving},
         dimensions=dimensions,

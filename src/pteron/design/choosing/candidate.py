@@ -42,7 +42,7 @@ _LONGER = 0.05
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Candidate:
     """One kind of machine after the search: its best design, or why there is none.
 
     Attributes
@@ -92,7 +92,7 @@ class Verdict:
         return asdict(self)
 
 
-def judged(case: Case, found: list[Rating]) -> Verdict:
+def judged(case: Case, found: list[Rating]) -> Candidate:
     """Return the best design of a search that can be proved, or why there is none."""
     objectives = case.job.objectives
     first, second = shown_objectives(objectives)[:2]
@@ -102,21 +102,21 @@ def judged(case: Case, found: list[Rating]) -> Verdict:
     counts = len(found), len(good)
     if not good:
         nearest = min(found, key=lambda one: one.cost(objectives[0]))
-        return Verdict(case.kind.name, False, tuple(nearest.told.values()), *counts)
+        return Candidate(case.kind.name, False, tuple(nearest.told.values()), *counts)
     why = ""
     for one in good[:_TRIED]:
         proofs = _proofs(case, one)
         bad = next((p for p in proofs if p.counterexample is not None), None)
         why = str(bad)
         if bad is None:
-            made = _verdict(case, one, proofs, counts, front(good, shown_objectives(objectives)))
+            made = _candidate(case, one, proofs, counts, front(good, shown_objectives(objectives)))
             why = _exceeded(case, made)
             if not why:
                 return made
-    return Verdict(case.kind.name, False, (f"no proof ({why})",), *counts)
+    return Candidate(case.kind.name, False, (f"no proof ({why})",), *counts)
 
 
-def _exceeded(case: Case, found: Verdict) -> str:
+def _exceeded(case: Case, found: Candidate) -> str:
     """Return in words what a design exceeds between the poses of its search; empty for nothing."""
     job, figures = case.job, found.figures
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
@@ -176,9 +176,9 @@ def _regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
     return [Box(tuple(low.tolist()), tuple(high.tolist()))]
 
 
-def _verdict(
+def _candidate(
     case: Case, one: Rating, proofs: list[Proof], counts: tuple[int, int], best: list[Rating]
-) -> Verdict:
+) -> Candidate:
     robot = one.robot
     assert robot is not None  # it keeps all that is asked
     carrying = case.loaded(robot)
@@ -194,7 +194,7 @@ def _verdict(
         figures["deflection"] = float(case.job.stiffness.force / least)
     times = _reached(case, carrying, one, place)
     objectives = shown_objectives(case.job.objectives)
-    return Verdict(
+    return Candidate(
         case.kind.name,
         True,
         (),
