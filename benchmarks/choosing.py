@@ -20,7 +20,7 @@ from measuring import quick
 
 import pteron
 from pteron.controllers import CONTROLLERS
-from pteron.design import Choice, Job, Verdict, choose_machine, read_job
+from pteron.design import Candidate, Choice, Job, choose_machine, read_job
 from pteron.design.choosing.choose import cases_of
 from pteron.design.choosing.rating import Rating
 from pteron.design.choosing.search import search_kind
@@ -57,8 +57,8 @@ def main() -> None:
     against_chance()
 
 
-def told(choice: Choice, one: Verdict) -> str:
-    """Return the objectives of a verdict."""
+def told(choice: Choice, one: Candidate) -> str:
+    """Return the objectives of a candidate."""
     return ", ".join(f"{name} {one.figures[name]:.4g}" for name in choice.job.objectives)
 
 
@@ -67,7 +67,7 @@ def changed(job: Job, **keys: object) -> Job:
     return Job.model_validate(job.model_dump(exclude_unset=True) | keys)
 
 
-def checked(job: Job, one: Verdict) -> str:
+def checked(job: Job, one: Candidate) -> str:
     """Return margins of a chosen machine over random poses and cycles, and a simulation."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / "machine.toml"
@@ -84,7 +84,7 @@ def checked(job: Job, one: Verdict) -> str:
     assert (joints <= high).all()
     assert margins.type_i.min() >= job.floors.type_i
     assert margins.type_ii.min() >= job.floors.type_ii
-    # Without backlash, which a machine's file does not have; the verdict's own figure has it.
+    # Without backlash, which a machine's file does not have; the candidate's own figure has it.
     assert job.accuracy is not None
     ratios = np.array([drive.gear for drive in drives_of(robot)])
     errors = Tolerances((np.pi / job.accuracy.counts_per_turn / ratios).tolist())
@@ -104,7 +104,7 @@ def checked(job: Job, one: Verdict) -> str:
     )
 
 
-def path_points(job: Job, one: Verdict, shift: Array, turn: float) -> Array:
+def path_points(job: Job, one: Candidate, shift: Array, turn: float) -> Array:
     """Return the poses of the first cycle's points at a place, turned about the upright."""
     c, s = np.cos(turn), np.sin(turn)
     given = np.array(job.cycles[0].points) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -114,7 +114,7 @@ def path_points(job: Job, one: Verdict, shift: Array, turn: float) -> Array:
 
 
 def random_cycles(
-    job: Job, robot: Manipulator, one: Verdict, rng: np.random.Generator
+    job: Job, robot: Manipulator, one: Candidate, rng: np.random.Generator
 ) -> Iterator[tuple[Array, Array, Array]]:
     """Yield states of the cycle at random places and in random directions of the workspace."""
     cycle, half, left = job.cycles[0], 0.5 * np.array(job.workspace.size), _CYCLES
@@ -157,7 +157,7 @@ def random_motions(job: Job, robot: Manipulator, poses: Array, rng: np.random.Ge
     return float((limits_of(robot).force / np.abs(forces).max(axis=0)).min())
 
 
-def driven(job: Job, robot: Manipulator, one: Verdict) -> str:
+def driven(job: Job, robot: Manipulator, one: Candidate) -> str:
     """Return how the simulated machine follows the cycle with its drives."""
     cycle = job.cycles[0]
     path = line_path(robot, path_points(job, one, np.zeros(3), 0.0), cycle.corner)
