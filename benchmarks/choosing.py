@@ -39,6 +39,7 @@ _JOBS, _EVALUATIONS = (1, 30) if quick() else (10, 400)
 _KINDS = ("delta", "linear-delta", "orthoglide", "tripteron", "par4", "quadrupteron", "hexa")
 
 
+@np.errstate(divide="ignore")  # a leg may have nothing to do
 def main() -> None:
     """Print each claim's figures."""
     job = read_job(_FILE)
