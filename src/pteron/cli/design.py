@@ -1,4 +1,7 @@
-"""`pteron design`: the search for the best dimensions, from a TOML file to a folder of results."""
+"""`pteron design`: a search for a machine's best dimensions by a TOML file that says what is asked.
+
+With `--out` all that is evaluated is kept in a folder, and the search goes on there.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ if TYPE_CHECKING:
     from pteron.design import Front, Spec, Summary
 
 _GENERATIONS, _SURVEY = "generations", "survey"
-"""Folders of the evaluated designs, in that of the results."""
+"""Subfolders of the results that keep the designs evaluated: by a search, by `--sweep`."""
 
 
 def design(
@@ -37,9 +40,9 @@ def design(
     and a list of motors, ... A search of several objectives has a front of best
     designs, each better than any other in something.
 
-    A folder gets front.csv, front.parquet, front.png, report.md with what changed and what is
-    proved, design.json, and the best machines as TOML files. What is evaluated is kept there, so
-    that the same command goes on where it was ended, and ends in the same front.
+    With --out a folder gets front.csv, front.parquet, front.png, report.md with what changed and
+    what is proved, design.json, and the best machines as TOML files. What is evaluated is kept
+    there, so that the same command goes on where it was ended, and ends in the same front.
 
     Arguments
     ---------

@@ -1,4 +1,8 @@
-"""Recordings: logs in memory, or files read in pieces, divided into a part to fit and a rest."""
+"""Recordings: logs in memory, or files read in pieces, divided into rows to fit and to hold out.
+
+Held-out rows judge the fit. `recording` mends time stamps first, and leaves lead-in and lead-out
+aside.
+"""
 
 from __future__ import annotations
 
@@ -21,17 +25,17 @@ _END = int(np.iinfo(np.int64).max)
 read."""
 
 _ROUNDINGS = 2.0
-"""Largest error of stamps beside their clock's ticks, in the spacing of floats."""
+"""Distance of time stamps from an even clock, in spacings of floats, that counts as rounding."""
 
 FITTED = 0.7
-"""Share of a log that is fitted where nothing else is held out."""
+"""Share of a log that is fitted, about, where no other log is held out."""
 
 
 @dataclass(frozen=True)
 class Recording:
     """A log, or its rows `start` to `stop`, that can be read more than once.
 
-    Rows count from 0; `stop` may lie beyond the last.
+    Rows count from 0, without row `stop`, which may lie beyond the last.
     """
 
     log: Log | LogFile

@@ -7,10 +7,10 @@ The savings that a person would make by hand are made here, once, for every equa
     x + y - z  and  w - y - x  ->  s = x + y; s - z, w - s  a part of two sums (or two products)
     -(a - b)  and  b - a       ->  b - a                    one difference: signs stand outside
     a/2.5                      ->  0.4*a                    a number's quotient is a product
-    a/x  and  b/x              ->  r = 1/x; a*r, b*r        one division, which takes longer
+    a/x  and  b/x              ->  r = 1/x; a*r, b*r        one division: it takes longer
 
-A graph of pairs does not show such savings, the sums of many terms of `terms` do. Three steps are
-repeated on them for as long as they save something:
+A graph whose operations take two operands does not show such savings; one of sums and products of
+many (`terms`) does. Three passes over it are repeated for as long as they save something:
 
     flatten   a sum that is used once, in a sum, becomes part of it
     factor    the factor that most terms of a sum have is taken out of them, again and again
@@ -20,7 +20,7 @@ Products are flattened and shared like sums; divisions are saved last, for one o
 This is the greedy algebraic elimination of common subexpressions of A. Hosangadi, F. Fallah and
 R. Kastner, IEEE Transactions on CAD 25 (2006) 2012-2022. No product of sums is multiplied out and
 nothing is divided that was not divided before, so that a result differs from the plain one by the
-rounding of its terms only.
+rounding of its terms only, as long as 1/x is no overflow.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from pteron.kernels.translation import read, written
 
 
 def optimised(function: ca.Function) -> ca.Function:
-    """Return an SX function of the same inputs, outputs and values with fewer operations.
+    """Return a function of the same inputs, outputs and values that takes less time.
 
-    Where nothing is saved it is the function given. A division takes as long as several products:
-    to save one, an operation more is taken.
+    It has fewer operations, but for one more for each division that is saved: a division takes as
+    long as several products. Where nothing is saved it is the function given.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""R-P-S legs, of tripods: a ram (P) in an upright plane, with a ball joint (S) at the platform."""
+"""R-P-S legs, of tripods: a hinge (R) at the base, a ram (P), a ball joint (S) at the platform.
+
+The ram stays in the plane across the hinge's axis, which holds the axis of the level platform.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,9 @@ from pteron.legs.rpr import RPR, RPREquations
 
 @dataclass(frozen=True)
 class RPS(RPR):
-    """An R-P-S leg: it keeps its platform point in the plane through r, normal to `direction`.
+    """An R-P-S leg: it keeps its platform point in the plane through r, across `direction`.
 
-    It is an R-P-R leg that ends in a ball joint; r is the guide point.
+    It is an R-P-R leg that ends in a ball joint; r is the guide point, the hinge's place.
     """
 
     platform_cone: Cone | None = None

@@ -1,4 +1,7 @@
-"""Checksums (SHA-256) of a map's data and arrays, by which damage to a file is noticed."""
+"""Checksums (SHA-256) of a map's files and chunks, by which damage to them is noticed.
+
+A map holds an index of performance over a grid of poses.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from numpy.typing import NDArray
 
 
 def checksum(about: Any, arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the SHA-256 of plain data and arrays, their names, types and shapes among it.
+    """Return the SHA-256 of what JSON can hold and of arrays with their names, types and shapes.
 
     The order of the arrays does not count, and a NaN is a NaN, whatever its bits.
     """

@@ -1,4 +1,7 @@
-"""Axes of pictures in space, seen from any side: nearer things hide those farther away."""
+"""Axes in which a machine in space is drawn, seen from any azimuth, a little from above.
+
+Things are drawn one over the other, the farthest first, by the distance of their middles.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +20,14 @@ from pteron.plots.canvas import GRID
 from pteron.plots.machine_axes import MachineAxes
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
-"""Degrees, from which the machine is seen at first: `turn` walks round it."""
+"""Degrees from which the machine is seen; `turn` adds to the azimuth."""
 
 _MARGIN = 0.04
-"""Margin on each side, as a share of the figure."""
+"""Margin on each side, as a share of the box that is filled."""
 
 
 def upright(vertical: Array) -> Array:
-    """Return a rotation (3, 3) that takes a direction to z, and x as nearly to x as it can."""
+    """Return a rotation (3, 3) that takes a direction to z and keeps x, or y, near its place."""
     z = vertical / np.linalg.norm(vertical)
     near = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
     y = np.cross(z, near)
@@ -33,7 +36,7 @@ def upright(vertical: Array) -> Array:
 
 
 class SpaceAxes(MachineAxes):
-    """Axes onto which segments and faces are put in the order of their distance.
+    """Matplotlib's three-dimensional axes, with a vertical, which draw by distance.
 
     They take a `box` of the figure: left, bottom, width and height, as shares of it.
     """

@@ -1,6 +1,7 @@
-"""Lengths and unit vectors in exact numbers: recognised where they are simple, else approximated.
+"""Lengths and unit vectors in exact numbers, for exact ranks: square roots of fractions (surds).
 
-Directions that are parallel, or at right angles, are kept so as far as fractions can.
+A float is recognised where it is near a simple surd, such as sqrt(3)/2, else approximated by a
+fraction. Parallel directions stay parallel; right angles that approximations lose are told.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ ExactVector = tuple[Surd, Surd, Surd]
 """Components along x, y and z."""
 
 PARALLEL = 1e-9
-"""rad within which directions count as parallel, or at a right angle."""
+"""rad within which directions count as parallel or at a right angle, and components as zero."""
 
 FINE = 10**12
-"""Largest denominator of an approximation: its error is below 1e-12 times 1e-6."""
+"""Largest denominator of an approximation, whose error is then below 1e-12."""
 
 _NOISE = 1e-14
-"""Error of a unit vector by rounding; a larger one is reported."""
+"""Difference of a recognised direction from its floats that is rounding, and not reported."""
 
 _NEARLY = 1e-5
 """Angle, rad, within which a relation that does not hold was perhaps meant to hold."""
@@ -38,7 +39,7 @@ UNIT: tuple[ExactVector, ...] = (_ONE, ZERO, ZERO), (ZERO, _ONE, ZERO), (ZERO, Z
 
 @dataclass(frozen=True)
 class Notes:
-    """The notes of a conversion to exact numbers: which were recognised, which approximated."""
+    """A conversion to exact numbers that notes which were recognised and which approximated."""
 
     recognised: list[str]
     approximated: list[str]

@@ -1,4 +1,8 @@
-"""Integration of a machine's equations of motion under the forces of its drives."""
+"""The plant of a simulation: a machine's equations of motion, integrated under its drives' forces.
+
+`Plant` steps one machine, `advance` many states at once, `longest_step` says how long a step may be
+where there is friction.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +44,7 @@ def advance(
 
     The equations are those of `drive_accelerations`: friction and the motors' inertia count. Where
     there is a C compiler the steps are one loop of machine code, which is compiled when it is first
-    asked for; the machines of a batch share the width of a vector.
+    asked for, and several states of a batch are computed by one instruction.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Checks that a machine can follow a path: reach, limits of joints, and singularities.
+"""Checks that a machine can follow a path or a motion: reach, joint limits, singularities.
 
-The path is continuous: its measures are followed between samples too, so that none jumps
-over a place where it fails.
+Between samples the margins are followed to their least values, so that a place where one fails
+between two samples is found. This is a search, no proof.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from pteron.motion.trajectories.path import Path, poses_of
 from pteron.workspace.margins import joint_distances
 
 _SAMPLES = 1001
-"""Poses of a path that are looked at before its measures are followed between them."""
+"""Poses of a path, about, that are looked at before its margins are followed between them."""
 
 _ROUNDING = 1e-9
-"""Distance beyond a joint's limit that counts as rounding, m or rad."""
+"""Distance beyond a limit, or out of reach, that counts as rounding, m or rad."""
 
 _MILLIMETRES = 20.0
-"""A place that misses a leg's reach by more times the leg's size is likely in millimetres."""
+"""A pose out of a leg's reach by more than so many leg sizes is likely in millimetres."""
 
 
 def check_path(robot: RobotLike, path: Path) -> None:

@@ -1,4 +1,7 @@
-"""The report on an identification: a page to read, its numbers, the model file of real bodies."""
+"""The report on identified dynamics: an HTML page, its numbers, and the machine's file.
+
+The file is that of the machine with bodies that can exist, where the values allow any.
+"""
 
 from pteron.public import publish as _publish
 from pteron.report.identification.values import (
