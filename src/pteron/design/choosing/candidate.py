@@ -160,7 +160,7 @@ def _proofs(case: Case, one: Rating) -> list[Proof]:
 
 
 def _regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
-    """Return the workspace as regions of poses: of of a list each, of a cylinder each turn."""
+    """Return the workspace as regions of poses: one for each of a list, and for each turn of a cylinder."""
     space, count = case.job.workspace, len(robot.platform.lengths)
     if space.poses is not None:
         return [Box(tuple(pose), tuple(pose)) for pose in middle + case.poses]
@@ -215,7 +215,8 @@ def _proof_words(case: Case, proofs: Sequence[Proof]) -> str:
     if case.job.workspace.poses is not None:
         return f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
     if all(proof.holds for proof in proofs):
-        return f"proved: every pose keeps reach, limits and floors, by intervals over {boxes} boxes"
+        poses = "every pose" if len(proofs) == 1 else f"every position, at {len(proofs)} turns,"
+        return f"proved: {poses} keeps reach, limits and floors, by intervals over {boxes} boxes"
     return (
         f"kept at {len(case.poses)} sample poses; intervals over {boxes} boxes do not decide of all"
     )
