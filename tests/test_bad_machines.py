@@ -286,7 +286,7 @@ def test_a_fault_hides_none_that_does_not_hang_on_it(tmp_path):
     found = faults_in("[[legs]]".join([head, first, second, *others]), tmp_path)
     assert [fault.split(": ")[0:2] for fault in found[:4]] == [
         ["name", "missing; the file must give a text"],
-        ["nam", "unknown key; the valid ones there are name, gravity, radii, platform, legs"],
+        ["nam", "unknown key; the valid ones there are name, gravity, radii, tools, platform, legs"],
         ["platform.bars, item 1", "mass"],
         ["platform.limits", "a 3T platform has no angle to limit"],
     ]

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from mechanisms import gated
+from mechanisms import CLIENTS, gated
 from typer.testing import CliRunner, Result
 
 import pteron
@@ -821,6 +821,7 @@ def test_a_machine_without_a_common_reach_is_refused():
 # The report
 
 
+@CLIENTS
 def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     text = done("report tripteron --out one/two --elbows +-+")
@@ -843,6 +844,7 @@ def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
     assert "forces" not in found["cycle"]
 
 
+@CLIENTS
 def test_a_motion_is_a_page_or_in_a_report(monkeypatch: pytest.MonkeyPatch):
     done("cycle tripteron --to 0.1 0 0.05 --acceleration 5 --rate 200 --out way.csv")
     samples = len(pl.read_csv("way.csv"))

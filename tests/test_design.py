@@ -274,6 +274,7 @@ def workspace_spec(**given):
     return spec_of(**usual | given)
 
 
+@CLIENTS
 def test_a_survey_streams_and_goes_on(tmp_path):
     asked = workspace_spec()
     asked = asked.model_copy(

@@ -78,7 +78,7 @@ def result(name):
 
 
 NAMES = ["quadrupteron", "no bodies", "unreal", "hostile"]
-EVERY = pytest.mark.parametrize("name", gated(NAMES, ["unreal", "hostile"]))
+EVERY = pytest.mark.parametrize("name", gated(NAMES, ["hostile"]))
 
 
 @lru_cache

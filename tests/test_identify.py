@@ -63,7 +63,7 @@ FAMILY = ["linear-delta", "five-bar", "3-rrr", "delta-4", "par4"]
     "name",
     gated(
         ["quadrupteron", "delta", "mixed", "mixed, planar", *FAMILY, "ball-table", "stewart"],
-        ["delta", "mixed, planar", "delta-4", "ball-table"],
+        ["delta", "mixed, planar", "ball-table"],
     ),
 )
 def test_noise_free_logs_give_back_the_machine(name):

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
+from mechanisms import CLIENTS, gated
 
 import pteron
 from pteron.errors import DataError
@@ -59,7 +60,7 @@ def test_columns_are_read_by_their_names_in_any_order(name, form):
     np.testing.assert_allclose(back, parts[2], rtol=1e-7, atol=1e-7)
 
 
-@pytest.mark.parametrize("target", ["vm", "numba", "c", "jax"])
+@pytest.mark.parametrize("target", gated(["vm", "numba", "c", "jax"], ["vm"], CLIENTS))
 def test_every_compiled_kernel_takes_tables(target):
     robot = pteron.load("delta")
     parts = motion_of(robot)[:3]

@@ -65,7 +65,7 @@ MACHINES = {
     "shaft": with_a_tool(CATALOG["delta-4"]),
     "planar": CATALOG["3-rrr"],
 }
-EVERY = in_turn(MACHINES, ("quadrupteron", "hostile", "shaft", "planar"), share=1)
+EVERY = in_turn(MACHINES, ("quadrupteron", "hostile", "planar"), share=1)
 
 VOID = {"meta", "input", "br", "hr", "img", "link"}
 

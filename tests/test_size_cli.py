@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from mechanisms import CLIENTS
 from test_cli import done, refused, run
 
 import pteron
@@ -137,6 +138,7 @@ def test_motors_of_a_list_are_fitted_to_each_joint(driven: str):
     assert "is it in grams?" in result.stderr
 
 
+@CLIENTS
 def test_a_folder_gets_tables_numbers_and_pictures(driven: str):
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
     result = run(f"size {driven} --motors motors.csv --out made/sizing")
