@@ -265,6 +265,9 @@ def faults_in(text, tmp_path):
     return caught.value.faults
 
 
+KEYS = "name, gravity, radii, tools, platform, legs"
+
+
 def test_a_fault_hides_none_that_does_not_hang_on_it(tmp_path):
     text = text_of("par4").replace('motion = "3T1R"', 'motion = "3T"')
     four = "legs: 4 given, but a 3T platform has 3 freedoms and needs 3 legs"
@@ -286,7 +289,7 @@ def test_a_fault_hides_none_that_does_not_hang_on_it(tmp_path):
     found = faults_in("[[legs]]".join([head, first, second, *others]), tmp_path)
     assert [fault.split(": ")[0:2] for fault in found[:4]] == [
         ["name", "missing; the file must give a text"],
-        ["nam", "unknown key; the valid ones there are name, gravity, radii, tools, platform, legs"],
+        ["nam", f"unknown key; the valid ones there are {KEYS}"],
         ["platform.bars, item 1", "mass"],
         ["platform.limits", "a 3T platform has no angle to limit"],
     ]

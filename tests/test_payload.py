@@ -20,13 +20,14 @@ from pteron.identification.signals import Processing
 from pteron.workspace import home_pose
 
 SOME = ("ball-table",)
+OTHERS = ("mixed", "3-rrr", "par4")
 CENTRAL = Processing(derivatives="central")
 EACH = pytest.mark.parametrize(
     ("name", "processing"),
     [
         *(
             pytest.param(name, None, marks=() if name in SOME else NIGHTLY)
-            for name in (*SOME, "five-bar", "quadrupteron", "delta-4", "random 3T 0", "mixed", "3-rrr", "par4")
+            for name in (*SOME, "five-bar", "quadrupteron", "delta-4", "random 3T 0", *OTHERS)
         ),
         ("quadrupteron-oblique", CENTRAL),
     ],

@@ -160,7 +160,7 @@ def _proofs(case: Case, one: Rating) -> list[Proof]:
 
 
 def _regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
-    """Return the workspace as regions of poses: one for each of a list, and for each turn of a cylinder."""
+    """Return the workspace as regions: each pose of a list, a cylinder at each turn."""
     space, count = case.job.workspace, len(robot.platform.lengths)
     if space.poses is not None:
         return [Box(tuple(pose), tuple(pose)) for pose in middle + case.poses]
