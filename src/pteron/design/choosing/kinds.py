@@ -254,7 +254,7 @@ def fitting_kinds(asked: Sequence[str] | None, lengths: int, turn: bool, tilt: b
         if not lacks:
             found.append(name)
         elif asked is not None:
-            faults.append(f"kinds: {name} {' and '.join(lacks)}, which the job asks for")
+            faults.append(f"kinds: {name} {' and '.join(lacks)}, but the job asks for more")
     if faults:
         raise DataError("\n  ".join(faults))
     return found

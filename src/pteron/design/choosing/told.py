@@ -91,7 +91,9 @@ def assumed(choice: Choice) -> list[str]:
     motors, links = choice.job.motors, choice.job.links
     examples = [] if motors.list else ["The motors are the package's examples, not products."]
     stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
-    stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
+    errors = choice.job.accuracy
+    left_out = errors is not None and not (errors.point or errors.length or errors.angle)
+    exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
     return [
         *examples,
         f"Drives have {motors.margin:g} times what is asked, and dry friction of "
@@ -100,4 +102,5 @@ def assumed(choice: Choice) -> list[str]:
         f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
         "The workspace is that of the platform's point P; a hexapod's joints have no cones.",
         "The shortest time is that of the cycle at its worst place with this margin.",
+        *(exact if left_out else []),
     ]
