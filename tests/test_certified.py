@@ -10,7 +10,7 @@ import casadi as ca
 import codac_bounds
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, in_turn
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, in_turn
 
 import pteron
 from pteron.errors import DataError, ModelError
@@ -325,6 +325,7 @@ def test_the_largest_cube_is_proved_and_no_neighbour_is_larger(name):
         assert not keeps(robot, conditions(robot), poses).all()
 
 
+@CLIENTS
 def test_parts_that_are_apart_are_told_and_how_modes_meet():
     pavings = mode_pavings("linear-delta", [0.0, 0.0, 0.3], tolerance=2.0)
     parts = {elbows: components(found, smallest=0.05) for elbows, found in pavings.items()}

@@ -1001,6 +1001,7 @@ def test_a_defect_of_pteron_is_not_hidden(monkeypatch: pytest.MonkeyPatch):
     assert isinstance(run("inverse tripteron --table poses.csv").exception, RuntimeError)
 
 
+@CLIENTS
 @pytest.mark.parametrize(("unbuffered", "as_json"), [("", []), ("1", ["--json"])])
 def test_a_pipe_that_closes_ends_the_program_quietly(unbuffered: str, as_json: list[str]):
     motion(5000).write_csv("motion.csv")
@@ -1017,6 +1018,7 @@ def test_a_pipe_that_closes_ends_the_program_quietly(unbuffered: str, as_json: l
         assert process.wait() == 1
 
 
+@CLIENTS
 def test_a_pipeline_of_programs():
     first = subprocess.Popen(
         [*PROGRAM, "inverse", "quadrupteron", "--table", "-"],
@@ -1064,6 +1066,7 @@ def test_a_wait_for_standard_input_can_be_interrupted():
         assert process.stderr.read() == b"Interrupted\n"
 
 
+@CLIENTS
 @pytest.mark.skipif(os.name != "posix", reason="a shell of another kind")
 @pytest.mark.parametrize(
     ("closed", "line", "status"),
@@ -1106,6 +1109,7 @@ def test_linear_algebra_has_one_thread_unless_the_environment_says_otherwise(tmp
     assert done.stdout.split() == [given or "1"]
 
 
+@CLIENTS
 def test_data_is_utf_8_in_every_locale():
     result = subprocess.run(
         [*PROGRAM, "inverse", "tripteron", "--table", "-"],
@@ -1117,6 +1121,7 @@ def test_data_is_utf_8_in_every_locale():
     assert result.stdout.decode().startswith("größe,x,y,z,rho1,rho2,rho3\nä,")
 
 
+@CLIENTS
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")
 def test_a_full_disk_is_one_line():
     with Path("/dev/full").open("w") as full:

@@ -235,6 +235,7 @@ def test_a_search_that_was_ended_goes_on_to_the_same_front(found, tmp_path):
         search(spec_of(robot=str(heavy)), folder=again)
 
 
+@CLIENTS
 def test_a_checkpoint_that_is_damaged_is_computed_again(found, tmp_path):
     front, folder = found
     again = tmp_path / "generations"

@@ -173,6 +173,7 @@ def test_a_motion_is_followed_from_where_it_is():
     assert info["distance"] < 1e-3
 
 
+@CLIENTS
 @EVERY
 def test_starts_and_targets_are_safe_and_differ(name):
     world = env_of(name).unwrapped.world
@@ -196,6 +197,7 @@ def ended_by(name, force, count=200):
     raise AssertionError("no end")
 
 
+@CLIENTS
 def test_an_episode_ends_with_its_reason_and_a_reward_of_minus_one():
     reasons = set()
     for name in MACHINES:

@@ -132,6 +132,7 @@ def test_every_machine_has_motions_that_keep_the_limits(name: str):
         assert margins(joints, limits).kept
 
 
+@CLIENTS
 def test_rams_of_little_stroke_have_motions_too():
     """Some random centers keep the limits so barely that no motion about them does."""
     robot = pteron.load("rubin-m2-hexapod")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from logs_of_motions import log_of
-from mechanisms import gated
+from mechanisms import CLIENTS, gated
 from test_faults import RATE, brisk, clean, found, late_by, noisy
 
 from pteron.identification import FaultIsolation, LogError, Processing, Terms, identify
@@ -187,6 +187,7 @@ def test_rotors_heavier_than_what_is_there_are_not_trusted():
 # Where fault isolation is run ------------------------------------------------------
 
 
+@CLIENTS
 def test_a_fault_shows_in_a_log_with_two_phases_too_long_to_be_looked_at_whole():
     robot, log = with_phases("five-bar", 0.02)
     late = replace(log, forces=late_by(log, 6e-3))

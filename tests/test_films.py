@@ -133,6 +133,7 @@ def test_without_the_encoder_the_extra_is_named(monkeypatch):
         film(TRIPTERON, CYCLE, "cycle.mp4")
 
 
+@CLIENTS
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
 def test_an_interrupted_film_leaves_what_was_there(ending):
     done = []

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from logs_of_motions import log_of
-from mechanisms import CATALOG, gated
+from mechanisms import CATALOG, CLIENTS, gated
 from test_report import HOSTILE, Reader, strict
 
 import pteron
@@ -204,6 +204,7 @@ def test_the_stretch_drawn_is_where_the_model_misses_most():
     assert missed[found.stretch].sum() >= (1.0 - 1e-9) * max(every)
 
 
+@CLIENTS
 def test_a_recording_of_one_sample_is_not_drawn():
     assert contents(result("no bodies")).drawn == ()
     assert "Over the joint's speed: a.csv, fitted" in read("no bodies").text

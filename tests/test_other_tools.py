@@ -240,6 +240,7 @@ def test_fmpy_simulates_an_fmu_as_scipy_the_librarys_equations(name):
         np.testing.assert_allclose(given, forward, 0.0, 1e-4 * np.abs(forward).max())
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", ["quadrupteron", "five-bar"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_fmu_ends_where_a_leg_does_not_reach(name, kind):

@@ -493,6 +493,7 @@ def test_a_log_is_shown_as_it_was_measured(tmp_path):
     np.testing.assert_allclose(again.motion.pose[0], found.motion.pose[start], atol=1e-6)
 
 
+@CLIENTS
 def test_a_simulation_and_a_table_bring_their_forces(tmp_path):
     robot = MACHINES["driven"]
     motion = cycle("driven")

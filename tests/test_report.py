@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, in_turn, random_machine, with_elbows
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, in_turn, random_machine, with_elbows
 from test_workspace import fourfold, with_limits
 
 import pteron
@@ -165,6 +165,7 @@ def test_the_page_says_nothing_of_this_computer():
     assert len(user) < 4 or user == "root" or user not in html(name)
 
 
+@CLIENTS
 @EVERY
 def test_no_number_is_missing(name):
     for word in ("nan", "None", "Undefined", "inf", "{{", "{%"):
@@ -192,6 +193,7 @@ def test_a_page_is_the_same_each_time():
     assert page(report("hostile")) == html("hostile")
 
 
+@CLIENTS
 @EVERY
 def test_the_moving_picture_is_the_machine(name):
     robot, data = MACHINES[name], scene(name)
@@ -331,6 +333,7 @@ def test_costs_come_in_pairs_with_percentages_of_the_counts():
     assert dense_operations(found.base, range(40)) == products + 43 + 2 * 16 * 40 + 4 * 79
 
 
+@CLIENTS
 def test_measures_are_shown_where_they_depend_on_the_position():
     assert report("quadrupteron").measures is report("hostile").measures is None
     assert report("planar").measures.cut.plane == "xy"
@@ -417,6 +420,7 @@ def test_the_geometry_has_a_column_a_leg():
         assert all(len(texts) == len(machine.legs) for _, texts in rows), name
 
 
+@CLIENTS
 def test_the_measures_show_what_is_reached():
     for name in ("delta", "mixed", "shaft", "planar"):
         inside = report(name).measures.cut.status == REACHABLE

@@ -57,6 +57,7 @@ def rows_of(line: str) -> pl.DataFrame:
     return pl.read_csv("rows.csv")
 
 
+@CLIENTS
 def test_a_program_gets_all_numbers_and_a_pipe_what_a_person_sees(driven: str, monkeypatch):
     rows = rows_of(f"size {driven}")
     data = json.loads(done(f"size {driven} --json"))

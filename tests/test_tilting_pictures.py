@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from mechanisms import NIGHTLY
+from mechanisms import CLIENTS, NIGHTLY
 from PIL import Image
 from scipy.spatial import ConvexHull
 from test_viewer import opened, slide, wait_for
@@ -67,6 +67,7 @@ def test_drawn_points_are_those_of_a_platform_turned_by_its_pose(kinds):
     assert len(colors & set(pteron.plots.canvas.LEG_COLORS)) == len(robot.legs)
 
 
+@CLIENTS
 @pytest.mark.parametrize("kinds", [("3T3R", "UPS"), ("1T2R", "RPS")])
 def test_a_film_and_a_page_show_all_coordinates(kinds, tmp_path):
     robot, home = tooled(*kinds)
