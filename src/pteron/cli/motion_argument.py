@@ -95,7 +95,7 @@ def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any
 
 @dataclass(frozen=True)
 class Carried:
-    """What --tool and --payload say that the platform carries."""
+    """The load of the platform, as --tool and --payload give it."""
 
     payload: float = 0.0
     payload_center: tuple[float, ...] | None = None

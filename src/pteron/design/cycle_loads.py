@@ -1,4 +1,4 @@
-"""What a cycle asks of the drives: the shortest time that they allow, and margins of motors."""
+"""The loads of cycles on drives: the shortest time that they allow, and margins of motors."""
 
 from __future__ import annotations
 

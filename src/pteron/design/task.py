@@ -179,8 +179,9 @@ class Task:
     def unit(self, name: str) -> str:
         """Return the unit of a quantity, for this machine's joints."""
         joint = self.robot.legs[0].joint
-        units = {"force": joint.force_unit, "speed": f"{joint.unit}/s"}
-        return units.get(name.removeprefix("cycle_"), quantities()[name].unit)
+        force, speed = joint.force_unit, f"{joint.unit}/s"
+        units = {"force": force, "cycle_force": force, "speed": speed, "cycle_speed": speed}
+        return units.get(name, quantities()[name].unit)
 
     def function(self, what: str) -> Kernel:
         """Return a function of the machines' topology, whose geometry a call gives."""

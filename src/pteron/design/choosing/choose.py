@@ -36,7 +36,7 @@ _KEPT = "kinds"
 
 @dataclass(frozen=True)
 class Choice:
-    """What every kind of machine can do for a job.
+    """The kinds of machines tried for a job, each judged by what it can do.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ _NUMBERS = ("ratio", "inertia", "backlash", "stiffness")
 
 @dataclass(frozen=True)
 class Gearbox:
-    """What is between a motor and a joint: a gear, a belt or a screw.
+    """The transmission between a motor and a joint: a gear, a belt or a screw.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ OBJECTIVES = {
     "footprint": "m^2",
     "height": "m",
 }
-"""What a machine can be chosen for, less of it being better, with units."""
+"""The objectives that a machine can be chosen for, less being better, with units."""
 
 Positions = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
 
@@ -210,7 +210,7 @@ class BoundTable(Table):
 
 
 class Job(Table):
-    """What a machine must do, as its file has it."""
+    """A job that a machine must do, as its file has it."""
 
     workspace: WorkspaceTable
     payload: PayloadTable = Field(default_factory=lambda: PayloadTable.model_validate({}))

@@ -35,7 +35,7 @@ _STROKE = 0.03
 """Share of a slider's travel by which its guide is longer at each end."""
 
 _FLOOR = 1.05
-"""What the floors are in a search over those that are proved at last."""
+"""Ratio of the floors in a search to those that are proved at last."""
 
 _HEAVY = 1e6
 """kg m^2: an inertia beside which that of a machine is nothing."""

@@ -23,7 +23,7 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.dimensions import Stock
 
 MATERIALS = {"steel": STEEL, "aluminium": ALUMINIUM, "carbon": Material(120e9, 5e9)}
-"""Of stock, for stiffness; carbon is fibre in resin, most of it along the tube."""
+"""Moduli of stock, for stiffness; carbon is fibre in resin, most of it along the tube."""
 
 _SOFT, _HARD = 1e4, 1e7
 """Stiffnesses of drives, N/m or N m/rad, between whose compliances others lie."""

@@ -18,7 +18,7 @@ class DriveMargin(NamedTuple):
     limit: str
     """The keys of the file: "rated_torque and ratio", "max_force" or "max_speed"."""
     quantity: str
-    """What it bounds: "rms_force", "peak_force" or "peak_speed"."""
+    """The quantity that it bounds: "rms_force", "peak_force" or "peak_speed"."""
     most: float
     needed: float
     unit: str
