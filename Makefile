@@ -13,7 +13,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --d
 # Each program that a test starts would translate the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo quick test tests clients nightly lint bench docs first wheels clean
+.PHONY: demo quick test tests clients nightly lint bench docs evidence first wheels clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
@@ -49,15 +49,17 @@ lint: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks
 
-# The site, docs/_build/html: every picture and table drawn, every notebook and example run anew;
-# a warning is an error, and then every link of it is followed.
+# The site, docs/_build/html: a warning is an error, and then every link of it is followed. Pictures,
+# notebooks and examples are made anew where code, scripts or packages have changed since the last build.
 docs: $(VENV)/.docs
-	rm -rf docs/_build docs/gallery
-	$(BIN)/python docs/pictures/draw.py
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
-	$(BIN)/python docs/check_site.py docs/_build/html
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/build.py
 
-# README's commands in a fresh copy of this clone, after README's set-up; some minutes.
+# Runs what stands behind the figures of README and docs, and says what differs; about half an hour.
+# `$(BIN)/python benchmarks/evidence.py --all` takes hours.
+evidence: $(VENV)/.dev
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/evidence.py
+
+# The commands of README and the tour in a fresh copy of this clone, after README's set-up; some minutes.
 first:
 	$(PYTHON) tests/installed/readme.py
 
@@ -66,7 +68,7 @@ first:
 wheels:
 	$(PYTHON) tests/installed/matrix.py
 
-# What README shows runs in this one: `make first` tries it.
+# What README and the tour show runs in this one: `make first` tries it.
 $(VENV)/.runtime: pyproject.toml Makefile
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) install --editable '.[consistency,design,film,viewer]'

@@ -95,7 +95,7 @@ def driven(robot: pteron.Manipulator, share: float) -> pteron.Manipulator:
     legs = [
         replace(
             leg,
-            drive=pteron.Drive(
+            drive=pteron.legs.Drive(
                 *(0.1 * share * force, 0.1 * share * force, 0.02 * share * force),
                 rotor_inertia=0.1 * share * mass,
                 rest_speed=0.01,
@@ -113,7 +113,7 @@ def largest(robot: pteron.Manipulator, controller: Controller, cycle: Motion) ->
 
 def wrong(robot: pteron.Manipulator, seed: int) -> pteron.Manipulator:
     """Return a machine whose bodies have all parameters off by 20 %, up or down at random."""
-    rng, data = np.random.default_rng(seed), pteron.parameter_data(robot)
+    rng, data = np.random.default_rng(seed), pteron.manipulator.parameter_data(robot)
     shares = {owner: 1 + 0.2 * rng.choice([-1, 1]) for owner in sorted({p.owner for p in data})}
     return pteron.with_parameters(robot, pteron.parameters(robot) * [shares[p.owner] for p in data])
 

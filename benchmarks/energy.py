@@ -61,7 +61,7 @@ def kept(robot: pteron.Manipulator, count: int) -> tuple[float, float]:
     least = MARGIN * np.array([leg.size for leg in robot.legs])
     nothing = np.zeros((count, robot.freedom))
     while alive.any() and time < LONGEST:
-        then, speed, well = advance(robot, pose, velocity, nothing, STEP, EACH)
+        then, speed, _, well = advance(robot, pose, velocity, nothing, STEP, EACH)
         time += STEP * EACH
         margin = numeric(robot, "reach")(then)[0]
         alive &= well & (margin > least).all(axis=1)
@@ -84,7 +84,9 @@ def energies(robot: pteron.Manipulator, pose: Array, velocity: Array) -> tuple[A
 
 def driven(robot: pteron.Manipulator) -> pteron.Manipulator:
     """Return the machine with friction and a motor's inertia in every drive."""
-    drive = pteron.Drive(coulomb=1.0, viscous=2.0, rotor_inertia=3e-5, ratio=50.0, rest_speed=0.05)
+    drive = pteron.legs.Drive(
+        coulomb=1.0, viscous=2.0, rotor_inertia=3e-5, ratio=50.0, rest_speed=0.05
+    )
     return replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
 
 

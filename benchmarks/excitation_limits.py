@@ -54,7 +54,7 @@ def driven(robot: pteron.Manipulator) -> pteron.Manipulator:
     legs = [
         replace(
             leg,
-            drive=pteron.Drive(
+            drive=pteron.legs.Drive(
                 coulomb=0.03 * largest,
                 viscous=0.05 * largest,
                 rotor_inertia=1e-5,
@@ -77,8 +77,8 @@ def worst_margin(
     pose, velocity, acceleration, *_ = motion.states(times)
     room, path = pose_margins(robot, pose), (pose, velocity, acceleration)
     moving = {
-        "speed": pteron.joint_rates(robot, pose, velocity).actuated,
-        "acceleration": pteron.joint_accelerations(robot, *path).actuated,
+        "speed": pteron.kinematics.joint_rates(robot, pose, velocity).actuated,
+        "acceleration": pteron.kinematics.joint_accelerations(robot, *path).actuated,
         "force": pteron.drive_forces(robot, *path),
     }
     found = {

@@ -30,7 +30,7 @@ def main() -> None:
     robot = pteron.load("quadrupteron")
     states = random_states(robot, 50)
     expected: Array = pteron.compile(robot, "inverse_dynamics", "vm")(*states)
-    cheapest = pteron.cheapest_parameters(robot)
+    cheapest = pteron.reduction.cheapest_parameters(robot)
     count = 1 << 10 if quick() else 1 << 16
     programs: list[tuple[str, Any, int]] = []
     forms = [("forces", None), ("forces, base", cheapest)]

@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 import traceback
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ from damaging import Chance, damaged_bytes, damaged_folder, damaged_text
 
 import pteron
 from pteron.design import Task, read_spec
-from pteron.errors import PteronError
+from pteron.errors import PteronError, UnlikelyValue
 from pteron.export.identified_parameters import read_identified
 from pteron.identification.logs import Log, read_log
 from pteron.maps import Map, TableStore, load_map, map_index, pose_grid, save_map, sweep
@@ -432,6 +433,7 @@ def main() -> None:
     asked.add_argument("--seed", type=int, default=21)
     given = asked.parse_args()
     count = given.count or (300 if given.quick else 20_000)
+    warnings.simplefilter("ignore", UnlikelyValue)  # many a damaged number is, and is read all the same
     raw: list[str] = []
     total: Counter[str] = Counter()
     begin = process_time()

@@ -25,7 +25,7 @@ def main() -> None:
         robot = pteron.load(name)
         base = pteron.base_parameters(robot)
         forms = {key: kernel.operations for key, kernel in model_forms(base).items()}
-        cheapest = pteron.cheapest_parameters(robot)
+        cheapest = pteron.reduction.cheapest_parameters(robot)
         complete, reduced = base.selection.shape[0], base.rank
 
         print(f"\n{name:<58}{f'{complete} parameters':>15}{f'{reduced} base':>12}")

@@ -37,7 +37,7 @@ def main() -> None:
     )
     robots = {name: pteron.load(name) for name in pteron.catalog()}
     legs = {name: {type(leg) for leg in robot.legs} for name, robot in robots.items()}
-    names = [name for name in robots if legs[name] == {pteron.Leg}]
+    names = [name for name in robots if legs[name] == {pteron.legs.Leg}]
     for name in names[: 1 if quick() else None]:
         base = pteron.base_parameters(robots[name])
         runners = contestants(base, random_states(base.robot, _STATES))

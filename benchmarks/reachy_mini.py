@@ -38,7 +38,7 @@ def main() -> None:
     poses = pteron.random_poses(robot, 100 if quick() else 1000)
     frames = np.broadcast_to(np.eye(4), (len(poses), 4, 4)).copy()
     frames[:, :3, :3] = pteron.rotation_of(robot, poses)
-    frames[:, :3, 3] = pteron.position_of(robot, poses)
+    frames[:, :3, 3] = pteron.kinematics.position_of(robot, poses)
     joints = pteron.inverse_kinematics(robot, poses)
     given = frames.tolist()
     theirs = np.array([own.inverse_kinematics(frame) for frame in given])

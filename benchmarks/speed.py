@@ -182,7 +182,7 @@ def kernels(robot: pteron.Manipulator, names: Sequence[str]) -> dict[str, Kernel
             robot,
             "inverse_dynamics",
             target,
-            base=pteron.cheapest_parameters(robot) if "base" in options else None,
+            base=pteron.reduction.cheapest_parameters(robot) if "base" in options else None,
             grade="parametric" if "parametric" in options else "specialised",
             dtype="float32" if "float32" in options else "float64",
             threads=2 if "2 threads" in options else 1,

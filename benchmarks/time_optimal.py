@@ -66,14 +66,14 @@ def driven(robot: pteron.Manipulator) -> pteron.Manipulator:
     home, still = home_pose(robot), np.zeros(robot.freedom)
     held = np.abs(pteron.inverse_dynamics(robot, home, still, still))
     largest = max(float(held.max()), 1.0)  # in a level plane nothing is held
-    drive = pteron.Drive(coulomb=0.03 * largest, viscous=0.05 * largest, rotor_inertia=1e-5)
+    drive = pteron.legs.Drive(coulomb=0.03 * largest, viscous=0.05 * largest, rotor_inertia=1e-5)
     return replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
 
 
 def sizes(robot: pteron.Manipulator, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Return the largest speeds and forces (n,) of a motion, between its samples too."""
     fine = motion.at(np.linspace(0.0, motion.duration, _FINER * (len(motion.time) - 1) + 1))
-    rates = pteron.joint_rates(robot, *fine[:2]).actuated
+    rates = pteron.kinematics.joint_rates(robot, *fine[:2]).actuated
     forces = pteron.drive_forces(robot, *fine)
     return np.abs(rates).max(axis=0), np.abs(forces).max(axis=0)
 

@@ -1,9 +1,10 @@
-"""The viewer: delay from a slider to the picture, and memory after minutes of random dragging.
+"""The viewer: delay from a slider to text and picture, and a thousand random drags on ten machines.
 
-A key moves a slider of the page in headless Chromium, whose WebGL the processor draws. The clock
-runs from the key's event until the picture with the new pose has been drawn; it also runs on the
-server alone, from an action to its last message. Then a mouse drags random sliders to random
-places; `--minutes 10` does only that, for so long.
+A key moves a slider of the page in headless Chromium, whose picture the processor draws. The clock
+runs from the key's event until the number has changed in the page, and until the picture with the
+new pose has been drawn; it also runs on the server alone, from an action to its last message.
+`--drags` makes the drags with the mouse: each leads somewhere in the window, and after it the
+platform must be where it may be, and must move again when it is dragged home.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -23,52 +23,55 @@ from measuring import quick
 
 import pteron
 from pteron.viewer import Viewer, view
+from pteron.viewer.boundary import allowed
 
 _FLAGS = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
-_SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader")
+
+DRAGGED = (
+    *("quadrupteron", "delta", "five-bar", "3-rrr", "3-rpr", "par4", "stewart", "ball-table"),
+    *("orthoglide", "wrist"),
+)
+"""Machines of all kinds of platforms and legs that are common."""
 
 _CLOCK = """() => {
-    const marks = window.marks = {start: null, found: []};
+    window.marks = {start: null, text: [], picture: []};
     addEventListener('keydown', event => { marks.start = event.timeStamp; }, true);
-    const drawn = WebGL2RenderingContext.prototype;
-    // The places of all bars are in a texture; a new pose is a new texture.
-    for (const name of ['texSubImage2D', 'texImage2D']) {
-        const usual = drawn[name];
-        drawn[name] = function (...given) {
-            usual.apply(this, given);
-            if (marks.start === null) return;
-            const start = marks.start;
-            marks.start = null;
-            // When the next frame begins this one is handed over; reading waits for its drawing.
-            requestAnimationFrame(() => {
-                this.readPixels(0, 0, 1, 1, this.RGBA, this.UNSIGNED_BYTE, new Uint8Array(4));
-                marks.found.push(performance.now() - start);
-            });
-        };
-    }
+    const seen = new MutationObserver(() => {
+        if (marks.start === null) return;
+        const start = marks.start;
+        marks.start = null;
+        marks.text.push(performance.now() - start);
+        // The picture is drawn in the next frame, and handed over before the one after it.
+        requestAnimationFrame(() => requestAnimationFrame(() => {
+            document.getElementById('view').getContext('2d').getImageData(0, 0, 1, 1);
+            marks.picture.push(performance.now() - start);
+        }));
+    });
+    addEventListener('DOMContentLoaded', () => {
+        seen.observe(document.getElementById('readout'), {childList: true});
+    });
 }"""
 
 
 def main() -> None:
-    """Print the times of each machine, then what dragging leaves behind."""
-    if "--minutes" in sys.argv:
-        _leave_behind(float(sys.argv[sys.argv.index("--minutes") + 1]))
+    """Print the times of each machine, then what dragging finds."""
+    if "--drags" in sys.argv:
+        _drags(10 if quick() else 100)
         return
-    machines = ("five-bar",) if quick() else ("quadrupteron", "delta", "five-bar", "par4")
-    print("from a slider to the picture, ms: median, 95 %")
+    machines = (
+        ("five-bar",) if quick() else ("quadrupteron", "delta", "five-bar", "par4", "stewart")
+    )
+    print("from a slider, ms: median, 95 %")
     for name in machines:
         with view(pteron.load(name), port=0) as viewer:
             print(f"  {name:<14} server {_told(_on_the_server(viewer))}", end="")
             with _page(viewer) as page:
-                print(f"   page {_told(_in_the_browser(page))}" if page else "   (no Chromium)")
-    _leave_behind(0.05 if quick() else 1.0)
-
-
-def _leave_behind(minutes: float) -> None:
-    """Print what so many minutes of random dragging leave behind."""
-    with view(pteron.load("quadrupteron"), port=0) as viewer, _page(viewer) as page:
-        if page:
-            _drag(viewer, page, 60.0 * minutes)
+                if page:
+                    text, picture = _in_the_browser(page)
+                    print(f"   text {_told(text)}   picture {_told(picture)}")
+                else:
+                    print("   (no Chromium)")
+    _drags(2 if quick() else 20)
 
 
 def _told(times: list[float]) -> str:
@@ -99,79 +102,74 @@ def _page(viewer: Viewer) -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=program, args=[*_FLAGS, *_SOFTWARE])
+        browser = play.chromium.launch(executable_path=program, args=list(_FLAGS))
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.add_init_script(f"({_CLOCK})()")
         page.goto(viewer.url)
-        page.wait_for_selector("table.legs")
-        page.wait_for_timeout(3000)
+        page.wait_for_selector("table.legs", state="attached")
+        page.wait_for_timeout(1000)
         yield page
         browser.close()
 
 
-def _in_the_browser(page: Any) -> list[float]:
-    """Return times, ms, from a key on a slider to the picture."""
-    page.locator("[role=slider]").first.focus()
+def _in_the_browser(page: Any) -> tuple[list[float], list[float]]:
+    """Return times, ms, from a key on a slider to the numbers, and to the picture."""
+    page.focus("#pose0")
     count = 5 if quick() else 60
     for k in range(count):
         page.keyboard.press("ArrowRight" if k % 20 < 10 else "ArrowLeft")
-        page.wait_for_function(f"() => marks.found.length > {k}")
+        page.wait_for_function(f"() => marks.picture.length > {k}")
         page.wait_for_timeout(120)
-    found: list[float] = page.evaluate("() => marks.found")
-    return found[2:]
+    marks = page.evaluate("() => marks")
+    return marks["text"][2:], marks["picture"][2:]
 
 
-def _drag(viewer: Viewer, page: Any, duration: float) -> None:
-    """Drag random sliders to random places, and print what came of it."""
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    devtools = page.context.new_cdp_session(page)
+def _drags(count: int) -> None:
+    """Print what so many random drags on each machine come to."""
     rng = random.Random(0)
-    sliders = page.locator("[role=slider]")
-    boxes = [sliders.nth(k).locator("xpath=..").bounding_box() for k in range(sliders.count())]
-    boxes = [box for box in boxes if box]
-
-    def dragged(until: float) -> int:
-        """Drag until a time; return how often the machine was found in another pose."""
-        count, before = 0, viewer.state.pose
-        while perf_counter() < until:
-            box = rng.choice(boxes)
-            height = box["y"] + 0.5 * box["height"]
-            page.mouse.move(box["x"] + box["width"] * rng.random(), height)
-            page.mouse.down()
-            for _ in range(rng.randint(1, 15)):
-                page.mouse.move(box["x"] + box["width"] * rng.uniform(-0.1, 1.1), height)
-                count += viewer.state.pose is not before
+    print(f"{count} random drags on each of {len(DRAGGED)} machines:")
+    for name in DRAGGED[: 2 if quick() else None]:
+        with view(pteron.load(name), port=0) as viewer, _page(viewer) as page:
+            if page is None:
+                return
+            outside, stuck, stopped, moved = 0, 0, 0, 0
+            for _ in range(count):
                 before = viewer.state.pose
-            page.mouse.up()
-        return count
-
-    warm = min(60.0, 0.2 * duration)
-    begin = perf_counter()
-    dragged(begin + warm)
-    before = _memory(), _heap(devtools)
-    count = dragged(begin + duration)
-    after = _memory(), _heap(devtools)
-    print(f"{duration / 60.0:.2g} min of random dragging, {count} poses seen:")
-    print(f"  exceptions: {len(viewer.faults)} on the server, {len(errors)} on the page")
-    for where, one, other in zip(("server", "page"), before, after, strict=True):
-        print(f"  memory of the {where}: {one:.1f} MB, then {other:.1f} MB: {other - one:+.1f} MB")
-    for text in (*viewer.faults, *errors):
-        print(text)
-
-
-def _memory() -> float:
-    """Return the memory of this process, MB."""
-    status = Path("/proc/self/status").read_text(encoding="utf-8")
-    return float(status.split("VmRSS:")[1].split()[0]) / 1024.0
+                _drag(page, viewer, (rng.uniform(10, 900), rng.uniform(60, 790)))
+                after = viewer.state
+                moved += not np.array_equal(before, after.pose)
+                outside += not bool(allowed(after.robot, after.pose))
+                if after.message:
+                    stopped += 1
+                    home = viewer.home
+                    viewer.move_to(after.pose + 0.3 * (home - after.pose))
+                    viewer.wait()
+                    stuck += np.array_equal(viewer.state.pose, after.pose)
+                    page.wait_for_timeout(30)
+            faults = len(viewer.faults)
+            print(
+                f"  {name:<14} moved {moved}, stopped by the boundary {stopped}; not allowed "
+                f"{outside}, stuck {stuck}, failures {faults}",
+                flush=True,
+            )
 
 
-def _heap(devtools: Any) -> float:
-    """Return what the page holds in memory once it has tidied up, MB."""
-    devtools.send("HeapProfiler.collectGarbage")
-    devtools.send("Performance.enable")
-    found = devtools.send("Performance.getMetrics")["metrics"]
-    return float(next(one["value"] for one in found if one["name"] == "JSHeapUsedSize")) / 2**20
+def _drag(page: Any, viewer: Viewer, to: tuple[float, float]) -> None:
+    """Drag the platform's middle, or the end of its x axis where it only turns; go home if away."""
+    x, y = page.evaluate("document.getElementById('view').platform()")
+    if page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.id", [x, y]) != "view":
+        viewer.move_to(viewer.home)
+        viewer.wait()
+        page.wait_for_timeout(100)
+        x, y = page.evaluate("document.getElementById('view').platform()")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for share in (0.3, 0.6, 1.0):
+        page.mouse.move(x + share * (to[0] - x), y + share * (to[1] - y))
+        page.wait_for_timeout(15)
+    page.mouse.up()
+    page.wait_for_timeout(30)
+    viewer.wait()
 
 
 if __name__ == "__main__":

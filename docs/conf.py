@@ -32,11 +32,20 @@ extensions = [
     "sphinxcontrib.bibtex",
     "command_line",
     "equations",
+    "for_everyone",
+    "handed_out",
     "reference",
     "results",
     "sources",
 ]
-exclude_patterns = ["_build", "pictures", "extensions", "gallery/*.ipynb", "gallery/*.py"]
+exclude_patterns = [
+    "_build",
+    "_templates",
+    "pictures",
+    "extensions",
+    "gallery/*.ipynb",
+    "gallery/*.py",
+]
 nitpicky = True
 nitpick_ignore_regex = [("py:(obj|class)", "(?s:.*)"), ("py:exc", r"\w+Error|NoSquareRoot")]
 """A word in backticks, or a type, is a link where it is a public name, and else a word."""
@@ -46,6 +55,8 @@ html_theme = "furo"
 html_title = "Pteron"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+templates_path = ["_templates"]
+html_search_scorer = str(DOCS / "_static" / "search-order.js")
 html_theme_options = {"navigation_with_keys": True}
 html_copy_source = False
 html_show_sphinx = False
@@ -108,11 +119,9 @@ if GALLERY.is_dir() and find_spec("sphinx_gallery") is not None:
 
 
 def leave_out(app: Sphinx, page: str, source: list[str]) -> None:
-    """Leave out of the contents what a folder without examples, or an older one, has not."""
-    if page == "index":
-        for name in ("view", "play", "plots", "notebooks/index", "gallery/index"):
-            if name not in app.env.found_docs:
-                source[0] = source[0].replace(f"\n{name}\n", "\n")
+    """Leave the gallery out of the contents where there are no examples."""
+    if page == "index" and "gallery/index" not in app.env.found_docs:
+        source[0] = source[0].replace("\ngallery/index\n", "\n")
 
 
 def setup(app: Sphinx) -> None:

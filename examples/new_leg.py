@@ -148,7 +148,7 @@ def linear_delta() -> pteron.Manipulator:
             elbow=-1,
         )
         legs.append(leg)
-    platform = pteron.Platform("3T", PlanarInertia.of_body(0.5, (0.0, 0.0), 1e-3))
+    platform = pteron.platforms.Platform("3T", PlanarInertia.of_body(0.5, (0.0, 0.0), 1e-3))
     return pteron.Manipulator("linear delta", platform, tuple(legs))
 
 
@@ -174,7 +174,7 @@ def main() -> None:
     dt = 4e-5
     rate = (8 * (energy(dt) - energy(-dt)) - (energy(2 * dt) - energy(-2 * dt))) / (12 * dt)
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
-    power = (forces * pteron.joint_rates(robot, pose, velocity).actuated).sum(axis=-1)
+    power = (forces * pteron.kinematics.joint_rates(robot, pose, velocity).actuated).sum(axis=-1)
     off = np.abs(power - rate).max() / np.abs(power).max()
     print(f"inverse dynamics balances the energy within {off:.0e} of the largest power")
     assert closed < 1e-12

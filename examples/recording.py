@@ -49,7 +49,7 @@ else:
 
 # What its controller records.
 joints = pteron.inverse_kinematics(drawn, path[0])
-rates = pteron.joint_rates(drawn, *path[:2]).actuated
+rates = pteron.kinematics.joint_rates(drawn, *path[:2]).actuated
 forces = pteron.inverse_dynamics(built, *path)
 forces += coulomb * np.sign(rates) + viscous * rates + offset
 forces += 0.01 * np.sqrt((forces**2).mean(axis=0)) * rng.normal(size=forces.shape)

@@ -1,6 +1,6 @@
 """The command `pteron` before its package is imported: Ctrl-C ends it quietly from the start.
 
-It stands outside the package: importing anything inside loads NumPy and CasADi first.
+It stands outside the package, whose import takes a while already.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import gc
 import os
 import shutil
 import signal
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,14 @@ typer.testing._get_command = lru_cache(typer.testing._get_command)  # type: igno
 
 # What a shell starts in the background ignores Ctrl-C; the tests of interruption want it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file() -> Generator[None, list[Any], list[Any]]:
+    """Leave out the search for examples in docstrings of the tests, which have none."""
+    found = yield
+    return [one for one in found if type(one) is pytest.Module]
+
 
 _FLAGS = (
     *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),

@@ -37,7 +37,7 @@ def controlled(plant, law, motion, period, start=None, *, steps=1, grid=None, la
     found = [], [], [], []
     for now in zip(*wanted, strict=True):
         joints = pteron.inverse_kinematics(plant, pose)
-        rates = pteron.joint_rates(plant, pose, velocity).actuated
+        rates = pteron.kinematics.joint_rates(plant, pose, velocity).actuated
         if grid is not None:
             joints = grid * np.round(joints / grid)
             rates = (joints - shown) / period if shown is not None else 0.0 * joints

@@ -156,7 +156,7 @@ def judged(make):
         robot = make()
     except pteron.ModelError:
         return "refused"
-    layout = pteron.architecture(robot)
+    layout = pteron.kinematics.architecture(robot)
     if not (layout.singular and layout.reason):
         return "not flagged"
     asked = (f"answered: {name}" for name, call in calls(robot) if not refused(call))

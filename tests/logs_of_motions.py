@@ -88,7 +88,7 @@ def log_of(
         time = np.arange(round(duration * rate)) / rate
     pose, velocity, acceleration = motion(robot, time, seed=seed, **shape)
     joints = pteron.inverse_kinematics(robot, pose)
-    rates = pteron.joint_rates(robot, pose, velocity).actuated
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
     forces = forces + (friction or Friction.of(len(robot.legs))).forces(rates)
     rng = np.random.default_rng(noise_seed)

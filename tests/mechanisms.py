@@ -17,8 +17,8 @@ NIGHTLY = pytest.mark.nightly
 CLIENTS = pytest.mark.clients
 """Marks what uses the library at length as others do."""
 
-BATCH_SHAPES = [(), (1,), (7,), (3, 5), (0,), (300,)]
-"""300 is more than one block of the virtual machine."""
+BATCH_SHAPES = [(), (1,), (7,), (3, 5), (0,), (400,)]
+"""NumPy evaluates 400 states, CasADi fewer."""
 
 
 def with_elbows(robot, signs):
@@ -42,13 +42,15 @@ def inertia(rng, length):
     """Return the inertia of a real link or platform, its centre of mass off both axes."""
     mass = rng.uniform(0.2, 0.6)
     x, y = rng.uniform(-0.6, 0.6) * length, rng.uniform(-0.1, 0.1) * length
-    return pteron.PlanarInertia.of_body(mass, (x, y), mass * (x * x + y * y + (0.3 * length) ** 2))
+    return pteron.bodies.PlanarInertia.of_body(
+        mass, (x, y), mass * (x * x + y * y + (0.3 * length) ** 2)
+    )
 
 
 def rod_inertia(rng, length):
     """Return the inertia of a real rod about its platform end."""
     mass, x = rng.uniform(0.2, 0.6), -length * rng.uniform(0.3, 0.7)
-    return pteron.RodInertia.of_body(mass, (x,), mass * (x * x + (0.3 * length) ** 2))
+    return pteron.bodies.RodInertia.of_body(mass, (x,), mass * (x * x + (0.3 * length) ** 2))
 
 
 def slider_leg(rng, d, c, **point):
@@ -58,7 +60,7 @@ def slider_leg(rng, d, c, **point):
     e = d + 0.5 * rng.normal(size=3)
     e /= np.linalg.norm(e) * np.sign(e @ d)
     reach = rng.uniform(0.75, 0.9) * np.hypot(lu, ll) * across
-    return pteron.PRRR(
+    return pteron.legs.PRRR(
         guide_point=c - reach + rng.uniform(-0.1, 0.1) * e,
         direction=d,
         upper_length=lu,
@@ -82,7 +84,7 @@ def crank_leg(rng, d, c, **point):
     across = np.cross(d, crank / lu)
     rod = np.cos(lean) * d + np.sin(lean) * (np.cos(side) * crank / lu + np.sin(side) * across)
     lower = rod_inertia(rng, ll)
-    return pteron.RSS(
+    return pteron.legs.RSS(
         guide_point=c - crank - ll * rod,
         direction=d,
         zero_direction=a,
@@ -99,7 +101,7 @@ def rod_leg(rng, n, c, **point):
     """Return a P-S-S leg that reaches c, its rod along n and 25 to 60 degrees from the guide."""
     ll = rng.uniform(0.25, 0.35)
     e, elbow = _guide(rng, n, unit(rng, n))
-    return pteron.PSS(
+    return pteron.legs.PSS(
         guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e,
         slider_direction=e,
         lower_length=ll,
@@ -120,7 +122,7 @@ def planar_slider_leg(rng, n, c, *, k, **point):
     """Return a P-R-R leg of the plane of normal k, its link along n."""
     ll = rng.uniform(0.25, 0.35)
     e, elbow = _guide(rng, n, np.cross(k, n) * rng.choice([1, -1]))
-    return pteron.PRR(
+    return pteron.legs.PRR(
         guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e + rng.uniform(-0.1, 0.1) * k,
         slider_direction=e,
         direction=rng.choice([1, -1]) * k,
@@ -138,7 +140,7 @@ def planar_crank_leg(rng, n, c, *, k, **point):
     elbow = int(rng.choice([1, -1]))
     side, d = -elbow * rng.uniform(0.8, 2.2), rng.choice([1, -1]) * k
     crank = lu * (np.cos(side) * n - np.sin(side) * np.cross(d, n))
-    return pteron.RRR(
+    return pteron.legs.RRR(
         guide_point=c - crank - ll * n + rng.uniform(-0.1, 0.1) * k,
         direction=d,
         zero_direction=unit(rng, d),
@@ -154,7 +156,7 @@ def planar_crank_leg(rng, n, c, *, k, **point):
 def ram_leg(rng, n, c, *, k, **point):
     """Return an R-P-R leg of the plane of normal k, its ram along n."""
     length = rng.uniform(0.4, 0.6)
-    return pteron.RPR(
+    return pteron.legs.RPR(
         guide_point=c - length * n + rng.uniform(-0.1, 0.1) * k,
         direction=rng.choice([1, -1]) * k,
         limits=(0.7 * length, 1.3 * length),
@@ -168,7 +170,7 @@ def shaft_leg(rng, n, c, *, k, **point):
     """Return an R-U-P-U leg less than 45 degrees from k, wherever n points."""
     across = rng.uniform(0.0, 1.0) * np.cross(k, n)
     length = rng.uniform(0.3, 0.4)
-    return pteron.RUPU(
+    return pteron.legs.RUPU(
         guide_point=c + length * (k + across) / np.linalg.norm(k + across),
         ratio=rng.uniform(1.0, 3.0) * rng.choice([1, -1]),
         upper=rod_inertia(rng, -0.5 * length),
@@ -240,10 +242,11 @@ def _drawn_machine(rng, name, kinds):
     parts = {}
     if articulated:
         parts["bars"] = [
-            pteron.Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0)) for _ in range(2)
+            pteron.platforms.Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0))
+            for _ in range(2)
         ]
-        parts["geared"] = [pteron.Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
-    platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis, slides, **parts)
+        parts["geared"] = [pteron.platforms.Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
+    platform = pteron.platforms.Platform(motion, inertia(rng, 0.08), axis, x_axis, slides, **parts)
     return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 
 

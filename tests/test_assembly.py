@@ -465,25 +465,25 @@ def test_which_modes_a_pose_is_in():
     joints = pteron.inverse_kinematics(robot, poses)
     for branches in (False, True):
         found = pteron.direct_kinematics(robot, joints, all_branches=branches)
-        mode = pteron.assembly_mode(robot, poses, all_branches=branches)
+        mode = pteron.kinematics.assembly_mode(robot, poses, all_branches=branches)
         np.testing.assert_allclose(found[np.arange(50), mode], poses, rtol=0, atol=1e-11)
-    elbows = pteron.working_mode(robot, found, joints[:, None])
+    elbows = pteron.kinematics.working_mode(robot, found, joints[:, None])
     there = ~np.isnan(found[..., 0])
     assert (elbows[there] != 0).all()
     own = [leg.elbow for leg in robot.legs]
-    assert (pteron.working_mode(robot, poses, joints) == own).all()
+    assert (pteron.kinematics.working_mode(robot, poses, joints) == own).all()
     for mode in pteron.working_modes(robot):
         signs = [leg.elbow for leg in mode.legs]
         in_it = there & (elbows == signs).all(axis=-1)
         back = pteron.inverse_kinematics(mode, found[in_it])
         expected = np.broadcast_to(joints[:, None], found.shape)[in_it]
         np.testing.assert_allclose(back, expected, rtol=0, atol=1e-6)
-    assert (pteron.working_mode(robot, poses, joints + 0.3) == 0).all()
+    assert (pteron.kinematics.working_mode(robot, poses, joints + 0.3) == 0).all()
 
 
 def test_elbows_that_joints_do_not_tell_are_the_robots_own():
     robot = pteron.load("quadrupteron")
     joints = pteron.inverse_kinematics(robot, np.zeros(4))
-    assert pteron.working_mode(robot, np.zeros(4), joints).tolist() == [
+    assert pteron.kinematics.working_mode(robot, np.zeros(4), joints).tolist() == [
         leg.elbow for leg in robot.legs
     ]

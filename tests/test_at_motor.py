@@ -19,7 +19,7 @@ RATIO, RATED, COUNTS = 300.0, 0.6, 131072.0
 def driven():
     """Return a Tripteron whose motors are known; the second turns the other way."""
     robot = machine("tripteron")
-    drives = [pteron.Drive(ratio=s * RATIO, rated_torque=RATED) for s in (1.0, -1.0, 1.0)]
+    drives = [pteron.legs.Drive(ratio=s * RATIO, rated_torque=RATED) for s in (1.0, -1.0, 1.0)]
     drives = [replace(drive, counts_per_turn=COUNTS) for drive in drives]
     legs = [replace(leg, drive=one) for leg, one in zip(robot.legs, drives, strict=True)]
     return replace(robot, legs=tuple(legs))

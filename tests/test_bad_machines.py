@@ -1,6 +1,7 @@
 """What a file may get wrong about a machine: one clear line each, and all of them at once."""
 
 import re
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +11,13 @@ from mechanisms import CATALOG, NIGHTLY
 from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron import ModelError, PlanarInertia
+from pteron import ModelError
+from pteron.bodies import PlanarInertia
 from pteron.legs.cones import Cone
+from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.variants import turned
 from pteron.workspace import home_pose, pose_margins
-from pteron.workspace.drive_warnings import load_warnings
-from pteron.workspace.machine_warnings import machine_warnings
+from pteron.workspace.load_warnings import load_warnings
 
 FOLDER = Path(pteron.__file__).parent / "manipulator" / "catalog"
 
@@ -221,9 +223,9 @@ def test_a_shaft_turns_the_platform_about_its_axis_and_no_other(tmp_path):
     shaft = replace(robot.legs[3], direction=None, ratio=-2.5)
     robot = replace(robot, legs=(*robot.legs[:3], shaft))
     pose, rates = home_pose(robot) + np.array([0.0, 0.0, 0.0, 0.3]), [0.1, -0.2, 0.3, 0.7]
-    found = pteron.joint_rates(robot, pose, rates)
+    found = pteron.kinematics.joint_rates(robot, pose, rates)
     joints = np.nan_to_num([found.actuated[3], *found.passive[3]])
-    twist = joints @ np.nan_to_num(pteron.joint_screws(robot, pose)[3])
+    twist = joints @ np.nan_to_num(pteron.kinematics.joint_screws(robot, pose)[3])
     np.testing.assert_allclose(twist[:3], 0.7 * np.array(axis), atol=1e-14)
     assert found.actuated[3] == pytest.approx(-2.5 * 0.7)
     for direction, words in [(X, "is not along"), (tuple(-a for a in axis), "reversed")]:
@@ -499,7 +501,7 @@ DRIVE_DOUBTS = {
     ),
     "dry friction of 9 N is more than max_force, 8 N": (
         SLIDERS,
-        {"coulomb": 7.0, "stribeck": pteron.Stribeck(2.0, 0.01), "max_force": 8.0},
+        {"coulomb": 7.0, "stribeck": pteron.legs.Stribeck(2.0, 0.01), "max_force": 8.0},
     ),
     "dry friction of 4 N m is more than rated_torque gives at the joint, 0.64 N m": (
         CRANKS,
@@ -515,7 +517,7 @@ DRIVE_DOUBTS = {
     ),
     "stribeck.speed of 10 rad/s is beyond max_speed, 5 rad/s": (
         CRANKS,
-        {"stribeck": pteron.Stribeck(1.0, 10.0), "max_speed": 5.0},
+        {"stribeck": pteron.legs.Stribeck(1.0, 10.0), "max_speed": 5.0},
     ),
 }
 
@@ -523,7 +525,7 @@ DRIVE_DOUBTS = {
 @pytest.mark.parametrize("words", DRIVE_DOUBTS)
 def test_a_drive_s_unlikely_numbers_are_doubted(words):
     name, keys = DRIVE_DOUBTS[words]
-    legs = legs_of(name, lambda i, leg: replace(leg, drive=pteron.Drive(**keys)) if i else leg)
+    legs = legs_of(name, lambda i, leg: replace(leg, drive=pteron.legs.Drive(**keys)) if i else leg)
     found = machine_warnings(replace(CATALOG[name], legs=legs))
     assert all(text.split(": ")[1] == "drive" for text in found)
     assert next(text.split(":")[0] for text in found if words in text) == "leg 2", found
@@ -535,7 +537,7 @@ def test_drives_that_cannot_hold_the_home_pose_and_rotors_that_outweigh_all_are_
     home = pteron.workspace.home_pose(robot)
 
     def found(**keys):
-        legs = [replace(leg, drive=pteron.Drive(**keys)) for leg in robot.legs]
+        legs = [replace(leg, drive=pteron.legs.Drive(**keys)) for leg in robot.legs]
         return load_warnings(replace(robot, legs=tuple(legs)), home)
 
     # Leg 1 carries the weight of 31 N; an offset of 5 N may hold it.
@@ -575,7 +577,10 @@ def test_numbers_whose_products_vanish_or_overflow_are_told(tmp_path, old, new, 
     file = tmp_path / "bad.toml"
     file.write_text(text.replace(old, new, 1), encoding="utf-8")
     try:
-        told = machine_warnings(pteron.load(file))
+        with warnings.catch_warnings(record=True) as unlikely:
+            warnings.simplefilter("always")
+            pteron.load(file)
+        told = [str(warning.message) for warning in unlikely]
     except ModelError as error:
         told = error.faults
     assert any(words in line for line in told)

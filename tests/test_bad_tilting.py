@@ -14,8 +14,8 @@ from test_cli import run
 
 import pteron
 from pteron.errors import ModelError, SingularPose, UnlikelyValue, UnreachablePose
+from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.workspace import home_pose, screw_lengths
-from pteron.workspace.machine_warnings import machine_warnings
 
 
 def edited(robot, folder, *changes):
@@ -36,7 +36,7 @@ def test_similar_hexagons_are_refused_with_the_reason(tmp_path):
         legs.append(replace(leg, platform_point=tuple(0.4 * np.array(leg.guide_point))))
     alike = replace(robot, legs=tuple(legs))
     words = "guide points and the platform points are similar figures on a conic, the latter"
-    assert words in pteron.architecture(alike).reason
+    assert words in pteron.kinematics.architecture(alike).reason
     with pytest.raises(SingularPose, match=words):
         pteron.random_poses(alike, 1)
     done = run(f"check {pteron.save(alike, tmp_path / 'alike.toml')}")
@@ -67,14 +67,14 @@ def test_figures_of_rams_that_balance_at_every_pose(base, top, reason):
         for leg, r, s in zip(robot.legs, *flat, strict=True)
     ]
     machine = replace(robot, legs=tuple(legs))
-    found = pteron.architecture(machine)
+    found = pteron.kinematics.architecture(machine)
     assert re.search(reason, found.reason)
     assert found.proof == ("exact arithmetic" if reason else "one pose")
     assert (found.type_ii < 1e-12) == bool(reason)
     assert found.self_motions == ()
     if "push" in reason:
         oblique = pteron.turned(machine, tilting.rotation(np.random.default_rng(0)))
-        assert "rams that push with (" in pteron.architecture(oblique).reason
+        assert "rams that push with (" in pteron.kinematics.architecture(oblique).reason
 
 
 def test_equal_plates_are_told_to_move_with_their_rams_held(tmp_path):
@@ -131,7 +131,7 @@ def test_a_screws_length_is_that_of_a_ram_between_universal_joints(tmp_path):
 def test_rams_far_longer_than_the_platform_is_wide_are_not_singular():
     robot = TILTED["stewart"]
     far = tuple(replace(leg, limits=(0.01, 1e4)) for leg in robot.legs)
-    assert not pteron.architecture(replace(robot, legs=far)).singular
+    assert not pteron.kinematics.architecture(replace(robot, legs=far)).singular
 
 
 @NIGHTLY
@@ -141,7 +141,7 @@ def test_points_in_line_are_the_reason():
         replace(leg, platform_point=(0.1 * k, 0.2 * k, 0.1 * k))
         for k, leg in enumerate(robot.legs, start=1)
     ]
-    found = pteron.architecture(replace(robot, legs=tuple(legs)))
+    found = pteron.kinematics.architecture(replace(robot, legs=tuple(legs)))
     assert "all platform points lie on one line through P" in found.reason
 
 

@@ -557,7 +557,7 @@ def two_legs_along_k():
 @pytest.mark.parametrize("seed", range(4))
 def test_a_turned_machine_that_is_singular_everywhere_is_recognised(seed):
     turned = pteron.turned(two_legs_along_k(), Rotation.random(rng=seed).as_matrix())
-    assert pteron.is_singular_everywhere(turned)
+    assert pteron.kinematics.is_singular_everywhere(turned)
     with pytest.raises(pteron.SingularPose):
         pteron.base_parameters(turned)
 
@@ -656,7 +656,7 @@ def test_floats_are_not_said_to_agree_where_what_they_drop_is_no_rounding(angle,
 def test_the_cheapest_base_parameters_give_the_same_forces(case):
     plain = found(case)
     robot = plain.robot
-    base = pteron.cheapest_parameters(robot)
+    base = pteron.reduction.cheapest_parameters(robot)
     kernels = [
         pteron.compile(robot, "inverse_dynamics", base=b, grade="parametric") for b in (base, plain)
     ]
@@ -672,7 +672,7 @@ def test_the_cheapest_base_parameters_of_a_nearly_symmetric_machine():
     first, last = TILTED["ankle"].legs
     point = (last.platform_point[0] + 1e-8, *last.platform_point[1:])
     robot = replace(TILTED["ankle"], legs=(first, replace(last, platform_point=point)))
-    base = pteron.cheapest_parameters(robot)
+    base = pteron.reduction.cheapest_parameters(robot)
     assert base.rank == pteron.base_parameters(robot).rank == 17
     motion = tilting.states(robot, pteron.workspace.home_pose(robot), 20)
     found = pteron.compile(robot, "inverse_dynamics", base=base)(*motion)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.calibration import Measurements, Place, Plane, Setup, calibrate, plan
-from pteron.calibration.exact_rank import RowKind, exact_rank
+from pteron.calibration.exact_rank import exact_rank
 from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess, tolerances_of
 from pteron.calibration.residuals import MachineSlopes
@@ -67,12 +67,7 @@ def ranks(robot, given, poses, free=GEOMETRY):
     whole = np.where(size > 1e-9 * size.max(), size, 1.0)
     sizes = np.linalg.svd(slopes / whole, compute_uv=False)
     numerical = int((sizes > 1e-8 * sizes[0]).sum())
-    level = float(given.heights[0]) if np.ptp(given.heights) == 0.0 else None
-    over = not np.isnan(given.heights[0])
-    seen = tuple((~np.isnan(given.positions[0])).tolist())
-    angles = tuple((~np.isnan(given.angles[0])).tolist())
-    kind = RowKind(seen, angles, over, False, "", "", None, "", level)
-    return exact_rank(start, blocks, [kind], 0)[0], numerical
+    return exact_rank(start, blocks, given, 0)[0], numerical
 
 
 @pytest.mark.parametrize(

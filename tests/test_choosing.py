@@ -1,6 +1,10 @@
 """Machines chosen for a job: what they keep, why kinds fall out, files, going on, bad jobs."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -10,11 +14,15 @@ from test_cli import done, refused, run
 
 import pteron
 from pteron.design import Job, choose_machine
+from pteron.design.choosing.choose import cases_of
+from pteron.design.choosing.proofs import regions
+from pteron.design.choosing.room import tool_places
+from pteron.design.choosing.search import search_kind
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError
 from pteron.kinematics import inverse_kinematics
 from pteron.motion import along, line_path, with_payload
-from pteron.workspace import Box, pose_margins, prove
+from pteron.workspace import Box, clearance, pose_margins, prove
 
 JOB = {
     "workspace": {"size": [0.2, 0.2, 0.05]},
@@ -48,6 +56,8 @@ def test_a_chosen_machine_keeps_what_was_asked(chosen, tmp_path):
     middle, half = np.array(one.middle), np.array([0.1, 0.1, 0.025])
     poses = middle + rng.uniform(-1.0, 1.0, (2000, 3)) * half
     assert pose_margins(robot, poses).type_i.min() >= 0.1
+    assert clearance(robot, poses).least.min() > 0.0
+    assert "touch" in one.clear
     low, high = np.array([leg.limits for leg in robot.legs]).T
     joints = inverse_kinematics(robot, poses)
     assert (joints >= low).all()
@@ -76,6 +86,80 @@ def test_a_finished_kind_is_not_searched_again(chosen, tmp_path):
     assert other.resumed == ()
 
 
+TURNING = {
+    "workspace": {"size": [0.2, 0.2, 0.05], "turn": [-1.0, 1.0]},
+    "payload": {"mass": 0.3, "tool": [0.05, 0.02, -0.1], "inertia": 1e-3},
+    "cycles": [{"points": [[-0.05, 0.0, 0.0, -0.5], [0.05, 0.0, 0.0, 0.5]], "duration": 0.4}],
+    "kinds": ["delta-4"],
+}
+"""A job with a tool off P, and a cycle that turns."""
+
+
+def test_the_tool_stays_in_the_workspace_while_the_platform_turns():
+    job = of(**TURNING)
+    case = cases_of(job)["delta-4"]
+    robot, middle = case.kind.machine(case.kind.ranges.mean(axis=0))
+    center = tool_places(robot, middle[None])
+    away = tool_places(robot, middle + case.poses) - center
+    assert np.abs(away).max(axis=0) == pytest.approx([0.1, 0.1, 0.025])
+    (cycle,) = case.every_cycle
+    pose = cycle.states[0]
+    away = tool_places(robot, middle + pose.reshape(-1, 4)) - center
+    assert np.abs(away).max(axis=0) == pytest.approx([0.1, 0.1, 0.025])
+    assert (pose[..., 3].min(), pose[..., 3].max()) == pytest.approx((-1.0, 1.0))
+    (region,) = regions(case, robot, middle)
+    assert region.holds(middle + 0.99 * case.poses)[case.poses[:, 3] == 0.0].all()
+    # No box that holds a pose of the region is said to miss it.
+    poses = np.random.default_rng(0).uniform(*region.box, (2000, 4))
+    size = np.array([0.01, 0.01, 0.01, 0.2])
+    assert not region.misses(poses - size, poses + size)[region.holds(poses)].any()
+    assert region.misses(poses - size, poses + size).any()
+
+
+def test_tilts_fill_a_cone():
+    job = of(workspace={**JOB["workspace"], "tilt": 0.2}, kinds=["stewart"])
+    case = cases_of(job)["stewart"]
+    axes = pteron.rotation_of("stewart", case.poses)[..., 2]
+    tilts = np.arccos(np.clip(axes[:, 2], -1.0, 1.0))
+    assert set(np.round(tilts, 9)) == {0.0, 0.2}
+    assert len(np.unique(np.round(axes, 9), axis=0)) == 7
+
+
+def test_rams_go_as_far_as_the_job_asks():
+    space = {"size": [0.2, 0.2, 0.1], "tilt": 0.2}
+    (case,) = cases_of(of(workspace=space, kinds=["stewart"])).values()
+    kept = [one for one in search_kind(case, 30, 0) if not one.misses]
+    assert kept
+    robot, middle = kept[-1].robot, kept[-1].middle
+    low, high = np.array([leg.limits for leg in robot.legs]).T
+    joints = inverse_kinematics(robot, middle + case.poses)
+    assert (joints > low).all()
+    assert (joints < high).all()
+    assert (high <= 1.7 * low).all()
+    # The tubes are as long as the shortest ram.
+    own = robot.legs[0].bodies["u"].values[0]
+    assert own == pytest.approx(robot.legs[1].bodies["u"].values[0] * low[0] / low[1], rel=1e-9)
+
+
+def test_shares_make_a_duty_cycle():
+    fast = JOB["cycles"][0]
+    loads = []
+    for share in (None, 1.0):
+        slow = fast | {"duration": 0.6, "dwell": 1.0}
+        cycles = [fast, slow] if share is None else [fast | {"share": 1}, slow | {"share": 3}]
+        case = cases_of(of(cycles=cycles))["linear-delta"]
+        values = case.kind.ranges.mean(axis=0)
+        values[0] += 0.7  # twice the size
+        robot, middle = case.kind.machine(values)
+        found, _ = case.loads(case.loaded(robot), middle, None)
+        loads.append(found.margins(case.options["m"], [0, 1, 2]))
+    times = np.array([0.3, 3 * 1.6])
+    parts = [1.0 / margins[0] ** 2 for margins in loads]
+    assert (loads[1][0] > loads[0][0]).all()
+    assert (parts[1] >= parts[0] * times[0] / times.sum() * (1 - 1e-9)).all()
+    assert loads[1][1:] == pytest.approx(loads[0][1:])
+
+
 def test_why_a_kind_falls_out_is_told():
     (one,) = choose_machine(of(cell={"height": 0.05}, search={"evaluations": 12})).candidates
     assert not one.serves
@@ -97,11 +181,20 @@ def test_kinds_are_those_that_can_do_the_motion():
         ({"objectives": ["beauty"]}, "is none of price"),
         ({"cycles": []}, "nothing says what the motors must do"),
         ({"objectives": ["cycle_time"]}, "every cycle has its duration"),
-        ({"cycles": [{"points": [[0, 0], [1, 0]], "duration": 1.0}]}, "points of 3 numbers"),
+        ({"cycles": [{"points": [[0, 0], [1, 0]], "duration": 1.0}]}, "points of 2 numbers given"),
         ({"payload": {"mass": -1.0}}, "mass"),
         ({"nonsense": 1}, "nonsense"),
         ({"links": {"upper": ["wood"]}}, "is no stock"),
         ({"cell": {"low": [0, 0, 0], "high": [1, 1, 1]}}, "need [workspace] center"),
+        ({"motors": "motors.csv"}, "a table expected: [motors] with list"),
+        ({"workspace": {"size": [0.2, -0.1, 0.1]}}, "workspace.size, item 2: -0.1 given"),
+        ({"workspace": {"size": [0.2]}}, "at least 2 of them"),
+        ({"workspace": {"size": [0.2, 0.2], "turn": [-90, 90]}}, "are these degrees?"),
+        ({"payload": {"mass": 1.0, "tool": [0, 0, -100]}}, "are these mm?"),
+        ({"payload": {"mass": 1.0, "inertia": -1.0}}, "payload: inertia"),
+        ({"kinds": ["delta", "delta"]}, "given twice"),
+        ({"cycles": [TURNING["cycles"][0]]}, "[workspace] turn is not given; at least [-0.5, 0.5]"),
+        ({"cycles": [*TURNING["cycles"], JOB["cycles"][0] | {"share": 2}]}, "share given of some"),
     ],
 )
 def test_a_bad_job_is_refused_in_a_line(keys, told, tmp_path):
@@ -120,6 +213,59 @@ def test_a_cycle_that_does_not_fit_and_motors_without_inertia_are_refused(tmp_pa
     motors.write_text("name,rotor_inertia,rated_torque,peak_torque,max_speed\na,1e-4,1,3,300\n")
     with pytest.raises(DataError, match="price: asked for"):
         choose_machine(of(motors={"list": str(motors)}))
+
+
+def test_gearboxes_and_prices_that_cannot_be(tmp_path):
+    gears = tmp_path / "gears.csv"
+    gears.write_text("name,joint,ratio,inertia,backlash,stiffness,price\na,rad,1,0,0,1e4,1\n")
+    with pytest.raises(DataError, match='no gearbox with joint = "m", as linear-delta needs'):
+        choose_machine(of(motors={"gearboxes": str(gears)}))
+    gears.write_text("name,joint,ratio,inertia,backlash,stiffness,price\na,m,1,0,0,1e4,-1\n")
+    with pytest.raises(DataError, match="price: -1 given, 0 or more expected"):
+        choose_machine(of(motors={"gearboxes": str(gears)}))
+
+
+@CLIENTS
+def test_ctrl_c_keeps_what_is_finished(tmp_path):
+    file, out = tmp_path / "job.toml", tmp_path / "out"
+    file.write_text(tomlkit.dumps(JOB | {"kinds": ["linear-delta", "hexa"]}))
+    given = [sys.executable, "-m", "pteron", "choose", str(file), "--out", str(out)]
+    process = subprocess.Popen([*given, "--workers", "2"], stderr=subprocess.PIPE, text=True)
+    while not (out / "kinds" / "linear-delta.json").exists() and process.poll() is None:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert f"What is finished is kept in {out}" in told
+    assert "Traceback" not in told
+    assert (out / "kinds" / "linear-delta.json").exists()
+    assert not (out / "choose.json").exists()
+    assert not list(out.rglob("*.tmp"))
+
+
+@CLIENTS
+def test_workers_end_with_the_process_that_asked(tmp_path):
+    file = tmp_path / "job.toml"
+    file.write_text(tomlkit.dumps(JOB | {"kinds": ["linear-delta", "hexa"]}))
+    given = [sys.executable, "-m", "pteron", "choose", str(file), "--workers", "2"]
+    process = subprocess.Popen(given, stderr=subprocess.DEVNULL)
+
+    def told(*given):
+        return subprocess.run(["ps", "-ww", *given], capture_output=True, text=True).stdout
+
+    workers = []
+    while not workers:
+        assert process.poll() is None
+        time.sleep(0.1)
+        lines = told("-o", "pid=,args=", "--ppid", str(process.pid)).splitlines()
+        workers = [line.split()[0] for line in lines if "spawn_main" in line]
+    process.kill()
+    process.wait()
+    for _ in range(600):
+        if not told("-o", "pid=", "-p", ",".join(workers)):
+            break
+        time.sleep(0.1)
+    assert not told("-o", "pid=", "-p", ",".join(workers))
 
 
 @CLIENTS

@@ -22,8 +22,8 @@ from typer.testing import CliRunner, Result
 import pteron
 from pteron.cli.arguments import regrouped
 from pteron.cli.main import app
+from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.variants import with_elbows
-from pteron.workspace.machine_warnings import machine_warnings
 
 PROGRAM = [sys.executable, "-c", "from pteron_command import main; main()"]
 PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
@@ -586,7 +586,9 @@ def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.Mo
     assert found["working_mode"] == "".join("+-"[leg.elbow < 0] for leg in machine.legs)
     home = found["home_pose"]
     assert np.isfinite(pteron.inverse_kinematics(machine, home)).all()
-    at_home = pteron.singular_orientations(machine, home[: len(machine.platform.lengths)])
+    at_home = pteron.kinematics.singular_orientations(
+        machine, home[: len(machine.platform.lengths)]
+    )
     assert found["singular_orientations"] == at_home.tolist()
     assert len(at_home) == (2 if robot in ("quadrupteron", "h4") else 0)
     assert ("at the home position" in text) == (robot == "h4")
@@ -597,13 +599,13 @@ def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.Mo
 
 def driven(robot, **more):
     drive = {"coulomb": 3.0, "viscous": 12.0, "rotor_inertia": 3e-5, "ratio": 392.7} | more
-    legs = tuple(replace(leg, drive=pteron.Drive(**drive)) for leg in robot.legs)
+    legs = tuple(replace(leg, drive=pteron.legs.Drive(**drive)) for leg in robot.legs)
     return replace(robot, legs=legs)
 
 
 def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
-    robot = driven(pteron.load("quadrupteron"), stribeck=pteron.Stribeck(1.0, 0.01))
+    robot = driven(pteron.load("quadrupteron"), stribeck=pteron.legs.Stribeck(1.0, 0.01))
     pteron.save(robot, "robot.toml")
     text = done("check robot.toml")
     assert max(map(len, text.splitlines())) <= 60
@@ -621,6 +623,8 @@ def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch
         "max_force": None,
         "max_speed": None,
         "counts_per_turn": None,
+        **dict.fromkeys(("elastic", "current_time", "winding", "lugre")),
+        **{name: [] for name in ("curve", "ripple", "cogging")},
     }
     pteron.save(driven(pteron.load(mixed)), "mixed.toml")
     text = done("check mixed.toml")
@@ -723,8 +727,8 @@ def test_all_faults_of_a_file_are_told_at_once():
 def test_what_is_possible_but_unlikely_is_doubted_aloud():
     robot = pteron.load("tripteron")
     leg = robot.legs[0]
-    turned = pteron.PlanarInertia.of_body(leg.lower.mass, (0.09, 0.0), leg.lower.inertia)
-    beyond = pteron.PlanarInertia.of_body(0.3, (0.25, 0.0), 0.02)
+    turned = pteron.bodies.PlanarInertia.of_body(leg.lower.mass, (0.09, 0.0), leg.lower.inertia)
+    beyond = pteron.bodies.PlanarInertia.of_body(0.3, (0.25, 0.0), 0.02)
     legs = replace(leg, lower=turned), replace(robot.legs[1], upper=beyond), robot.legs[2]
     pteron.save(replace(robot, legs=legs), "odd.toml")
     result = run("check odd.toml")
@@ -741,7 +745,7 @@ def test_millimetres_in_a_file_are_doubted():
     robot = pteron.load("tripteron")
     assert all(machine_warnings(pteron.load(name)) == () for name in pteron.catalog())
     far = replace(robot.legs[0], upper_length=154.0, guide_point=(260.0, 0.0, 0.0))
-    heavy = pteron.PlanarInertia.of_body(0.8, (0.006, -0.004), 2100.0)
+    heavy = pteron.bodies.PlanarInertia.of_body(0.8, (0.006, -0.004), 2100.0)
     odd = replace(
         robot,
         gravity=(0.0, 0.0, -9810.0),

@@ -33,7 +33,7 @@ def with_drives(robot, friction=1.0):
     legs = [
         replace(
             leg,
-            drive=pteron.Drive(
+            drive=pteron.legs.Drive(
                 *(friction * (0.3 + 0.1 * i), friction * 0.5, 0.2 - 0.1 * i),
                 *(1e-6, 40.0 + i),
                 rest_speed=0.05,
@@ -78,7 +78,10 @@ def test_two_velocities_meet_as_christoffels_symbols_say(name):
     values = ca.DM(pteron.parameters(robot))
     function = ca.Function("mixed", symbols, [mixed_forces(machine, x, *joints, ca.SX(values))])
     J = pteron.jacobian(robot, pose)
-    rate = (pteron.joint_accelerations(robot, pose, v + s * w, 0 * a).actuated for s in (1, -1))
+    rate = (
+        pteron.kinematics.joint_accelerations(robot, pose, v + s * w, 0 * a).actuated
+        for s in (1, -1)
+    )
     drift = 0.25 * (next(rate) - next(rate))  # J' w is half of what is bilinear
     push = times(J, a) + drift
     found = np.array(function(pose.T, times(J, v).T, times(J, w).T, push.T)).T
@@ -109,7 +112,7 @@ def test_without_errors_a_law_gives_what_the_motion_needs(name, what):
     pose, velocity, acceleration = states(robot, 12)
     law = CONTROLLERS[what].law(robot)
     joints = pteron.inverse_kinematics(robot, pose)
-    rates = pteron.joint_rates(robot, pose, velocity).actuated
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     third = 50.0 * acceleration[::-1]
     memory = law.memory(pose + 1e-4, velocity)
     begins = 0 if what == "feed_forward_pd" else robot.freedom
@@ -165,7 +168,7 @@ def test_adaptive_control_takes_energy_at_the_rate_of_its_damping(name, friction
     n = plant.freedom
     slope, damping = law.gains[:n], law.gains[n : 2 * n]
     joints = pteron.inverse_kinematics(plant, pose)
-    rates = pteron.joint_rates(plant, pose, velocity).actuated
+    rates = pteron.kinematics.joint_rates(plant, pose, velocity).actuated
     start = law.memory(pose, velocity)
     forces, memory = law(wanted, rest, rest, joints, rates, start)
     error = pteron.inverse_kinematics(plant, wanted) - joints
@@ -175,7 +178,10 @@ def test_adaptive_control_takes_energy_at_the_rate_of_its_damping(name, friction
     J = pteron.jacobian(plant, pose)
     inverse = np.linalg.inv(J)
     v, w = velocity, times(inverse, aim)
-    drift = (pteron.joint_accelerations(plant, pose, v + s * w, rest).actuated for s in (1.0, -1.0))
+    drift = (
+        pteron.kinematics.joint_accelerations(plant, pose, v + s * w, rest).actuated
+        for s in (1.0, -1.0)
+    )
     a = times(inverse, push - 0.25 * (next(drift) - next(drift)))
     rotors = np.diag([leg.drive.inertia if leg.drive else 0.0 for leg in plant.legs])
     M = pteron.mass_matrix(plant, pose) + np.swapaxes(J, -1, -2) @ rotors @ J
@@ -184,7 +190,8 @@ def test_adaptive_control_takes_energy_at_the_rate_of_its_damping(name, friction
     C = pteron.coriolis_matrix(plant, pose, v)
     # J' z_x by which the motors' part of M changes.
     turned = (
-        pteron.joint_accelerations(plant, pose, v + s * zx, rest).actuated for s in (1.0, -1.0)
+        pteron.kinematics.joint_accelerations(plant, pose, v + s * zx, rest).actuated
+        for s in (1.0, -1.0)
     )
     turning = 0.25 * (next(turned) - next(turned))
     kinetic = (zx * times(M, change)).sum(-1) + (zx * times(C, zx)).sum(-1)
@@ -252,7 +259,7 @@ def test_computed_torque_tracks_the_cycle_to_1_um_at_4_khz(name):
 def wrong(robot, seed, share=0.2):
     """Return a machine whose bodies are all heavier or lighter by a share, at random."""
     rng = np.random.default_rng(seed)
-    data = pteron.parameter_data(robot)
+    data = pteron.manipulator.parameter_data(robot)
     factors = {owner: 1 + share * rng.choice([-1, 1]) for owner in sorted({p.owner for p in data})}
     values = pteron.parameters(robot) * [factors[p.owner] for p in data]
     return pteron.with_parameters(robot, values)

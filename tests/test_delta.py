@@ -20,7 +20,7 @@ def test_the_published_delta():
         np.testing.assert_allclose(level, outwards, atol=1e-15)
         assert leg.second[2] > 0.99
     home = [0.0, 0.0, -0.9]
-    upper, lower = pteron.link_vectors(robot, home)
+    upper, lower = pteron.kinematics.link_vectors(robot, home)
     elbows = np.array([leg.r for leg in machine.legs]) + upper
     assert (np.linalg.norm(elbows[:, :2], axis=-1) > 0.7).all()
     np.testing.assert_allclose(np.linalg.norm(upper, axis=-1), 0.42, rtol=1e-15)

@@ -100,7 +100,7 @@ def test_a_stretched_link_is_that_of_a_longer_bar():
     def bar(length, density=1.3, off=0.02):
         mass = density * length
         inertia = mass * (length**2 / 3.0 + off**2)
-        return pteron.PlanarInertia.of_body(mass, (length / 2.0, off), inertia)
+        return pteron.bodies.PlanarInertia.of_body(mass, (length / 2.0, off), inertia)
 
     np.testing.assert_allclose(stretched(bar(0.2), 1.7).values, bar(0.34).values)
 
@@ -128,10 +128,12 @@ def test_quantities_are_those_of_the_public_functions(task):
     corners = np.column_stack([corners, [0.0, 0.0]])
     forces = pteron.drive_forces(robot, corners, [0, 1.0, 0, 0], [-10.0, 0, 0, 0])
     assert design.quantity("force") >= np.abs(forces).max() * (1 - 1e-9)
-    masses = [p for p in pteron.parameter_data(robot) if p.kind == "m"]
+    masses = [p for p in pteron.manipulator.parameter_data(robot) if p.kind == "m"]
     total = sum(
         v
-        for p, v in zip(pteron.parameter_data(robot), pteron.parameters(robot), strict=True)
+        for p, v in zip(
+            pteron.manipulator.parameter_data(robot), pteron.parameters(robot), strict=True
+        )
         if p in masses
     )
     assert design.quantity("moving_mass") == pytest.approx(total)
@@ -475,7 +477,7 @@ def test_the_plan_of_an_older_search_stays(task):
 
 
 def test_the_shortest_time_brings_a_drive_to_its_limit():
-    drive = pteron.Drive(coulomb=0.05, viscous=0.01, max_force=0.6)
+    drive = pteron.legs.Drive(coulomb=0.05, viscous=0.01, max_force=0.6)
     robot = pteron.load("five-bar")
     robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
     motion = pick_and_place(robot, scale=0.1, duration=0.5, samples=61)
@@ -490,7 +492,7 @@ def test_the_shortest_time_brings_a_drive_to_its_limit():
     assert all(most(slower * time) < 0.6 for slower in (1.01, 1.5, 5.0))
     fast = replace(drive, max_force=None, max_speed=2.0)
     robot = replace(robot, legs=tuple(replace(leg, drive=fast) for leg in robot.legs))
-    speeds = np.abs(pteron.joint_rates(robot, motion.pose, motion.velocity).actuated)
+    speeds = np.abs(pteron.kinematics.joint_rates(robot, motion.pose, motion.velocity).actuated)
     assert shortest_time(robot, motion) == pytest.approx(0.5 * speeds.max() / 2.0)
 
 

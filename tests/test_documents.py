@@ -10,6 +10,7 @@ import importlib
 import re
 import runpy
 import shlex
+import shutil
 import sys
 from pathlib import Path
 
@@ -106,7 +107,8 @@ def test_options_that_are_shown_exist(name):
         assert used <= known, f"{name}: {line}"
 
 
-RUN = ("README.md", "docs/start/first-result.md", "docs/start/install.md")
+RUN = tuple(f"docs/start/{name}.md" for name in ("first-result", "install", "tour"))
+"""Those of README run in `make first`."""
 LEFT = {
     "choose": "test_choosing.py",
     "design": "test_design.py",
@@ -180,6 +182,8 @@ SLOW = {
     *("docs/plots.md", "docs/play.md", "docs/simulation.md", "docs/controllers.md"),
     *("docs/how-to/prove-a-workspace.md", "docs/how-to/singularities.md"),
     "docs/how-to/platforms-that-tilt.md",
+    "docs/how-to/simulate-then-identify.md",
+    "docs/start/coming-from.md",
 }
 
 
@@ -190,6 +194,8 @@ def test_python_runs(name, tmp_path, monkeypatch):
     """In order, in one session; what follows `>>>` is compared with what is shown."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("builtins.input", lambda *words: "")  # Enter ends the viewer
+    for machine in (ROOT / name).parent.glob("*.toml"):  # it lies beside the page
+        shutil.copy(machine, tmp_path)
     names: dict[str, object] = {}
     finder = doctest.DocTestParser()
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
@@ -210,10 +216,10 @@ def test_pictures_are_those_that_are_drawn(tmp_path, monkeypatch):
     """Those of the catalog take longer, and MuJoCo's need OpenGL: `make docs` compares all."""
     monkeypatch.syspath_prepend(DOCS / "pictures")
     script = runpy.run_path(str(DOCS / "pictures" / "draw.py"))
-    for name in ("cycle", "legs"):
+    for name in ("cycle", "legs", "vectors"):
         script["DRAWN"][name](tmp_path)
     drawn = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert len(drawn) == 2 + len(pteron.legs.KINDS)
+    assert len(drawn) == 2 + len(pteron.legs.KINDS) + 14
     for path in drawn:
         kept = DOCS / path.relative_to(tmp_path)
         assert script["alike"](kept, path), f"{kept} is not what is drawn; run make docs"
@@ -275,11 +281,11 @@ def test_each_equation_has_code_and_each_citation_an_equation():
     assert len(set(cited(source))) > 10
 
 
-def test_figures_of_the_claim_are_those_of_the_readme():
-    """README's are counted from the graphs by test_costs.py."""
+def test_figures_of_the_claim_are_those_of_the_evidence():
+    """They are counted from the graphs by test_costs.py."""
     shown = re.findall(r"\| (\d{3}) \| (\d{3}) \|", TEXTS["docs/theory/corrections.md"])
     assert len(shown) == 3
-    assert all(f"| {whole} | {reduced} |" in TEXTS["README.md"] for whole, reduced in shown)
+    assert all(f"| {whole} | {reduced} |" in TEXTS["docs/evidence.md"] for whole, reduced in shown)
 
 
 def test_sources_that_are_cited_are_in_the_bibliography():
@@ -292,3 +298,14 @@ def test_sources_that_are_cited_are_in_the_bibliography():
     }
     assert cited
     assert cited <= known
+
+
+def test_the_paper_cites_what_it_lists_and_states_what_the_evidence_does():
+    paper = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+    known = re.findall(r"@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"))
+    assert sorted(set(re.findall(r"@(\w+\d{4})", paper))) == sorted(known)
+    assert 250 <= len(paper.partition("# Summary")[2].split()) <= 1000
+    evidence = TEXTS["docs/evidence.md"]
+    for figure in ("385", "323", "806", "11.3", "93.9", "95.5", "9e-14"):
+        assert re.search(rf"\b{figure}\b", paper), figure
+        assert re.search(rf"\b{figure}\b", evidence), figure

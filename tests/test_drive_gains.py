@@ -128,7 +128,7 @@ def test_what_was_found_can_be_read_and_declared():
 def test_a_payload_that_no_actuator_feels_is_refused():
     robot = machine("tripteron")
     # What is "carried" weighs nothing: the log's forces are those of the empty machine.
-    empty = make_log("tripteron", load=pteron.PlanarInertia(1e-30, (0.0, 0.0), 1e-40))
+    empty = make_log("tripteron", load=pteron.bodies.PlanarInertia(1e-30, (0.0, 0.0), 1e-40))
     log = in_currents(empty, GAINS[:3])
     with pytest.raises(DataError, match="the payload does not tell the gains from the inertia"):
         identify_drive_gains(robot, log, base=base_of("tripteron"))

@@ -35,7 +35,7 @@ def plain(robot, what):
 
 
 def joint_rates(robot, pose, velocity):
-    return pteron.joint_rates(robot, pose, velocity).actuated
+    return pteron.kinematics.joint_rates(robot, pose, velocity).actuated
 
 
 @EVERY
@@ -66,7 +66,7 @@ def test_the_factors_of_equation_15_multiply_to_the_regressor(name):
     product = -np.linalg.solve(transposed(J), np.concatenate([*blocks, platform], axis=-1))
     scale = np.abs(D).max(axis=(-2, -1), keepdims=True)
     assert (np.abs(product - D) / scale).max() < 1e-12
-    both = np.concatenate(pteron.link_jacobians(robot, motion[0]), axis=1)
+    both = np.concatenate(pteron.kinematics.link_jacobians(robot, motion[0]), axis=1)
     np.testing.assert_allclose(link_jacobians, both, atol=1e-12)
 
 
@@ -168,7 +168,7 @@ def test_potential_energy_is_zero_at_the_origin_of_the_base_frame():
         lost = pteron.potential_energy(robot, pose) - pteron.potential_energy(
             replace(robot, legs=legs), moved
         )
-        kinds = pteron.parameter_data(robot)
+        kinds = pteron.manipulator.parameter_data(robot)
         mass = sum(v for p, v in zip(kinds, pteron.parameters(robot), strict=True) if p.kind == "m")
         np.testing.assert_allclose(lost, mass * size, rtol=1e-13)
 
@@ -204,7 +204,7 @@ def test_passive_friction_does_the_work_of_its_joint(name):
     robot = MACHINES[name]
     pose, velocity, _ = states(robot, 20)
     columns = pteron.compile(robot, "passive_friction")(pose, velocity)
-    moved = pteron.joint_rates(robot, pose, velocity)
+    moved = pteron.kinematics.joint_rates(robot, pose, velocity)
     # Of a chain under a platform that turns, the last joint is the platform's own.
     own = moved.passive[..., :3] if robot.platform.turns else moved.passive
     rates = own.reshape(len(pose), -1)
@@ -219,7 +219,7 @@ def test_the_platforms_motion_from_that_of_the_joints(name):
     robot = MACHINES[name]
     motion = states(robot, COUNT)
     rates = joint_rates(robot, *motion[:2])
-    accelerations = pteron.joint_accelerations(robot, *motion).actuated
+    accelerations = pteron.kinematics.joint_accelerations(robot, *motion).actuated
     back = pteron.compile(robot, "platform_motion")(motion[0], rates, accelerations)
     assert relative_error(back[0], motion[1]) < 1e-10
     assert relative_error(back[1], motion[2]) < 1e-10
@@ -264,19 +264,24 @@ STATE_FUNCTIONS = {
 
 def parts(result):
     """Return the arrays of a result."""
-    if isinstance(result, pteron.JointMotion):
+    if isinstance(result, pteron.kinematics.JointMotion):
         return list(vars(result).values())
     return list(result) if isinstance(result, tuple) else [np.asarray(result)]
+
+
+def public(name):
+    """Return the function of a name, whichever package has it."""
+    return getattr(pteron if name in pteron.__all__ else pteron.kinematics, name)
 
 
 @pytest.mark.parametrize("function", [*STATE_FUNCTIONS, "direct_kinematics"])
 @pytest.mark.parametrize("name", ["quadrupteron", "delta", "random PRR 0"])
 def test_a_batch_is_its_single_calls_bit_for_bit(name, function):
-    robot, call = MACHINES[name], getattr(pteron, function)
+    robot, call = MACHINES[name], public(function)
     if function == "direct_kinematics":
-        arrays = [pteron.inverse_kinematics(robot, states(robot, 300)[0])]
+        arrays = [pteron.inverse_kinematics(robot, states(robot, 400)[0])]
     else:
-        arrays = states(robot, 300)[: STATE_FUNCTIONS[function]]
+        arrays = states(robot, 400)[: STATE_FUNCTIONS[function]]
     single = [parts(call(robot, *state)) for state in zip(*arrays, strict=True)]
     for shape in BATCH_SHAPES:
         count = int(np.prod(shape, dtype=int))
@@ -291,7 +296,7 @@ def test_a_batch_is_its_single_calls_bit_for_bit(name, function):
 
 @pytest.mark.parametrize("function", [f for f, n in STATE_FUNCTIONS.items() if n > 1])
 def test_leading_axes_broadcast(function):
-    robot, call = CATALOG["quadrupteron"], getattr(pteron, function)
+    robot, call = CATALOG["quadrupteron"], public(function)
     pose, *rest = states(robot, 12)[: STATE_FUNCTIONS[function]]
     pose = pose[:4].reshape(4, 1, 4)
     rest = [rest[0][:3], *(one[0] for one in rest[1:])]

@@ -61,6 +61,7 @@ def waits(path):
         for path in paths
     ],
 )
+@pytest.mark.filterwarnings("ignore::pteron.UnlikelyValue")
 def test_a_file_of_version_0_1_holds_what_it_held(kind, path):
     read, _ = FILES[kind]
     expect_alike(json.loads(json.dumps(read(path))), VALUES[kind][label(path)], label(path))

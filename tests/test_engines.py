@@ -176,7 +176,7 @@ def test_the_written_module_is_the_model_in_this_process(tmp_path):
 
 def test_a_drives_inertia_is_armature():
     pytest.importorskip("pinocchio")
-    drive = pteron.Drive(rotor_inertia=2e-4, ratio=10.0)
+    drive = pteron.legs.Drive(rotor_inertia=2e-4, ratio=10.0)
     robot = CATALOG["delta-4"]
     robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
     closed = pinocchio_model(robot)
@@ -209,8 +209,8 @@ def test_mjcf_opens_at_the_home_pose_with_its_loops_closed(case):
 
 def test_mjcf_has_drives_and_limits():
     mujoco = pytest.importorskip("mujoco")
-    drive = pteron.Drive(3.0, 12.0, 0.5, 3e-5, 400.0, max_force=50.0)
-    shaft = pteron.Drive(0.2, 0.1, rotor_inertia=1e-3, max_force=2.0)
+    drive = pteron.legs.Drive(3.0, 12.0, 0.5, 3e-5, 400.0, max_force=50.0)
+    shaft = pteron.legs.Drive(0.2, 0.1, rotor_inertia=1e-3, max_force=2.0)
     robot = CATALOG["delta-4"]
     *cranks, last = robot.legs
     last = replace(last, ratio=-2.0, limits=(-1.0, 3.0), drive=shaft)
@@ -236,7 +236,7 @@ def test_the_parts_are_the_whole_machine(case):
     """Mass, and every body real: no moment above the sum of the other two."""
     robot, _, home = case
     opened = tree(robot, home)
-    listed = zip(pteron.parameter_data(robot), pteron.parameters(robot), strict=True)
+    listed = zip(pteron.manipulator.parameter_data(robot), pteron.parameters(robot), strict=True)
     mass = sum(value for parameter, value in listed if parameter.kind == "m")
     np.testing.assert_allclose(sum(body.mass for body in opened.bodies), mass, rtol=1e-12)
     for body in opened.bodies:
@@ -277,7 +277,7 @@ def test_rates_of_the_chain_are_those_of_the_coordinates():
         found = dict(
             zip([j.name for j in opened.joints], ((ahead - back) / (2 * dt)).T, strict=True)
         )
-        rates = pteron.joint_rates(robot, pose, velocity).passive
+        rates = pteron.kinematics.joint_rates(robot, pose, velocity).passive
         for i in range(robot.freedom):
             for k in range(1, 4):
                 key = f"leg{i + 1}_joint{k}"
@@ -307,7 +307,7 @@ def test_every_file_is_named_after_the_machine(tmp_path):
 
 
 def test_what_a_file_cannot_hold_is_said_in_it():
-    drive = pteron.Drive(3.0, offset=1.0, rotor_inertia=1e-5, max_speed=2.0)
+    drive = pteron.legs.Drive(3.0, offset=1.0, rotor_inertia=1e-5, max_speed=2.0)
     robot = CATALOG["quadrupteron"]
     legs = (replace(leg, drive=drive, elbow_limits=(0.1, 3.0)) for leg in robot.legs)
     opened = tree(replace(robot, legs=tuple(legs)))
@@ -356,7 +356,10 @@ def test_wrong_homes_are_refused(tmp_path):
         export_sdf(robot, tmp_path, home=["middle"] * 3)
     with pytest.raises(pteron.DataError, match="nan given, a finite number expected"):
         export_sdf(robot, tmp_path, home=[0.0, 0.0, np.nan])
-    with pytest.raises(pteron.UnreachablePose, match="leg 1"):
+    with (
+        pytest.warns(pteron.UnlikelyValue, match="are these mm"),
+        pytest.raises(pteron.UnreachablePose, match="leg 1"),
+    ):
         export_urdf(robot, tmp_path, home=[0.0, 0.0, -900.0])
     with pytest.raises(pteron.ModelError, match="robot: int given"):
         export_sdf(3, tmp_path)

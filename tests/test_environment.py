@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from functools import lru_cache
 
 import gymnasium
@@ -108,13 +109,18 @@ def test_a_step_is_the_machines_motion_under_its_drives(name):
     forces = np.float64(action) * world.forces
     m = world.robot.freedom
 
+    def sharp(drive):  # smooth friction, next to that which sticks
+        return drive and replace(drive, rest_speed=1e-6)
+
+    legs = tuple(replace(leg, drive=sharp(leg.drive)) for leg in world.robot.legs)
+    smooth = replace(world.robot, legs=legs)
+
     def rates(_, y):
-        return np.concatenate(
-            [y[m:], pteron.drive_accelerations(world.robot, y[:m], y[m:], forces)]
-        )
+        return np.concatenate([y[m:], pteron.drive_accelerations(smooth, y[:m], y[m:], forces)])
 
     begin = np.concatenate([state.pose, state.velocity])
-    solved = solve_ivp(rates, (0.0, world.period), begin, rtol=1e-10, atol=1e-12).y[:, -1]
+    solved = solve_ivp(rates, (0.0, world.period), begin, "LSODA", rtol=1e-10, atol=1e-12)
+    solved = solved.y[:, -1]
     seen, reward, ended, late, info = env.step(action)
     np.testing.assert_allclose(
         np.concatenate([env._state.pose, env._state.velocity]), solved, atol=1e-5, rtol=1e-5

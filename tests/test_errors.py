@@ -29,12 +29,12 @@ STRETCHED = along_leg_1(LONGEST * (1 - 1e-9))
 
 CALLS = {
     "inverse_kinematics": (pteron.inverse_kinematics, 0),
-    "link_vectors": (pteron.link_vectors, 0),
+    "link_vectors": (pteron.kinematics.link_vectors, 0),
     "potential_energy": (pteron.potential_energy, 0),
-    "link_jacobians": (pteron.link_jacobians, 0),
-    "joint_screws": (pteron.joint_screws, 0),
-    "joint_rates": (pteron.joint_rates, 1),
-    "joint_accelerations": (pteron.joint_accelerations, 2),
+    "link_jacobians": (pteron.kinematics.link_jacobians, 0),
+    "joint_screws": (pteron.kinematics.joint_screws, 0),
+    "joint_rates": (pteron.kinematics.joint_rates, 1),
+    "joint_accelerations": (pteron.kinematics.joint_accelerations, 2),
     "mass_matrix": (pteron.mass_matrix, 0),
     "coriolis_matrix": (pteron.coriolis_matrix, 1),
     "bias_forces": (pteron.bias_forces, 1),
@@ -60,7 +60,7 @@ def arrays(name, poses):
 def call(name, robot, poses, *others, **options):
     """Return the arrays that a function of CALLS returns."""
     found = CALLS[name][0](robot, poses, *(others or arrays(name, poses)), **options)
-    if isinstance(found, pteron.JointMotion):
+    if isinstance(found, pteron.kinematics.JointMotion):
         return list(vars(found).values())
     return list(found) if isinstance(found, tuple) else [np.asarray(found)]
 

@@ -109,8 +109,10 @@ def test_platform_and_sliders_are_one_motion(name: str, space: str):
     time = np.linspace(0.0, 4.0, 23)
     state, (rho, drho, ddrho) = motion.at(time), motion.joints(time)
     assert pteron.inverse_kinematics(robot, state.pose) == pytest.approx(rho, abs=1e-12)
-    rates = pteron.joint_rates(robot, state.pose, state.velocity)
-    seconds = pteron.joint_accelerations(robot, state.pose, state.velocity, state.acceleration)
+    rates = pteron.kinematics.joint_rates(robot, state.pose, state.velocity)
+    seconds = pteron.kinematics.joint_accelerations(
+        robot, state.pose, state.velocity, state.acceleration
+    )
     assert rates.actuated == pytest.approx(drho, abs=1e-11)
     assert seconds.actuated == pytest.approx(ddrho, abs=1e-10)
 
@@ -184,7 +186,12 @@ def test_the_angle_does_not_jump_at_half_a_turn():
     swing = 0.015 * np.random.default_rng(3).normal(size=(2, 2, 4))
     joints = pteron.inverse_kinematics(robot, center)
     motion = FourierMotion(
-        robot, "joints", 5.0, joints, *swing, mode=int(pteron.assembly_mode(robot, center))
+        robot,
+        "joints",
+        5.0,
+        joints,
+        *swing,
+        mode=int(pteron.kinematics.assembly_mode(robot, center)),
     )
     angle = motion.at(motion.uniform_times(2000)).pose[:, 3]
     assert np.ptp(angle) > 0.1
@@ -282,7 +289,7 @@ def test_every_limit_binds_when_it_is_the_tight_one(limits: Limits, space: str):
 )
 def test_passive_joints_and_phi_keep_their_limits(search):
     robot = CATALOG["par4"]
-    given = {"limits": None, "platform_cone": pteron.Cone((0.0, 0.0, 1.0), 1.3)}
+    given = {"limits": None, "platform_cone": pteron.legs.Cone((0.0, 0.0, 1.0), 1.3)}
     robot = replace(robot, legs=tuple(replace(leg, **given) for leg in robot.legs))
     limits, few = Limits(speed=10.0, acceleration=100.0, passive_clearance=0.55), {}
     if search is optimal_excitation:

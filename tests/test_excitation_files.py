@@ -49,11 +49,11 @@ def driven(name: str) -> pteron.Manipulator:
     robot = machine(name)
     more = {}
     if robot.platform.turns:
-        more = {"rotor_inertia": 1e-5, "ratio": 50.0, "stribeck": pteron.Stribeck(0.5, 0.02)}
+        more = {"rotor_inertia": 1e-5, "ratio": 50.0, "stribeck": pteron.legs.Stribeck(0.5, 0.02)}
     home, n = home_pose(robot), robot.freedom
     held = np.abs(pteron.inverse_dynamics(robot, home, np.zeros(n), np.zeros(n)))
     drives = [
-        pteron.Drive(
+        pteron.legs.Drive(
             coulomb=0.02 * held.max() + 0.05 * k,
             viscous=0.05 * held.max(),
             offset=0.01 * held.max(),
@@ -91,8 +91,8 @@ def left_of(robot, limits: Limits, movement, rate: float) -> dict[str, float]:
     """Return the least margins of a movement, over the sizes of the limits, by public functions."""
     times = np.arange(0.0, movement.duration, 1.0 / rate)
     pose, velocity, acceleration, *_ = movement.states(times)
-    rates = pteron.joint_rates(robot, pose, velocity).actuated
-    second = pteron.joint_accelerations(robot, pose, velocity, acceleration).actuated
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
+    second = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration).actuated
     forces = pteron.drive_forces(robot, pose, velocity, acceleration)
     room = pose_margins(robot, pose)
     joints = pteron.inverse_kinematics(robot, pose)
@@ -200,7 +200,7 @@ def test_limits_come_from_the_drives_where_they_are_known():
     assert limits.speed == tuple(leg.drive.max_speed for leg in robot.legs)
     assert limits.force == tuple(leg.drive.max_force for leg in robot.legs)
     assert Limits.of(robot, speed=0.2, force=5.0) == Limits(speed=0.2, force=5.0)
-    first = replace(robot.legs[0], drive=pteron.Drive(max_force=80.0))
+    first = replace(robot.legs[0], drive=pteron.legs.Drive(max_force=80.0))
     others = [replace(leg, drive=None) for leg in robot.legs[1:]]
     partly = Limits.of(replace(robot, legs=(first, *others)))
     assert (partly.speed, partly.force) == (1.0, (80.0, np.inf, np.inf))

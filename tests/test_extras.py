@@ -1,4 +1,4 @@
-"""Extras: the command that installs one, and that README's set-up has those of its commands."""
+"""Extras: the command that installs one, and that `make demo` brings those of what is shown."""
 
 import json
 import re
@@ -11,7 +11,7 @@ import pytest
 from pteron.extras import install_command
 
 ROOT = Path(__file__).parent.parent
-NEEDED = {"design": "design", "film": "film", "identify": "consistency", "view": "viewer"}
+NEEDED = {"design": "design", "film": "film", "identify": "consistency"}
 """Subcommands that do their work only with an extra."""
 
 ORIGINS = {
@@ -53,9 +53,29 @@ def test_sources_that_are_not_installed_are_installed():
     assert done.stdout.rstrip().endswith(f'-m pip install --editable "{ROOT}[film]"')
 
 
+@pytest.mark.parametrize(
+    ("words", "module", "extra"),
+    [
+        (["design", "task.toml"], "pymoo", "design"),
+        (["film", "delta", "-o", "cycle.mp4"], "imageio_ffmpeg", "film"),
+    ],
+)
+def test_a_missing_extra_is_told_before_anything_slow_is_imported(words, module, extra):
+    code = (
+        f"import sys; sys.modules[{module!r}] = None\n"
+        f"from pteron_command import main; sys.argv[1:] = {words!r}\n"
+        "try:\n    main()\nfinally:\n    print('casadi' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert f"{sys.executable} -m pip install" in done.stderr
+    assert f"[{extra}]" in done.stderr
+    assert done.stdout == "False\n"
+
+
 def test_the_set_up_of_readme_has_what_its_commands_need():
     """Tried with pip, in an empty environment, by `make first`."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = "".join((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/start/tour.md"))
     shown = set(re.findall(r"(?m)^ {4}\.venv/bin/pteron (\w+)", text))
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     (set_up,) = re.findall(r"(?s)/\.runtime: .*?install --editable '\.\[([\w,]+)\]'", makefile)

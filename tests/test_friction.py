@@ -31,7 +31,7 @@ each_mechanism = pytest.mark.parametrize("name", SOME)
 
 def passive_rates(robot, pose, velocity):
     """Return the rates of what has a column: the passive joints of each leg, and the platform."""
-    passive = pteron.joint_rates(robot, pose, velocity).passive
+    passive = pteron.kinematics.joint_rates(robot, pose, velocity).passive
     rates = [
         velocity[:, -1] if leg is None else passive[:, leg - 1, number - 1]
         for leg, number, _ in passive_joints(robot)
@@ -45,7 +45,7 @@ def test_a_column_of_passive_friction_does_the_work_of_its_joint(name):
     pose, velocity, _ = states(robot, 50)
     columns = unchecked(robot, "passive_friction", pose, velocity)
     rates = passive_rates(robot, pose, velocity)
-    sliders = pteron.joint_rates(robot, pose, velocity).actuated
+    sliders = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     power = np.einsum("rnc,rn->rc", columns, sliders)
     assert columns.shape == (50, len(robot.legs), rates.shape[1])
     assert relative_error(power, rates**2) < 1e-11
@@ -59,7 +59,7 @@ def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
     pose, velocity, _ = states(robot, 20)
     columns = unchecked(robot, "passive_friction", pose, velocity)
     rates = passive_rates(robot, pose, velocity)
-    sliders = pteron.joint_rates(robot, pose, velocity).actuated
+    sliders = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     invert = partial(unchecked, robot, "platform_motion")
     for j in range(n):
 
@@ -76,8 +76,8 @@ def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
 def test_motion_of_the_platform_inverts_that_of_the_sliders(name):
     robot = machine(name)
     pose, velocity, acceleration = states(robot, 100)
-    rates = pteron.joint_rates(robot, pose, velocity)
-    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity)
+    accelerations = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration)
     back = unchecked(robot, "platform_motion", pose, rates.actuated, accelerations.actuated)
     assert relative_error(back[0], velocity) < 1e-10
     assert relative_error(back[1], acceleration) < 1e-10

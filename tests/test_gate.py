@@ -12,7 +12,6 @@ from test_family import KINDS as MIXTURES
 from pteron.closures import KINDS as CLOSURES
 from pteron.equations.machine import Machine
 from pteron.legs import KINDS as LEGS
-from pteron.platforms import equations_class
 
 CHOSEN = [MACHINES[name] for name in GATE]
 TILTED = [tilting.machine(*case, 3)[0] for case in tilting.LEGS.items()]  # those of test_tilting
@@ -21,7 +20,7 @@ CHOSEN += TILTED
 
 def served(robots):
     """Return the closures of machines, each with the platform under which it stands."""
-    return {(type(Machine.of(r).closure), equations_class(r.platform)) for r in robots}
+    return {(type(Machine.of(r).closure), r.platform.kind) for r in robots}
 
 
 def test_every_closure_is_there_under_each_platform_that_it_serves():

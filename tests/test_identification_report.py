@@ -128,7 +128,7 @@ def test_the_page_says_the_verdict_first(name):
         assert grade == "Not trustworthy"
         assert 'class="verdict bad"' in html(name)
     shown = contents(found)
-    for reason in shown.reasons:
+    for reason in shown.result.verdict.reasons:
         assert " ".join(reason.split()) in text
     assert shown.worst == pytest.approx(max(p.nrms.max() for p in found.held_out))
     assert shown.worst_floor <= max(p.floor.max() for p in found.held_out)

@@ -145,7 +145,7 @@ def resting(robot, *, seed=3, rate=1000.0):
     )
     pose, velocity, acceleration = law[..., None] * step
     pose = pose + corners[start] + home_pose(robot)
-    rates = pteron.joint_rates(robot, pose, velocity).actuated
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
     forces = forces + Friction.of(len(robot.legs)).forces(rates)
     return Log("rests", time, pteron.inverse_kinematics(robot, pose), forces)

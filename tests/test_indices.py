@@ -254,7 +254,7 @@ def frame_compliance(robot, pose, spring, section):
 
     size = 6 + 24 * 3
     stiff, ties = np.zeros((size, size)), []
-    upper, lower = pteron.link_vectors(robot, pose)
+    upper, lower = pteron.kinematics.link_vectors(robot, pose)
     for i, leg in enumerate(robot.legs):
         d, s = np.array(leg.direction), np.array(leg.platform_point)
         at = 6 + 24 * i

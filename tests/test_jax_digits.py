@@ -2,11 +2,12 @@
 
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 from mechanisms import CLIENTS, NIGHTLY
 
-pytest.importorskip("jax")
+pytestmark = pytest.mark.skipif(find_spec("jax") is None, reason="jax is not installed")
 
 _BEGIN = """
 import jax, numpy as np, pteron

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import pteron
-from pteron.kernels.kept import EQUATIONS
+from pteron.kernels import cache
+from pteron.kernels.kept import EQUATIONS, kept_result
 from pteron.workspace import home
 
 PACKAGE = Path(pteron.__file__).parent
@@ -90,3 +91,40 @@ def test_every_file_that_it_depends_on_counts(start, packages, tmp_path):
     assert key_of(copy, sources=packages) == known
     (copy / "identification" / "__init__.py").write_text("")
     assert key_of(copy, sources=packages) == known
+
+
+def spoilt(path, damage):
+    """Damage a kept result, or replace it by another text that is whole."""
+    whole = path.read_bytes()
+    if damage == "cut":
+        path.write_bytes(whole[:-3])
+    elif damage == "changed":
+        path.write_bytes(whole[:40] + bytes([whole[40] ^ 1]) + whole[41:])
+    elif damage == "empty":
+        path.write_bytes(b"")
+    else:
+        cache.keep_text(path.name, damage)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    ["cut", "changed", "empty", "no pickle", "cnowhere\nAbsent\n.", "\u20ac"],
+    ids=["cut", "changed", "empty", "no pickle", "unknown class", "no bytes"],
+)
+def test_a_damaged_result_is_found_again_and_kept(damage, tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.VARIABLE, str(tmp_path))
+    value, asked = (0.1, ("rho1", -2), None), []
+
+    def result():
+        return kept_result(("what", 1.0), (), lambda: asked.append(1) or value)
+
+    assert result() == value
+    assert result() == value
+    assert len(asked) == 1
+    (path,) = (tmp_path / cache.TEXTS).iterdir()
+    spoilt(path, damage)
+    assert result() == value
+    assert len(asked) == 2
+    assert result() == value
+    assert len(asked) == 2
+    assert [one.name for one in (tmp_path / cache.TEXTS).iterdir()] == [path.name]

@@ -76,7 +76,7 @@ def test_the_links_close_every_leg_on_the_side_of_sigma(name):
     robot = MECHANISMS[name]
     poses, _, _ = states(robot, COUNT)
     q = pteron.inverse_kinematics(robot, poses)
-    upper, lower = pteron.link_vectors(robot, poses)
+    upper, lower = pteron.kinematics.link_vectors(robot, poses)
     base, d = column(robot, "guide_point"), column(robot, "direction")
     for i, leg in enumerate(robot.legs):
         if leg.joint.unit == "m":
@@ -103,7 +103,7 @@ def test_the_points_on_the_joint_axes_are_the_ends_of_the_links(name):
     robot = MECHANISMS[name]
     poses, _, _ = states(robot, 5)
     points = pteron.compile(robot, "joint_points")(poses)
-    upper, lower = pteron.link_vectors(robot, poses)
+    upper, lower = pteron.kinematics.link_vectors(robot, poses)
     ends = platform_points(robot, poses)
     for i, leg in enumerate(robot.legs):
         own = points[:, i][:, ~np.isnan(points[0, i]).any(axis=-1)]
@@ -132,7 +132,7 @@ def test_every_choice_of_elbows_is_another_working_mode(name):
     robot = CATALOG[name]
     modes = pteron.working_modes(robot)
     poses, _, _ = states(robot, 5)
-    uppers = [pteron.link_vectors(mode, poses)[0] for mode in modes]
+    uppers = [pteron.kinematics.link_vectors(mode, poses)[0] for mode in modes]
     assert len(modes) == 2 ** len(robot.legs)
     assert robot in modes
     for i, mode in enumerate(modes):
@@ -220,7 +220,7 @@ def test_the_assembly_modes_meet_wherever_the_base_frame_lies(name, shift):
     )
     robot = replace(MECHANISMS[name], legs=legs)
     poses = pteron.random_poses(robot, 100, seed=7, type_ii=0.0)
-    for angle in pteron.singular_orientations(robot):
+    for angle in pteron.kinematics.singular_orientations(robot):
         for away in (0.0, 1e-8, -1e-8):
             poses[:, 3] = angle + away
             joints = pteron.inverse_kinematics(robot, poses, on_failure="nan")
@@ -287,7 +287,7 @@ def test_the_jacobian_by_a_wrench_reciprocal_to_the_passive_joints(name):
     """Eq. (9): what no passive joint takes up, the actuated one must hold."""
     robot = MECHANISMS[name]
     poses, _, _ = states(robot, 20)
-    J, screws = pteron.jacobian(robot, poses), pteron.joint_screws(robot, poses)
+    J, screws = pteron.jacobian(robot, poses), pteron.kinematics.joint_screws(robot, poses)
     twists = twist(robot, np.eye(robot.freedom))
     for row, chain in zip(
         J.reshape(-1, robot.freedom), screws.reshape(-1, *screws.shape[2:]), strict=True
@@ -305,8 +305,8 @@ def test_the_jacobian_by_a_wrench_reciprocal_to_the_passive_joints(name):
 def test_joint_screws_times_rates_are_the_platforms_twist_for_every_leg(name):
     robot = MECHANISMS[name]
     poses, velocities, _ = states(robot, COUNT)
-    screws = pteron.joint_screws(robot, poses)
-    rates = pteron.joint_rates(robot, poses, velocities)
+    screws = pteron.kinematics.joint_screws(robot, poses)
+    rates = pteron.kinematics.joint_rates(robot, poses, velocities)
     joints = np.concatenate([rates.actuated[..., None], rates.passive], axis=-1)
     lacking = np.isnan(screws).any(axis=-1)
     np.testing.assert_array_equal(np.isnan(joints), lacking)
@@ -324,7 +324,7 @@ def test_joint_screws_times_rates_are_the_platforms_twist_for_every_leg(name):
 def test_link_jacobians_against_differences_of_points_and_links(name):
     robot = MECHANISMS[name]
     poses = bent_poses(robot)
-    jacobians = pteron.link_jacobians(robot, poses)
+    jacobians = pteron.kinematics.link_jacobians(robot, poses)
     starts = [leg.joint.unit == "m" for leg in robot.legs]
 
     def base_points(x):
@@ -335,8 +335,8 @@ def test_link_jacobians_against_differences_of_points_and_links(name):
     for which, (matrix, point) in enumerate(zip(jacobians, points, strict=True)):
         # Differences of coordinates, 0.5 m and rounded, over the step 5e-5.
         np.testing.assert_allclose(matrix[..., :3, :], gradient(point, poses), atol=1e-10)
-        links = pteron.link_vectors(robot, poses)[which]
-        slope = gradient(lambda x, k=which: pteron.link_vectors(robot, x)[k], poses)
+        links = pteron.kinematics.link_vectors(robot, poses)[which]
+        slope = gradient(lambda x, k=which: pteron.kinematics.link_vectors(robot, x)[k], poses)
         omega = matrix[..., 3:, :]
         turned = np.swapaxes(np.cross(np.swapaxes(omega, -1, -2), links[..., None, :]), -1, -2)
         # Magnified by 1 / measure at the elbow.
@@ -354,10 +354,12 @@ def test_link_jacobians_against_differences_of_points_and_links(name):
 def test_rates_of_links_are_those_of_their_jacobians(name):
     robot = MECHANISMS[name]
     poses, velocities, _ = states(robot, COUNT)
-    rates = pteron.joint_rates(robot, poses, velocities)
+    rates = pteron.kinematics.joint_rates(robot, poses, velocities)
     d = column(robot, "direction")
     for matrix, found in zip(
-        pteron.link_jacobians(robot, poses), (rates.upper_links, rates.lower_links), strict=True
+        pteron.kinematics.link_jacobians(robot, poses),
+        (rates.upper_links, rates.lower_links),
+        strict=True,
     ):
         omega = np.einsum("bnij,bj->bni", matrix[..., 3:, :], velocities)
         own = ~np.isnan(found)
@@ -374,14 +376,16 @@ def test_joint_accelerations_against_differences_of_rates_along_a_motion(name):
     poses = bent_poses(robot)
     rng = np.random.default_rng(4)
     velocities, accelerations = rng.normal(size=poses.shape), 10 * rng.normal(size=poses.shape)
-    found = pteron.joint_accelerations(robot, poses, velocities, accelerations)
+    found = pteron.kinematics.joint_accelerations(robot, poses, velocities, accelerations)
 
     def motion(t):
         t = t[:, None, None]
         return poses + t * velocities + t**2 / 2 * accelerations, velocities + t * accelerations
 
     for part in ("actuated", "upper_links", "lower_links", "passive"):
-        expected = along(lambda t, p=part: getattr(pteron.joint_rates(robot, *motion(t)), p), 2e-5)
+        expected = along(
+            lambda t, p=part: getattr(pteron.kinematics.joint_rates(robot, *motion(t)), p), 2e-5
+        )
         # Rates of 10 rad/s, rounded, over a step of 2e-5 s; accelerations of 10 to 1000 rad/s^2.
         np.testing.assert_allclose(getattr(found, part), expected, rtol=1e-8, atol=1e-7)
 
@@ -393,7 +397,7 @@ def test_joint_accelerations_against_differences_of_rates_along_a_motion(name):
 def test_the_type_1_measure_is_the_sine_between_the_links_about_d(name):
     robot = MECHANISMS[name]
     poses, _, _ = states(robot, COUNT)
-    upper, lower = pteron.link_vectors(robot, poses)
+    upper, lower = pteron.kinematics.link_vectors(robot, poses)
     volume = inner(column(robot, "direction"), np.cross(upper, lower))
     sizes = column(robot, "upper_length") * column(robot, "lower_length")
     measure = pteron.compile(robot, "reach")(poses)[1]
@@ -443,7 +447,7 @@ def test_the_type_2_measure_is_the_determinant_of_unit_forces(name):
 @pytest.mark.parametrize("name", gated(TURNING, ["quadrupteron-oblique +--+", "random 3T1R 0"]))
 def test_singular_orientations_do_not_depend_on_the_position(name):
     robot = MECHANISMS[name]
-    angles = pteron.singular_orientations(robot)
+    angles = pteron.kinematics.singular_orientations(robot)
     assert angles.shape == (2,)
     assert angles[1] - angles[0] == pytest.approx(np.pi, abs=1e-14)
     rng = np.random.default_rng(5)
@@ -456,16 +460,16 @@ def test_singular_orientations_do_not_depend_on_the_position(name):
 
 
 def test_the_catalogs_quadrupteron_is_singular_at_right_angles():
-    angles = pteron.singular_orientations(CATALOG["quadrupteron"])
+    angles = pteron.kinematics.singular_orientations(CATALOG["quadrupteron"])
     np.testing.assert_allclose(np.degrees(angles), [-90.0, 90.0], rtol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["par4", "h4", "3-rrr", "3-prr", "delta-4", "sliding"])
 def test_singular_orientations_at_a_position(name):
     robot = random_machine(0, "PRSSI") if name == "sliding" else CATALOG[name]
-    assert pteron.singular_orientations(robot).shape == (0,), "at every position"
+    assert pteron.kinematics.singular_orientations(robot).shape == (0,), "at every position"
     for pose in pteron.random_poses(robot, 5, seed=3, type_i=0.1, type_ii=0.01):
-        angles = pteron.singular_orientations(robot, pose[:-1])
+        angles = pteron.kinematics.singular_orientations(robot, pose[:-1])
         assert (np.diff(angles) > 0.0).all()
 
         def determinant(phi, pose=pose):
@@ -489,14 +493,18 @@ def test_singular_orientations_at_a_position(name):
 
 def test_singular_orientations_where_they_cannot_be():
     robot = CATALOG["par4"]
-    assert pteron.singular_orientations(robot, [0.0, 0.0, 9.0]).shape == (0,), "out of reach"
-    assert pteron.singular_orientations(CATALOG["delta"], [0.0, 0.0, -1.0]).shape == (0,)
-    both = pteron.singular_orientations(CATALOG["quadrupteron"], [0.1, 0.0, 0.0])
-    np.testing.assert_array_equal(both, pteron.singular_orientations(CATALOG["quadrupteron"]))
+    assert pteron.kinematics.singular_orientations(robot, [0.0, 0.0, 9.0]).shape == (0,), (
+        "out of reach"
+    )
+    assert pteron.kinematics.singular_orientations(CATALOG["delta"], [0.0, 0.0, -1.0]).shape == (0,)
+    both = pteron.kinematics.singular_orientations(CATALOG["quadrupteron"], [0.1, 0.0, 0.0])
+    np.testing.assert_array_equal(
+        both, pteron.kinematics.singular_orientations(CATALOG["quadrupteron"])
+    )
     with pytest.raises(DataError, match="position: shape"):
-        pteron.singular_orientations(robot, [0.0, 0.0, -0.4, 0.1])
+        pteron.kinematics.singular_orientations(robot, [0.0, 0.0, -0.4, 0.1])
     with pytest.raises(DataError, match="finite numbers expected"):
-        pteron.singular_orientations(robot, [0.0, np.nan, -0.4])
+        pteron.kinematics.singular_orientations(robot, [0.0, np.nan, -0.4])
     # Where the rods of a Delta lie in a plane it is singular, however its shaft is turned.
     *legs, shaft = CATALOG["delta-4"].legs
     short = tuple(replace(leg, lower_length=0.55) for leg in legs)
@@ -504,13 +512,13 @@ def test_singular_orientations_where_they_cannot_be():
     measure = pteron.compile(flat, "type_ii")
     z = brentq(lambda z: float(measure([0.0, 0.0, z, 0.0])), -0.4, 0.4, xtol=1e-16)
     with pytest.raises(SingularPose, match="in every orientation"):
-        pteron.singular_orientations(flat, [0.0, 0.0, z])
+        pteron.kinematics.singular_orientations(flat, [0.0, 0.0, z])
 
 
 @pytest.mark.parametrize("name", [n for n in MECHANISMS if n not in TURNING])
 def test_a_translating_platform_has_no_singular_orientation(name):
-    assert pteron.singular_orientations(MECHANISMS[name]).shape == (0,)
-    assert not pteron.is_singular_everywhere(MECHANISMS[name])
+    assert pteron.kinematics.singular_orientations(MECHANISMS[name]).shape == (0,)
+    assert not pteron.kinematics.is_singular_everywhere(MECHANISMS[name])
 
 
 def test_a_delta_whose_rods_lie_in_one_plane_is_singular():
@@ -523,7 +531,7 @@ def test_a_delta_whose_rods_lie_in_one_plane_is_singular():
         return float(pteron.compile(robot, "type_ii")([0.0, 0.0, z]))
 
     z = brentq(measure, -0.4, 0.4, xtol=1e-16)
-    lower = pteron.link_vectors(robot, [0.0, 0.0, z])[1]
+    lower = pteron.kinematics.link_vectors(robot, [0.0, 0.0, z])[1]
     np.testing.assert_allclose(lower[:, 2], 0.0, atol=1e-14)
     rest = np.zeros(3)
     with pytest.raises(SingularPose, match=r"^pose: singular \(type II; measure") as caught:
@@ -551,12 +559,12 @@ def fourfold(tilt):
 def test_a_layout_with_fourfold_symmetry_is_singular_everywhere():
     robot = fourfold(0.0)
     rest = np.zeros(4)
-    assert pteron.is_singular_everywhere(robot)
+    assert pteron.kinematics.is_singular_everywhere(robot)
     poses = np.random.default_rng(0).uniform(-1, 1, (20, 4))
     assert np.abs(np.linalg.det(pteron.jacobian(robot, poses))).max() < 1e-15
     assert pteron.inverse_kinematics(robot, rest).shape == (4,)
     calls = {
-        "orientations": lambda: pteron.singular_orientations(robot),
+        "orientations": lambda: pteron.kinematics.singular_orientations(robot),
         "forces": lambda: pteron.inverse_dynamics(robot, rest, rest, rest),
         "regressor": lambda: pteron.regressor(robot, rest, rest, rest),
         "direct": lambda: pteron.direct_kinematics(robot, rest),
@@ -574,14 +582,14 @@ def test_a_layout_with_fourfold_symmetry_is_singular_everywhere():
 @pytest.mark.parametrize("seed", range(3))
 def test_being_singular_everywhere_does_not_depend_on_the_frame(seed):
     rotation = Rotation.random(rng=seed).as_matrix()
-    assert pteron.is_singular_everywhere(pteron.turned(fourfold(0.0), rotation))
-    assert not pteron.is_singular_everywhere(pteron.turned(fourfold(1e-6), rotation))
+    assert pteron.kinematics.is_singular_everywhere(pteron.turned(fourfold(0.0), rotation))
+    assert not pteron.kinematics.is_singular_everywhere(pteron.turned(fourfold(1e-6), rotation))
 
 
 def test_the_symmetry_broken_is_singular_at_two_orientations():
     robot = fourfold(0.1)
-    assert not pteron.is_singular_everywhere(robot)
-    assert pteron.singular_orientations(robot).shape == (2,)
+    assert not pteron.kinematics.is_singular_everywhere(robot)
+    assert pteron.kinematics.singular_orientations(robot).shape == (2,)
     poses = pteron.random_poses(robot, 10, type_i=0.3, type_ii=0.01)
     motion = np.random.default_rng(0).normal(size=(2, 10, 4))
     assert np.isfinite(pteron.inverse_dynamics(robot, poses, *motion)).all()
@@ -591,7 +599,7 @@ def test_directions_in_one_plane_are_singular_everywhere():
     robot = CATALOG["tripteron"]
     d = (np.sqrt(0.5), np.sqrt(0.5), 0.0)
     flat = replace(robot, legs=(*robot.legs[:2], replace(robot.legs[2], direction=d)))
-    assert pteron.is_singular_everywhere(flat)
+    assert pteron.kinematics.is_singular_everywhere(flat)
     with pytest.raises(SingularPose, match="singular at every pose"):
         pteron.direct_kinematics(flat, np.zeros(3))
 

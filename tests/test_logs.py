@@ -297,9 +297,10 @@ def test_a_dead_channel_is_refused(tmp_path, column, rows):
         list(open_log(path, QUADRUPTERON).pieces(rows))
 
 
-def test_a_phase_that_is_neither_0_nor_1_is_refused(tmp_path):
-    given = columns(motion()) | {"payload": np.r_[np.zeros(400), np.full(100, 2.0)]}
-    with pytest.raises(DataError, match=r"row 401, column payload: 2 given; 0 .*or 1"):
+def test_a_second_mass_in_the_payloads_column_is_refused(tmp_path):
+    masses = np.repeat([0.0, 2.0, 3.0], [400, 50, 50])
+    given = columns(motion()) | {"payload": masses}
+    with pytest.raises(DataError, match=r"row 451, column payload: 3 given; 0 .*or one mass"):
         read_log(saved(tmp_path, given), QUADRUPTERON)
 
 

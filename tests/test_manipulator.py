@@ -13,7 +13,10 @@ from mechanisms import CATALOG, MECHANISMS, random_machine
 from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron import Leg, Manipulator, ModelError, OutputError, PlanarInertia, Platform
+from pteron import Manipulator, ModelError, OutputError
+from pteron.bodies import PlanarInertia
+from pteron.legs import Leg
+from pteron.platforms import Platform
 
 EVERY = pytest.mark.parametrize("name", MECHANISMS)
 BODY = PlanarInertia(1.0, (0.0, 0.0), 1.0)
@@ -656,10 +659,10 @@ def test_parameters_stand_in_the_papers_order(name):
     expected |= zip(("m_e", "mgx_e", "mgy_e", "I_e"), platform, strict=True)
     assert pteron.parameter_names(robot) == tuple(expected)
     assert pteron.parameters(robot).tolist() == list(expected.values())
-    listed = pteron.parameter_data(robot)
+    listed = pteron.manipulator.parameter_data(robot)
     assert tuple(p.name for p in listed) == tuple(expected)
     units = {"m": "kg", "mgx": "kg m", "mgy": "kg m", "I": "kg m^2"}
-    assert pteron.parameter_units(robot) == tuple(units[p.kind] for p in listed)
+    assert pteron.manipulator.parameter_units(robot) == tuple(units[p.kind] for p in listed)
     for p in listed:
         assert p.name == f"{p.kind}_{p.body}{p.suffix}"
         assert p.length_power == {"kg": 0, "kg m": 1, "kg m^2": 2}[p.unit]

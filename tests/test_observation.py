@@ -28,8 +28,8 @@ def model_of(name, terms=Terms()):  # noqa: B008
 def states_of(robot, count=60, payload=0):
     """Return random states as the equations see them."""
     pose, velocity, acceleration = states(robot, count)
-    rates = pteron.joint_rates(robot, pose, velocity)
-    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity)
+    accelerations = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     phases = np.full(count, payload)
     return States(
@@ -247,7 +247,7 @@ def test_slow_sliders_are_left_out_on_both_sides(derivatives):
         name, derivatives, processing=processing
     )
     pose, velocity, _ = motion(MECHANISMS[name], log.time)
-    rates = pteron.joint_rates(MECHANISMS[name], pose, velocity).actuated
+    rates = pteron.kinematics.joint_rates(MECHANISMS[name], pose, velocity).actuated
     stuck = np.abs(rates) < 0.95 * treatment.slow
     assert stuck.mean() > 0.03
     spoiled = replace(log, forces=log.forces + 50.0 * stuck)

@@ -67,8 +67,9 @@ def _written(folder, kind, name):
     if kind == "report":
         return write_report(MACHINES[name], folder / name)
     robot = CATALOG["delta"]
-    log = log_of(robot, duration=5.0, rate=300.0, joint_noise=2e-7, force_noise=0.05)
-    return write_identification(identify(robot, log), folder / "identified").page
+    noise = {} if name == "noise-free" else {"joint_noise": 2e-7, "force_noise": 0.05}
+    log = log_of(robot, duration=5.0, rate=300.0, **noise)
+    return write_identification(identify(robot, log), folder / f"identified-{name}").page
 
 
 @pytest.fixture
@@ -348,6 +349,60 @@ def test_a_page_is_as_broad_as_its_window_and_cuts_nothing_without_a_cue(
             "[...document.querySelectorAll('svg, canvas, table, p')].every((one) => "
             "one.closest('.scroll') || one.getBoundingClientRect().right <= innerWidth)"
         )
+
+
+OVERLAPS = """() => [...document.querySelectorAll("svg.plot")].flatMap((plot) => {
+    const boxes = [...plot.querySelectorAll("g[id*=axis_] text, g[id*=legend_] text")]
+        .filter((text) => text.textContent.trim())
+        .map((text) => [text.textContent, text.getBoundingClientRect()]);
+    const shared = (a, b, low, high) => Math.min(a[high], b[high]) - Math.max(a[low], b[low]);
+    return boxes.flatMap(([one, a], i) => boxes.slice(0, i)
+        .filter(([, b]) => shared(a, b, "left", "right") > 1 && shared(a, b, "top", "bottom") > 2)
+        .map(([other]) => [plot.getAttribute("aria-label"), one, other]));
+})"""
+"""Pairs of a picture's labels that lie on each other."""
+
+LETTERS = """() => Math.min(...[...document.querySelectorAll("figure svg.plot")].flatMap((plot) => {
+    const scale = plot.getBoundingClientRect().width / plot.viewBox.baseVal.width;
+    const texts = [...plot.querySelectorAll("g[id*=axes_] g[id*=axis_] text")];
+    return plot.closest(".scroll, .still") || !scale ? []
+        : texts.map((text) => scale * parseFloat(getComputedStyle(text).fontSize));
+}))"""
+"""Size of the smallest letters of scales, pixels."""
+
+FAINT = """() => {
+    const rgb = (color) => color.match(/[\\d.]+/g).slice(0, 3).map(Number);
+    const light = (color) => rgb(color).map((c) => c / 255)
+        .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4))
+        .reduce((sum, c, i) => sum + [0.2126, 0.7152, 0.0722][i] * c, 0);
+    const paper = light(getComputedStyle(document.body).backgroundColor);
+    const texts = "g[id*=axis_] text, g[id*=legend_] text, p, td, th, caption, figcaption, dt";
+    return [...document.querySelectorAll(texts)]
+        .filter((one) => one.textContent.trim())
+        .map((one) => getComputedStyle(one)[one.closest("svg") ? "fill" : "color"])
+        .filter((color) => color.startsWith("rgb"))
+        .filter((color) => {
+            const [low, high] = [light(color), paper].sort((a, b) => a - b);
+            return (high + 0.05) / (low + 0.05) < 4.5;
+        });
+}"""
+"""Colours of texts that are too near to the page's."""
+
+
+@CLIENTS
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("kind", "name"), [("identification", "noise-free"), ("report", "driven"), ("motion", "par4")]
+)
+def test_letters_of_pictures_can_be_read(browser, page_of, kind, name, scheme):
+    for width in (390, 1440):
+        with opened(browser, page_of(kind, name), width, color_scheme=scheme) as page:
+            assert page.evaluate("document.documentElement.scrollWidth") == width
+            assert page.evaluate(OVERLAPS) == []
+            assert page.evaluate(LETTERS) > 9.0
+            assert page.evaluate(FAINT) == []
+            names = "[...document.querySelectorAll('.scroll')].every((b) => b.ariaLabel)"
+            assert page.evaluate(names), "what scrolls has a name"
 
 
 def shades(box):

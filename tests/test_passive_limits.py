@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import pteron
-from pteron import Cone, ModelError
+from pteron import ModelError
 from pteron.cli.main import app
 from pteron.kernels import numeric
+from pteron.legs import Cone
 from pteron.motion import pick_and_place
 from pteron.workspace import (
     BEYOND_LIMITS,
@@ -43,13 +44,17 @@ def angle(a, b):
 
 
 def elbows(robot, pose):
-    return {"elbow": [angle(u, v) for u, v in zip(*pteron.link_vectors(robot, pose), strict=True)]}
+    return {
+        "elbow": [
+            angle(u, v) for u, v in zip(*pteron.kinematics.link_vectors(robot, pose), strict=True)
+        ]
+    }
 
 
 def link_angles(robot, pose):
     """The link of a P-R-R leg against its guide, by the right hand about the plane's normal."""
     found = []
-    for leg, link in zip(robot.legs, pteron.link_vectors(robot, pose)[1], strict=True):
+    for leg, link in zip(robot.legs, pteron.kinematics.link_vectors(robot, pose)[1], strict=True):
         ahead = leg.elbow * np.array(leg.slider_direction)
         sine = np.cross(ahead, link) @ np.array(leg.direction) / leg.lower_length
         found.append(np.arcsin(sine))
@@ -59,7 +64,7 @@ def link_angles(robot, pose):
 def crank_cones(robot, pose):
     """At the crank's end in the crank's frame, at the platform in the platform's frame at rest."""
     tips, ends = [], []
-    for leg, u, rod in zip(robot.legs, *pteron.link_vectors(robot, pose), strict=True):
+    for leg, u, rod in zip(robot.legs, *pteron.kinematics.link_vectors(robot, pose), strict=True):
         x, z = u / np.linalg.norm(u), np.array(leg.direction)
         frame = np.column_stack([x, np.cross(z, x), z])
         tips.append(angle(frame @ leg.tip_cone.axis, rod))
@@ -69,14 +74,14 @@ def crank_cones(robot, pose):
 
 def slider_cones(robot, pose):
     tips, ends = [], []
-    for leg, rod in zip(robot.legs, pteron.link_vectors(robot, pose)[1], strict=True):
+    for leg, rod in zip(robot.legs, pteron.kinematics.link_vectors(robot, pose)[1], strict=True):
         tips.append(angle(np.array(leg.tip_cone.axis), rod))
         ends.append(angle(np.array(robot.platform.frame).T @ leg.platform_cone.axis, -rod))
     return {"rod at its tip": tips, "rod at the platform": ends}
 
 
 def shafts(robot, pose):
-    return {"shaft": [np.linalg.norm(pteron.link_vectors(robot, pose)[1][3])]}
+    return {"shaft": [np.linalg.norm(pteron.kinematics.link_vectors(robot, pose)[1][3])]}
 
 
 CONES = {"tip_cone": Cone(TILTED, 3.0), "platform_cone": Cone(TILTED, 3.1)}
@@ -139,7 +144,7 @@ def test_the_socket_of_a_single_rod_turns_with_the_platform():
         leg = replace(still, rods=rods, platform_cone=cone)
         machine = replace(robot, legs=(leg, *robot.legs[1:]))
         values[rods] = passive(machine, pose)["rod at the platform"][0]
-        rod = pteron.link_vectors(machine, pose)[1][0]
+        rod = pteron.kinematics.link_vectors(machine, pose)[1][0]
         turn = Rotation.from_rotvec(0.4 * Z) if rods == 1 else Rotation.identity()
         assert values[rods] == pytest.approx(angle(turn.apply(cone.axis), -rod), abs=1e-9)
     assert abs(values[1] - values[2]) > 0.01

@@ -10,13 +10,15 @@ from mechanisms import NIGHTLY
 
 import pteron
 from pteron.bodies.inertia import SpatialInertia
+from pteron.controllers import CONTROLLERS
 from pteron.errors import DataError
 from pteron.identification.estimators import huber
-from pteron.identification.logs import Log
+from pteron.identification.logs import Log, read_log
 from pteron.identification.logs.description import Description
 from pteron.identification.model import Terms
 from pteron.identification.payload import identify_payload
 from pteron.identification.signals import Processing
+from pteron.motion import pick_and_place, simulate
 from pteron.workspace import home_pose
 
 SOME = ("ball-table",)
@@ -33,7 +35,7 @@ EACH = pytest.mark.parametrize(
     ],
 )
 
-LOAD = pteron.PlanarInertia(0.35, (0.006, -0.009), 0.0011)
+LOAD = pteron.bodies.PlanarInertia(0.35, (0.006, -0.009), 0.0011)
 SOLID = SpatialInertia(
     0.15, (0.002, -0.003, 0.004), (0.0009, 0.0001, 0.00005, 0.0012, -0.0001, 0.0011)
 )
@@ -83,12 +85,12 @@ def clean(name, seed, load):
     time, q = motion(name, seed)
     phase = (np.arange(len(time)) >= len(time) // 2).astype(int)
     empty, full = (pteron.inverse_dynamics(r, *q) for r in (robot, laden(robot, load)))
-    rates = pteron.joint_rates(robot, q[0], q[1]).actuated
+    rates = pteron.kinematics.joint_rates(robot, q[0], q[1]).actuated
     legs = np.arange(len(robot.legs))
     forces = np.where(phase[:, None] == 1, full, empty)
     forces += 2.0 * (1.0 + 0.1 * legs) * np.sign(rates) + (1.0 + 0.2 * legs) * rates + 0.3 * legs
     sliders = pteron.inverse_kinematics(robot, q[0])
-    mode = 1 + int(pteron.assembly_mode(robot, q[0, 0]))
+    mode = 1 + int(pteron.kinematics.assembly_mode(robot, q[0, 0]))
     return time, sliders, forces, phase, mode
 
 
@@ -248,7 +250,7 @@ def test_values_of_no_real_body_are_told():
 
 @pytest.mark.parametrize("name", ["quadrupteron"])
 def test_a_payload_that_was_not_there_is_not_felt(name):
-    nothing = pteron.PlanarInertia(1e-9, (0.0, 0.0), 1e-12)
+    nothing = pteron.bodies.PlanarInertia(1e-9, (0.0, 0.0), 1e-12)
     log = make_log(name, load=nothing, noise=NOISE)
     found = identify_payload(machine(name), *halves(log), base=base_of(name))
     assert not found.felt
@@ -305,3 +307,21 @@ def test_logs_that_do_not_show_a_payload_are_refused(change, message):
     with pytest.raises(DataError, match=message) as caught:
         identify_payload(machine("tripteron"), *logs, base=base_of("tripteron"))
     assert "\n" not in str(caught.value)
+
+
+def test_a_log_of_a_simulation_says_when_a_payload_is_carried(tmp_path):
+    robot = pteron.load("five-bar")
+    cycle = pick_and_place(robot, scale=0.2, duration=0.2, samples=41)
+    control = CONTROLLERS["computed_torque"]
+    found = simulate(robot, cycle, control, payload=[(0.0, 0.0), (0.1, 0.5)], step=5e-3)
+    path = tmp_path / "simulated.csv"
+    found.table().write_csv(path)
+    log = read_log(path, robot)
+    assert log.payload.tolist() == (found.payload > 0.0).astype(int).tolist()
+    assert set(log.payload) == {0, 1}
+    assert log.payload_mass == 0.5
+    table = found.table()
+    heavier = table.with_columns(payload=table["payload"].to_numpy() + 0.25)
+    heavier.write_csv(path)
+    with pytest.raises(DataError, match="or one mass in kg; give each payload its own log"):
+        read_log(path, robot)

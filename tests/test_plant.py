@@ -64,7 +64,9 @@ def test_its_forces_are_those_of_the_model(name, duration):
     assert np.abs(poses - recording.poses).max() < 1e-6
     jacobian = pteron.jacobian(built, poses)
     velocity = np.linalg.solve(jacobian, recording.rates[..., None])[..., 0]
-    drift = pteron.joint_accelerations(built, poses, velocity, np.zeros_like(poses)).actuated
+    drift = pteron.kinematics.joint_accelerations(
+        built, poses, velocity, np.zeros_like(poses)
+    ).actuated
     acceleration = np.linalg.solve(jacobian, (recording.accelerations - drift)[..., None])[..., 0]
     forces = pteron.inverse_dynamics(built, poses, velocity, acceleration)
     rates = recording.rates

@@ -1,5 +1,6 @@
 """Pictures: they show the numbers they are given, and their SVG is the same on every run."""
 
+import itertools
 import re
 import subprocess
 import sys
@@ -492,7 +493,7 @@ def test_singularities_are_drawn_where_the_determinant_is_zero():
     inked = [c for c in axes.collections if len(c.get_edgecolor())]
     (red,) = [c for c in inked if np.allclose(c.get_edgecolor(), to_rgba("#b3261e"))]
     drawn = np.vstack([path.vertices for path in red.get_paths()])
-    expected = np.degrees(pteron.singular_orientations(robot))
+    expected = np.degrees(pteron.kinematics.singular_orientations(robot))
     near = np.abs(drawn[:, 1, None] - expected).min(axis=1)
     assert near.max() < 0.1
     assert set(np.abs(drawn[:, 1, None] - expected).argmin(axis=1)) == {0, 1}
@@ -591,3 +592,34 @@ def test_letters_that_no_font_has_are_told_once(tmp_path, width):
         assert len(str(told[0].message)) < 260
     save_figure(titled(letters), tmp_path / "a.svg", width=width)
     assert letters in (tmp_path / "a.svg").read_text()
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1e-12, "(10⁻¹² N)"), (1.0, "(N)"), (1e9, "(10⁹ N)")])
+def test_a_scale_has_short_numbers_and_curves_that_coincide_are_told(scale, unit):
+    t = np.linspace(0.0, 1.0, 20)
+    figure = pteron.plots.forces_figure(t, scale * np.stack([np.sin(t), np.cos(t), np.cos(t)], 1))
+    text = pteron.plots.svg(figure, name="f", title="Forces")
+    assert f"actuator force {unit}" in text
+    assert "leg 3 (on 2)" in text
+    lines = [line for line in figure.axes[0].lines if line.get_label().startswith("leg")]
+    assert lines[1].get_linestyle() == lines[2].get_linestyle() == "--"
+
+
+@pytest.mark.parametrize("values", [[1e-10, 3e-10], [2.0, 3.0], [10.0, 1e6], [0.0, np.nan]])
+def test_numbers_of_a_logarithmic_scale_stand_apart(values):
+    errors = np.array(values)
+    figure = pteron.plots.errors_figure(errors, np.array([80.0, 90.0]), errors / 10.0)
+    pteron.plots.svg(figure, name="e", title="Errors")
+    figure.draw_without_rendering()
+    labels = figure.axes[0].get_xticklabels()
+    boxes = [label.get_window_extent() for label in labels if label.get_text()]
+    assert all(one.x1 < other.x0 for one, other in itertools.pairwise(boxes))
+
+
+@pytest.mark.parametrize("power", [1000.0 + 1e-9 * np.eye(4, 3), np.full((4, 3), np.nan)])
+def test_what_is_constant_or_not_known_is_drawn(power):
+    for rows in (4, 1):
+        figure = pteron.plots.power_figure(np.arange(float(rows)), power[:rows])
+        pteron.plots.svg(figure, name="p", title="Power")
+        low, high = figure.axes[0].get_ylim()
+        assert high - low > 0.01

@@ -31,7 +31,7 @@ def drawn(request):
 
 def test_positions_and_rotations_are_poses_and_back(drawn):
     robot, poses, _ = drawn
-    position = pteron.position_of(robot, poses)
+    position = pteron.kinematics.position_of(robot, poses)
     matrix = pteron.rotation_of(robot, poses)
     np.testing.assert_allclose(np.linalg.det(matrix), 1.0, atol=1e-13)
     turned = Rotation.from_matrix(matrix)
@@ -60,14 +60,17 @@ def test_twists_are_velocities_and_back(drawn):
     step = 1e-6
     ends = [poses + side * step * velocities for side in (1.0, -1.0)]
     (p1, p0), (r1, r0) = (
-        [part(robot, end) for end in ends] for part in (pteron.position_of, pteron.rotation_of)
+        [part(robot, end) for end in ends]
+        for part in (pteron.kinematics.position_of, pteron.rotation_of)
     )
     turned = Rotation.from_matrix(r1 @ np.swapaxes(r0, -1, -2)).as_rotvec()
     np.testing.assert_allclose(found[:, :3], (p1 - p0) / (2 * step), atol=1e-8)
     np.testing.assert_allclose(found[:, 3:], turned / (2 * step), atol=1e-8)
-    np.testing.assert_allclose(pteron.velocity_of(robot, poses, found), velocities, atol=1e-11)
+    np.testing.assert_allclose(
+        pteron.kinematics.velocity_of(robot, poses, found), velocities, atol=1e-11
+    )
     near = pteron.random_poses(robot, 3) if not robot.platform.tilts else poses[:3]
-    rows = pteron.twist_jacobian(robot, near, on_failure="nan")
+    rows = pteron.kinematics.twist_jacobian(robot, near, on_failure="nan")
     rates = np.einsum("bij,bj->bi", rows, pteron.twist(robot, near, velocities[:3]))
     expected = pteron.jacobian(robot, near, on_failure="nan") @ velocities[:3, :, None]
     np.testing.assert_allclose(rates, expected[..., 0], atol=1e-11)
@@ -79,7 +82,7 @@ def test_what_a_motion_cannot_have_is_refused_with_by_how_much():
     with pytest.raises(DataError, match=r"3R platform cannot have them: 0\.01 m from"):
         pteron.pose_of(wrist, at + np.array([0.0, 0.006, 0.008]), level)
     with pytest.raises(DataError, match=r"cannot move so at this pose: 0\.5 m/s are"):
-        pteron.velocity_of(wrist, [0.1, 0.2, 0.3], [0.0, 0.3, 0.4, 1.0, 2.0, 3.0])
+        pteron.kinematics.velocity_of(wrist, [0.1, 0.2, 0.3], [0.0, 0.3, 0.4, 1.0, 2.0, 3.0])
     turned = Rotation.from_rotvec([0.0, 0.2, 0.0]).as_matrix()
     with pytest.raises(DataError, match=r"3T platform cannot have them: 0\.2 rad"):
         pteron.pose_of("tripteron", [0.0, 0.0, 0.0], turned)
@@ -91,7 +94,7 @@ def test_what_a_motion_cannot_have_is_refused_with_by_how_much():
     ):
         pteron.pose_of(table, [0.0, 0.01, 0.12], np.eye(3))
     with pytest.raises(DataError, match=r"1T2R platform cannot move so .*: 0\.3 m/s are"):
-        pteron.velocity_of(table, [0.12, 0.0, 0.0], [0.3, 0.0, 0.1, 0.0, 0.0, 0.0])
+        pteron.kinematics.velocity_of(table, [0.12, 0.0, 0.0], [0.3, 0.0, 0.1, 0.0, 0.0, 0.0])
     with pytest.raises(DataError, match=r"2R platform cannot have them: 0\.3 rad from"):
         pteron.pose_of(ankle, [0.0, 0.0, 0.0], [0.0, 0.0, 0.3], form="tilt-torsion")
     found = pteron.pose_of(wrist, [at, at + 1.0], level, on_failure="nan")
@@ -107,7 +110,7 @@ def test_singular_angles_are_not_the_machines():
     np.testing.assert_allclose(found, [0.0, np.pi / 2, 0.1], atol=1e-12)
     assert np.isfinite(pteron.inverse_dynamics(robot, pose, 0 * pose, 0 * pose)).all()
     for call in (
-        lambda: pteron.velocity_of(robot, pose, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        lambda: pteron.kinematics.velocity_of(robot, pose, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
         lambda: pteron.forward_dynamics(robot, pose, 0 * pose, 0 * pose),
     ):
         with pytest.raises(SingularPose, match="angles are singular where pitch is") as caught:

@@ -26,7 +26,7 @@ PACKAGES = [pteron.__name__] + [
 PUBLIC = [
     "pteron",
     *(f"pteron.{name}" for name in pteron.__all__ if inspect.ismodule(getattr(pteron, name))),
-    *("pteron.dynamics", "pteron.kinematics", "pteron.manipulator", "pteron.reduction"),
+    "pteron.dynamics",
 ]
 
 
@@ -150,7 +150,7 @@ class Balance(HTMLParser):
 def values():
     """Return values of every kind that a notebook shows, by name."""
     driven = pteron.load("delta")
-    drive = pteron.Drive(coulomb=1.0, max_force=40.0, max_speed=10.0)
+    drive = pteron.legs.Drive(coulomb=1.0, max_force=40.0, max_speed=10.0)
     legs = (*(replace(leg, drive=drive) for leg in driven.legs[:2]), driven.legs[2])
     motion = pteron.motion.pick_and_place("delta", [0.0, 0.0, -0.8], samples=21)
     run = pteron.motion.simulate("delta", motion, ComputedTorque(), duration=0.01)

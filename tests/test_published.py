@@ -41,7 +41,7 @@ def test_router_at_home():
     robot = pteron.load("tripteron-router")
     home = np.zeros(3)
     np.testing.assert_allclose(pteron.inverse_kinematics(robot, home), 0.1, rtol=1e-15)
-    upper, lower = pteron.link_vectors(robot, home)
+    upper, lower = pteron.kinematics.link_vectors(robot, home)
     elbows = np.array([[0, 0, 1], [0, 0, 1], [0, 1, 0]])
     np.testing.assert_allclose(upper + lower, 0.24 * np.eye(3)[[1, 0, 0]], atol=1e-15)
     assert (np.sum(upper * elbows, axis=-1) > 0.2).all()
@@ -55,7 +55,7 @@ def test_router_s_links_are_where_it_printed_them():
     along, towards = np.eye(3)[[1, 0, 0]], np.eye(3)[[2, 2, 1]]
     upper, lower = (
         np.degrees(np.arctan2(np.sum(link * towards, axis=-1), np.sum(link * along, axis=-1)))
-        for link in pteron.link_vectors(robot, pose)
+        for link in pteron.kinematics.link_vectors(robot, pose)
     )
     printed = [65.37568164783592, 59.99999999999999, 50.08032532232782]
     np.testing.assert_allclose(upper, printed, rtol=1e-13)
@@ -93,19 +93,23 @@ def delta(base, platform, crank, rod):
     for azimuth in (-90, 30, 150):
         out = outwards(azimuth)
         legs.append(
-            pteron.RSS(
+            pteron.legs.RSS(
                 guide_point=base * out,
                 direction=np.cross([0, 0, 1], out),
                 zero_direction=out,
                 platform_point=platform * out,
                 upper_length=crank,
                 lower_length=rod,
-                upper=pteron.PlanarInertia.of_body(0.1, (crank / 2, 0.0), 0.1 * crank**2 / 3),
-                lower=pteron.RodInertia.of_body(0.1, (-rod / 2,), 0.1 * rod**2 / 3),
+                upper=pteron.bodies.PlanarInertia.of_body(
+                    0.1, (crank / 2, 0.0), 0.1 * crank**2 / 3
+                ),
+                lower=pteron.bodies.RodInertia.of_body(0.1, (-rod / 2,), 0.1 * rod**2 / 3),
                 elbow=-1,
             )
         )
-    platform = pteron.Platform("3T", pteron.PlanarInertia.of_body(0.1, (0.0, 0.0), 1e-4))
+    platform = pteron.platforms.Platform(
+        "3T", pteron.bodies.PlanarInertia.of_body(0.1, (0.0, 0.0), 1e-4)
+    )
     return pteron.Manipulator("delta", platform, tuple(legs))
 
 
@@ -280,7 +284,7 @@ def test_the_3prr_s_home():
     home = np.zeros(3)
     joints = pteron.inverse_kinematics(robot, home)
     np.testing.assert_allclose(joints, np.sqrt(3) * 0.1, rtol=1e-14)
-    _, lower = pteron.link_vectors(robot, home)
+    _, lower = pteron.kinematics.link_vectors(robot, home)
     along = [leg.slider_direction for leg in robot.legs]
     np.testing.assert_allclose(np.sum(lower * along, axis=-1), 0.2 * np.cos(np.pi / 6), rtol=1e-14)
 

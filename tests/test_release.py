@@ -19,7 +19,6 @@ RECIPE = yaml.safe_load((ROOT / "recipe" / "recipe.yaml").read_text("utf-8"))
     [
         ("CITATION.cff", r"(?m)^version: (.*)$"),
         ("recipe/recipe.yaml", r'(?m)^  version: "(.*)"$'),
-        ("README.md", r"pteron-(.*)-py3-none-any\.whl"),
         ("docs/start/install.md", r"pteron-(.*)-py3-none-any\.whl"),
         ("CHANGELOG.md", r"(?m)^## \[(\d.*?)\]"),
     ],

@@ -33,7 +33,7 @@ HOSTILE = '</script><b onload="x">&\'{{ 7 * 6 }}'
 def doubtful(robot):
     """Return the machine with a centre of mass beyond the platform joint."""
     leg = robot.legs[0]
-    lower = pteron.PlanarInertia.of_body(leg.lower.mass, (0.09, 0.0), leg.lower.inertia)
+    lower = pteron.bodies.PlanarInertia.of_body(leg.lower.mass, (0.09, 0.0), leg.lower.inertia)
     return replace(robot, legs=(replace(leg, lower=lower), *robot.legs[1:]))
 
 
@@ -47,8 +47,8 @@ def with_a_tool(robot):
 
 def driven(robot):
     """Return the machine with drives, of which the first has neither limits nor a ratio."""
-    motor = pteron.Drive(3.0, 12.0, 0.1, 3e-5, 392.7, max_force=40.0, max_speed=9.0)
-    drives = (pteron.Drive(2.0), *(motor for _ in robot.legs[1:]))
+    motor = pteron.legs.Drive(3.0, 12.0, 0.1, 3e-5, 392.7, max_force=40.0, max_speed=9.0)
+    drives = (pteron.legs.Drive(2.0), *(motor for _ in robot.legs[1:]))
     legs = zip(robot.legs, drives, strict=True)
     return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in legs))
 
@@ -282,7 +282,7 @@ def test_the_numbers_are_the_librarys(name):
     np.testing.assert_allclose(data["base_parameters"]["values"], base.values())
     assert data["reach"]["unit"] == ("m^2" if robot.platform.planar else "m^3")
     if name in ("quadrupteron", "planar"):
-        singular = pteron.singular_orientations(robot, home["pose"][:-1])
+        singular = pteron.kinematics.singular_orientations(robot, home["pose"][:-1])
         assert len(singular) == 2
         np.testing.assert_allclose(data["singular_orientations"], singular)
     else:

@@ -17,8 +17,9 @@ from pteron import Manipulator, OutputError
 from pteron.legs import KINDS
 from pteron.manipulator import with_dimensions
 from pteron.manipulator.explained import explained
+from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.saving import document_of
-from pteron.manipulator.tables import PlatformTable, leg_table
+from pteron.manipulator.tables import PlatformTable
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGE = (DOCS / "robot-file.md").read_text(encoding="utf-8")

@@ -11,6 +11,7 @@ from jaxtyping import install_import_hook
 packages = ("kinematics", "dynamics", "motion", "workspace", "reduction.reduced")
 with install_import_hook([f"pteron.{name}" for name in packages], "beartype.beartype"):
     import pteron
+    from pteron.kinematics import joint_accelerations, joint_screws, link_jacobians, link_vectors
     from pteron.motion import joint_points, pick_and_place
     from pteron.workspace import pose_margins
 
@@ -23,18 +24,18 @@ for name, middle in (("quadrupteron", [0, 0, 0, 0]), ("delta", [0, 0, -0.8])):
         q = pteron.inverse_kinematics(robot, x)
         pteron.direct_kinematics(robot, q)
         for f in (
-            *(pteron.jacobian, pteron.link_vectors, pteron.link_jacobians, pteron.joint_screws),
+            *(pteron.jacobian, link_vectors, link_jacobians, joint_screws),
             *(pteron.mass_matrix, pteron.gravity_forces, pteron.potential_energy),
             *(pose_margins, joint_points),
         ):
             f(robot, x)
         for f in (
-            *(pteron.joint_rates, pteron.coriolis_matrix, pteron.bias_forces),
+            *(pteron.kinematics.joint_rates, pteron.coriolis_matrix, pteron.bias_forces),
             pteron.kinetic_energy,
         ):
             f(robot, x, v)
         for f in (
-            *(pteron.joint_accelerations, pteron.inverse_dynamics, pteron.forward_dynamics),
+            *(joint_accelerations, pteron.inverse_dynamics, pteron.forward_dynamics),
             pteron.regressor,
         ):
             f(robot, x, v, v)

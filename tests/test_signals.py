@@ -354,8 +354,8 @@ each_kind = pytest.mark.parametrize(
 def test_states_are_those_of_the_motion(name):
     robot = MECHANISMS[name]
     pose, velocity, acceleration = motion(robot, np.linspace(0.0, 4.0, 200))
-    rates = pteron.joint_rates(robot, pose, velocity)
-    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity)
+    accelerations = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     log = Log("log.csv", np.arange(200.0), sliders, sliders)
     found = States.of_joints(
@@ -382,7 +382,7 @@ def in_mode(robot, mode):
 
 def mode_of_log(robot, log):
     """Return the assembly mode, from 0, that a log is taken to be in."""
-    return pteron.assembly_mode(robot, start_pose(robot, log))
+    return pteron.kinematics.assembly_mode(robot, start_pose(robot, log))
 
 
 @pytest.mark.parametrize("name", ["random 3T1R 1"])
@@ -496,8 +496,8 @@ def test_a_wrong_mode_is_told_from_a_wrong_machine():
 def test_a_singular_sample_is_named():
     robot = CATALOG["tripteron"]
     pose, velocity, acceleration = states(robot, 30)
-    rates = pteron.joint_rates(robot, pose, velocity)
-    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity)
+    accelerations = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     motion_of = [sliders, rates.actuated, accelerations.actuated]
     _, margin, _ = unchecked(robot, "reach", pose[17:18])
@@ -593,7 +593,9 @@ def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
     robot = CATALOG["quadrupteron"]
     log = log_of(robot)
     pose, velocity, _ = motion(robot, log.time)
-    usual = np.sqrt((pteron.joint_rates(robot, pose, velocity).actuated ** 2).mean(axis=0))
+    usual = np.sqrt(
+        (pteron.kinematics.joint_rates(robot, pose, velocity).actuated ** 2).mean(axis=0)
+    )
     for share in (0.0, 0.02, 0.3):
         slow = preprocessing_of(robot, log, Processing(slow=share)).slow
         assert slow == pytest.approx(share * usual, rel=0.01, abs=1e-15)

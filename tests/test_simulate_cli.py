@@ -22,7 +22,7 @@ def run(*arguments, code=0):
 def weak(tmp_path):
     """Return the file of a Tripteron whose drives are hardly stronger than they must be."""
     robot = pteron.load("tripteron")
-    drive = pteron.Drive(coulomb=1.0, viscous=2.0, max_force=36.0, rest_speed=0.01)
+    drive = pteron.legs.Drive(coulomb=1.0, viscous=2.0, max_force=36.0, rest_speed=1e-4)
     legs = tuple(replace(leg, drive=drive) for leg in robot.legs)
     path = tmp_path / "weak.toml"
     pteron.save(replace(robot, legs=legs), path)
@@ -89,7 +89,7 @@ def test_units_of_a_cycle_and_a_payload_are_doubted(tmp_path):
     refused = run("quadrupteron", "--cycle", path, code=2)
     assert f"; {path}: phi up to 10.0977: are these degrees? rad are expected" in refused.stderr
     heavy = run("tripteron", "--payload", 500, "--delay", "-1", code=2)
-    assert "Warning: a payload of 500 kg" in heavy.stderr
+    assert "Note: a payload of 500 kg" in heavy.stderr
 
 
 def test_a_table_on_a_narrow_screen_keeps_its_numbers(monkeypatch):

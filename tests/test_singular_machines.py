@@ -39,7 +39,7 @@ def test_the_published_example_is_refused_with_the_reason():
     """A P-R-R-R leg whose joint moves nothing in the plane of a planar machine."""
     robot = CATALOG["3-prr"]
     old = robot.legs[2]
-    leg = pteron.PRRR(
+    leg = pteron.legs.PRRR(
         guide_point=old.guide_point,
         direction=robot.platform.axis,
         platform_point=old.platform_point,
@@ -73,7 +73,7 @@ def test_a_layout_that_no_pose_reaches_is_not_told_regular():
     robot = CATALOG["delta"]
     far = replace(robot.legs[0], guide_point=(50.0, 0.0, 0.0))
     with pytest.raises(pteron.ModelError, match="no pose was found that all legs reach"):
-        pteron.architecture(replace(robot, legs=(far, *robot.legs[1:])))
+        pteron.kinematics.architecture(replace(robot, legs=(far, *robot.legs[1:])))
 
 
 def test_no_box_with_a_rod_across_the_plane_is_proved():

@@ -32,18 +32,18 @@ def fourfold(direction, point):
 
 def test_fourfold_symmetry_is_refused_with_the_reason():
     robot = fourfold(np.array([0.0, 0.6, 0.8]), np.array([0.05, 0.0, 0.0]))
-    found = pteron.architecture(robot)
+    found = pteron.kinematics.architecture(robot)
     assert found.singular
     assert found.proof == "exact arithmetic"
     assert "fourfold symmetry" in found.reason
     with pytest.raises(pteron.SingularPose, match="the layout has fourfold symmetry"):
         pteron.inverse_dynamics(robot, *np.zeros((3, 4)))
     rng = np.random.default_rng(0)
-    found = pteron.architecture(fourfold(unit(rng), rng.uniform(-0.06, 0.06, 3)))
+    found = pteron.kinematics.architecture(fourfold(unit(rng), rng.uniform(-0.06, 0.06, 3)))
     assert (found.singular, found.proof) == (True, "closed form")
     assert "fourfold symmetry" in found.reason
     bent = replace(robot.legs[0], platform_point=(0.0501, 0.0, 0.0))
-    found = pteron.architecture(replace(robot, legs=(bent, *robot.legs[1:])))
+    found = pteron.kinematics.architecture(replace(robot, legs=(bent, *robot.legs[1:])))
     assert (found.singular, found.reason, found.proof) == (False, "", "one pose")
 
 
@@ -83,7 +83,7 @@ POINTS = np.array([[0.04, 0.0, 0.0], [0.0, 0.05, 0.0], [-0.04, 0.01, 0.0], [0.0,
     ids=["plane", "points", "legs", "planar"],
 )
 def test_other_layouts_are_refused_with_the_reason(robot, reason, proof):
-    found = pteron.architecture(robot)
+    found = pteron.kinematics.architecture(robot)
     assert found.singular
     assert found.proof == proof
     assert found.type_ii < 1e-10
@@ -108,7 +108,7 @@ def test_singular_orientations_are_the_roots_of_det_j_for_1000_layouts():
     one = np.arctan2(b, a) + 0.5 * np.pi
     found = np.sort(np.pi - (np.pi - np.array([one, one - np.pi])) % (2.0 * np.pi), axis=0).T
     for k in range(0, 1000, 100):
-        angles = pteron.singular_orientations(layout(d[k], s[k]))
+        angles = pteron.kinematics.singular_orientations(layout(d[k], s[k]))
         np.testing.assert_allclose(angles, found[k], atol=1e-9)
 
     def determinant(phi):
@@ -153,7 +153,9 @@ def test_the_single_rods_hold_what_type_ii_and_constraint_measures_say(name):
     """With joints held the rods' wrenches vanish where either does, and are their product."""
     robot = CATALOG[name]
     poses = pteron.random_poses(robot, 8, seed=2, type_ii=0.02)
-    product = numeric(robot, "type_ii")(poses)[0] * pteron.constraint_measure(robot, poses)
+    product = numeric(robot, "type_ii")(poses)[0] * pteron.kinematics.constraint_measure(
+        robot, poses
+    )
     rods = [rods_determinant(robot, pose) for pose in poses]
     share = np.array(rods) / product
     np.testing.assert_allclose(share, share[0], rtol=1e-9)
@@ -162,13 +164,15 @@ def test_the_single_rods_hold_what_type_ii_and_constraint_measures_say(name):
 def test_constraints_of_revolute_joints_are_the_layouts():
     for name in ("tripteron-oblique", "quadrupteron-oblique"):
         robot = CATALOG[name]
-        found = pteron.constraint_measure(robot, pteron.random_poses(robot, 5))
+        found = pteron.kinematics.constraint_measure(robot, pteron.random_poses(robot, 5))
         assert np.ptp(found) < 1e-14
         assert found[0] > 0.5
     random = random_machine(0, "PRSS")
-    assert pteron.architecture(random).holds is None, "bars that are not told"
+    assert pteron.kinematics.architecture(random).holds is None, "bars that are not told"
     loose = random_machine(0, "RRRR")
-    assert pteron.architecture(loose).holds is False, "bars that turn on hinges of their own"
+    assert pteron.kinematics.architecture(loose).holds is False, (
+        "bars that turn on hinges of their own"
+    )
 
 
 @pytest.mark.parametrize(
@@ -330,7 +334,7 @@ def test_the_estimate_of_a_turn_is_about_the_axis_that_leads_there_soonest():
     pose = np.array([0.1, -0.2, 0.3])
     measure, step = numeric(robot, "type_ii"), 1e-6
     turns = Rotation.from_rotvec(step * np.vstack([np.eye(3), -np.eye(3)])).as_matrix()
-    at, axes = pteron.position_of(robot, pose), pteron.rotation_of(robot, pose)
+    at, axes = pteron.kinematics.position_of(robot, pose), pteron.rotation_of(robot, pose)
     ahead, behind = np.split(measure(pteron.pose_of(robot, at, turns @ axes))[0], 2)
     slope = np.linalg.norm(ahead - behind) / (2.0 * step)
     size = abs(measure(pose)[0])
@@ -353,14 +357,14 @@ def test_distances_in_closed_form_are_met():
     pose = pteron.random_poses(three, 3, seed=3, type_ii=0.05)[2]
     turns = [one for one in nearest_singularities(three, pose) if one.by == "rotation"]
     (turn,) = [one for one in turns if one.kind == "II"]
-    angles = pteron.singular_orientations(three, pose[:2])
+    angles = pteron.kinematics.singular_orientations(three, pose[:2])
     ways = (angles - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
     assert np.abs(ways).min() == pytest.approx(turn.distance, abs=1e-9)
 
 
 def test_regions_are_free_up_to_the_singular_orientation():
     robot = CATALOG["quadrupteron-oblique"]
-    first = pteron.singular_orientations(robot)
+    first = pteron.kinematics.singular_orientations(robot)
     edge = first[first > 0.0].min()
     low, high = np.full((2, 4), 0.01) * [[-1.0], [1.0]]
     low[3], high[3] = 0.0, edge - 1e-3

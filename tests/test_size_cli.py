@@ -29,7 +29,7 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.fixture
 def driven() -> str:
     robot = pteron.load("five-bar")
-    drive = pteron.Drive(
+    drive = pteron.legs.Drive(
         *(0.1, 0.01, 0.0, 3e-5, 20.0), rated_torque=0.64, max_force=30.0, max_speed=40.0
     )
     legs = tuple(replace(leg, drive=drive) for leg in robot.legs)

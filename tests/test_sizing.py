@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, in_turn, random_machine, with_elbows
+from mechanisms import CATALOG, NIGHTLY, gated, in_turn, random_machine, with_elbows
 
 import pteron
 from pteron.motion import (
@@ -25,6 +25,7 @@ from pteron.motion import (
     with_payload,
 )
 from pteron.motion.sizing.gearing import peak_span, rated_span, speed_span, torques
+from pteron.motion.trajectories.scaling import keeps_margin, least_margin
 from pteron.workspace import Box, home_pose
 
 BARE = {
@@ -42,7 +43,7 @@ def driven(robot, **more):
     legs = []
     for i, leg in enumerate(robot.legs):
         slides = leg.joint.unit == "m"
-        drive = pteron.Drive(
+        drive = pteron.legs.Drive(
             coulomb=(2.0 + i) * (1.0 if slides else 0.1),
             viscous=(10.0 - i) * (1.0 if slides else 0.01),
             offset=0.3 * i,
@@ -131,7 +132,7 @@ def sine(amplitude, omega, offset=0.0):
     Its sliders' coordinates are those of the pose, so that speeds and forces are sines.
     """
     robot = replace(CATALOG["tripteron"], gravity=(0.0, 0.0, 0.0))
-    drive = pteron.Drive(viscous=40.0, offset=offset, rotor_inertia=1e-3, ratio=300.0)
+    drive = pteron.legs.Drive(viscous=40.0, offset=offset, rotor_inertia=1e-3, ratio=300.0)
     robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
     time = np.linspace(0.0, 2.0 * np.pi / omega, 401)
     x = np.zeros((401, 3))
@@ -237,6 +238,36 @@ def test_places_are_those_that_a_loop_over_all_finds(name, wider):
     spans = [rated_span(one, 1, 3e-5, rated) for one in every]
     assert span.least == pytest.approx(max(s.least for s in spans), rel=1e-9)
     assert span.greatest == pytest.approx(min(s.greatest for s in spans), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", gated(["quadrupteron", "par4"], ["quadrupteron"], NIGHTLY))
+def test_the_platform_turns_with_the_cycle(name):
+    robot = CATALOG[name]
+    robot = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
+    tool = pick_and_place(robot, samples=31, scale=0.2)
+    found = size(robot, tool, places="workspace")
+    turns, angles = np.array([(place.turn, place.pose[-1]) for place in found.places]).T
+    with_it = np.abs(np.angle(np.exp(1j * (angles - turns)))) < 1e-9
+    assert (with_it & (turns > 0.1)).sum() > 2
+    assert (~with_it & (angles == 0.0)).sum() > 2
+    # The whole is turned as one, here by hand.
+    i = int(np.flatnonzero(with_it & (turns > 0.1))[0])
+    c, s = np.cos(turns[i]), np.sin(turns[i])
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[c, -s], [s, c]]
+    middle = Box.around(tool.pose).box.mean(axis=0)
+    pose = (tool.pose - middle) @ matrix.T + found.places[i].pose
+    moved = Motion(tool.time, pose, tool.velocity @ matrix.T, tool.acceleration @ matrix.T)
+    assert found.at(i).rms_forces == pytest.approx(size(robot, moved).rms_forces, rel=1e-9)
+    # No place and turn of the path, or of the whole, between those that were looked at is worse.
+    rng, box = np.random.default_rng(0), Box.around(np.array([p.pose for p in found.places])).box
+    least = least_margin(robot, home_pose(robot))
+    for k in range(40):
+        turn = rng.uniform(-0.5, 0.5) if k % 2 else rng.uniform(0.0, 2.0 * np.pi)
+        place = Place((*rng.uniform(*box)[:3], turn if k % 2 else 0.0), turn)
+        moved = placed(robot, tool, place)
+        if keeps_margin(robot, moved.pose, least):
+            assert (size(robot, moved).rms_forces <= 1.01 * found.rms_forces).all()
 
 
 def test_a_region_that_is_not_all_in_reach_is_refused_with_the_place():

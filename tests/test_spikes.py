@@ -61,7 +61,7 @@ def correct(name, seed):
     joints = pteron.inverse_kinematics(robot, pose)
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
     friction = Friction.of(joints.shape[1])
-    rates = pteron.joint_rates(robot, pose, velocity).actuated
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     forces = forces + float(rng.choice([0.0, 1.0, 5.0])) * friction.forces(rates)
     joints = joints + float(rng.choice([0.0, 1e-6, 1e-5])) * rng.normal(size=joints.shape)
     forces = forces + float(rng.choice([0.0, 0.1, 1.0])) * rng.normal(size=forces.shape)

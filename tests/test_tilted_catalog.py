@@ -82,7 +82,7 @@ def test_a_cube_is_found_where_it_is_far_smaller_than_the_machine():
 
 def test_tables_of_poses_may_be_in_mm_and_degrees(tmp_path):
     robot, table = TILTED["ball-table"], tmp_path / "poses.csv"
-    table.write_text("t,z (mm),roll [deg],pitch [deg]\n0,120,5,-3\n1,121,5,-3\n", encoding="utf-8")
+    table.write_text("t,z (mm),roll [deg],pitch [deg]\n0,120,5,-3\n.1,121,5,-3\n", encoding="utf-8")
     first, _ = json.loads(run(f"inverse ball-table --table {table} --json").stdout)
     pose = [0.12, *np.radians([5.0, -3.0])]
     joints = [first[name] for name in robot.joint_names]

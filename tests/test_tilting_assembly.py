@@ -82,7 +82,7 @@ def test_direct_inverts_inverse(name):
     given = np.broadcast_to(joints[:, None], (*whole.shape, joints.shape[-1]))[whole]
     np.testing.assert_allclose(np.exp(1j * back), np.exp(1j * given), atol=1e-10)
     assert (np.abs(poses[whole][:, angular]) <= np.pi).all()
-    mode = pteron.assembly_mode(robot, x)
+    mode = pteron.kinematics.assembly_mode(robot, x)
     rows = np.take_along_axis(poses, mode[:, None, None], axis=1)[:, 0]
     assert (same(rows, x, angular) < 1e-10).all()
     for side in (poses[..., -1], poses[..., 0]):
@@ -178,7 +178,7 @@ def test_a_motion_keeps_its_mode(name):
     joints = pteron.inverse_kinematics(robot, way)
     np.testing.assert_allclose(pteron.follow(robot, joints, way[0]), way, atol=1e-10)
     elbows = [leg.elbow for leg in robot.legs]
-    assert (pteron.working_mode(robot, way, joints) == elbows).all()
+    assert (pteron.kinematics.working_mode(robot, way, joints) == elbows).all()
 
 
 def test_two_poses_that_all_but_meet_are_told_apart():
@@ -230,7 +230,7 @@ MOVING = ["line-symmetric", "translation", "about a line"]
 def test_a_platform_that_moves_with_its_joints_held_has_no_list_of_poses(kind):
     rng = np.random.default_rng(8)
     robot, pose = moving_hexapod(kind, rng)
-    told = pteron.architecture(robot).self_motions
+    told = pteron.kinematics.architecture(robot).self_motions
     assert [kind in text for text in told] == ([True] if kind != "about a line" else [])
     joints, at, along = pteron.inverse_kinematics(robot, pose), pose, np.zeros(6)
     for _ in range(40):
@@ -248,7 +248,7 @@ def test_a_platform_that_moves_with_its_joints_held_has_no_list_of_poses(kind):
     assert caught.value.index == (1,)
     assert counts(pteron.direct_kinematics(robot, other)) >= 2
     turned = pteron.turned(robot, tilting.rotation(rng))
-    assert pteron.architecture(turned).self_motions == told
+    assert pteron.kinematics.architecture(turned).self_motions == told
     with pytest.raises(SingularPose, match="self-motion"):
         pteron.direct_kinematics(turned, joints)
 
@@ -263,4 +263,4 @@ def test_a_pose_that_is_singular_but_alone_is_listed():
     pose = start + brentq(measure, 0.0, 1.0, xtol=1e-16) * way
     poses = pteron.direct_kinematics(robot, pteron.inverse_kinematics(robot, pose))
     assert np.nanmin(np.linalg.norm((poses - pose)[:, :3], axis=-1)) < 1e-6
-    assert pteron.architecture(robot).self_motions == ()
+    assert pteron.kinematics.architecture(robot).self_motions == ()

@@ -41,8 +41,8 @@ def test_c_of_a_tilting_machine_returns_what_the_library_does(tmp_path, motion):
     for x, dx, ddx in zip(*states, strict=True):
         joints = pteron.inverse_kinematics(robot, x)
         forces = pteron.inverse_dynamics(robot, x, dx, ddx, wrench)
-        rates = pteron.joint_rates(robot, x, dx).actuated
-        seconds = pteron.joint_accelerations(robot, x, dx, ddx).actuated
+        rates = pteron.kinematics.joint_rates(robot, x, dx).actuated
+        seconds = pteron.kinematics.joint_accelerations(robot, x, dx, ddx).actuated
         given = pteron.drive_forces(robot, x, dx, ddx, wrench, smooth=True)
         results = {
             "inverse_kinematics": ((x,), joints),

@@ -13,8 +13,8 @@ from pteron.errors import ModelError
 from pteron.indices import Elasticity, evaluate, geometric_sensitivities, indices_of, stiffness
 from pteron.workspace import home_pose
 
-CASES = [("1T2R", ("RPS", "PRS", "RRS")), ("3T3R", ("UPS",))]
-CASES += [("2R", ("UPS", "PSS", "RSS")), ("3R", ("UPS", "PSS", "RSS"))]
+CASES = [("1T2R", ("RPS",)), ("2R", ("UPS", "PSS", "RSS"))]
+CASES += [("1T2R", ("RPS", "PRS", "RRS")), ("3T3R", ("UPS",)), ("3R", ("UPS", "PSS", "RSS"))]
 
 
 def twists(robot, pose):
@@ -28,7 +28,7 @@ def twists(robot, pose):
     return np.array(columns).T
 
 
-@pytest.mark.parametrize(("motion", "kinds"), several(CASES, [CASES[0], CASES[2]]))
+@pytest.mark.parametrize(("motion", "kinds"), several(CASES, CASES[:2]))
 def test_indices_are_those_of_the_homogeneous_jacobian(motion, kinds):
     robot, home = tilting.machine(motion, kinds, 3)
     poses = tilting.states(robot, home, 3)[0]

@@ -3,13 +3,17 @@
 import json
 import re
 from dataclasses import replace
+from zipfile import ZipFile
 
 import numpy as np
 import polars as pl
 import pytest
+from mechanisms import CLIENTS
 from test_cli import done, refused
+from test_export import compiled, states
 
 import pteron
+from pteron.export import export_fmu
 from pteron.manipulator import Tool
 from pteron.motion import pick_and_place, size, with_payload, with_tool
 from pteron.workspace import home_pose
@@ -145,3 +149,32 @@ def test_exported_code_has_each_tools_numbers(tmp_path):
     block = (tmp_path / "Quadrupteron_SetPayload.st").read_text()
     assert "mass := [0.3], center := [0.01, 0.0, -0.03]" in block
     assert "Tool" not in (tmp_path / "quadrupteron.h").read_text().split("set_payload(")[-1]
+
+
+@CLIENTS
+@pytest.mark.parametrize(("name", "inertia"), [("par4", 2e-4), ("stewart", TENSOR)])
+def test_exported_code_carries_the_tool_that_it_is_written_with(tmp_path, name, inertia):
+    robot = equipped(name, replace(GRIPPER, central_inertia=inertia), PEN)
+    file = pteron.save(robot, tmp_path / "robot.toml")
+    done(f"export {file} --tool gripper --function inverse_dynamics --c {tmp_path / 'c'}")
+    text = (tmp_path / "c" / f"{name}.c").read_text()
+    table = re.search(r"_parameters\[\d+\] = \{(.*?)\};", text, re.S)[1]
+    written = [float(x) for x in re.findall(r"^\s*\(?(\S+?)\)?,? /\*", table, re.M)]
+    mounted = with_tool(robot, "gripper")
+    np.testing.assert_array_equal(written, pteron.parameters(mounted))
+    assert "tool_" not in text
+    call, _ = compiled(mounted, ["inverse_dynamics"], tmp_path / "c")
+    state = [part[0] for part in states(robot, 1)]
+    expected = pteron.inverse_dynamics(mounted, *state)
+    _, forces = call("inverse_dynamics", *state, np.array(written), sizes=[expected.shape])
+    np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    refused(f"export {file} --tool saw --c {tmp_path / 'd'}", "no tool 'saw'; it has gripper")
+    refused(f"export {file} --tool gripper --base a.json --c {tmp_path / 'd'}", "not with --base")
+    assert not (tmp_path / "d").exists()
+
+
+@CLIENTS
+def test_an_fmu_lists_the_tools(tmp_path):
+    (path,) = export_fmu(equipped("quadrupteron", GRIPPER), tmp_path)
+    told = ZipFile(path).read("modelDescription.xml").decode()
+    assert "Tool gripper, its centre point at 0 0 -0.08 m: mass := [0.3]" in told

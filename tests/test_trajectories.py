@@ -67,7 +67,7 @@ def test_a_payload_is_the_weight_and_the_inertia_of_a_point_at_the_tool(name):
         pteron.inverse_dynamics(machine, pose, velocity, acceleration)
         for machine in (with_payload(robot, 1.7), robot)
     ]
-    rates = pteron.joint_rates(robot, pose, velocity).actuated
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     given = ((more[0] - more[1]) * rates).sum(axis=-1)
 
     def tool(times):
@@ -101,10 +101,10 @@ def test_a_payload_that_is_none_or_impossible():
         with_payload(askew, 1.0)
 
 
-DRIVE = pteron.Drive(
+DRIVE = pteron.legs.Drive(
     coulomb=1.5, viscous=6.0, offset=0.4, rotor_inertia=0.02, ratio=5.0, max_speed=2.0
 )
-STRIBECK = replace(DRIVE, stribeck=pteron.Stribeck(0.7, 0.02))
+STRIBECK = replace(DRIVE, stribeck=pteron.legs.Stribeck(0.7, 0.02))
 
 
 def driven(robot, drive=DRIVE, **more):
@@ -152,8 +152,8 @@ def sides(robot, motion, finer=10):
     """Return joints' speeds, accelerations and the drives' forces at so many times the samples."""
     fine = motion.at(np.linspace(0.0, motion.duration, finer * (len(motion.time) - 1) + 1))
     return (
-        pteron.joint_rates(robot, *fine[:2]).actuated,
-        pteron.joint_accelerations(robot, *fine).actuated,
+        pteron.kinematics.joint_rates(robot, *fine[:2]).actuated,
+        pteron.kinematics.joint_accelerations(robot, *fine).actuated,
         pteron.drive_forces(robot, *fine),
     )
 
@@ -331,7 +331,7 @@ def test_a_force_keeps_its_limit_where_a_joint_reverses_between_samples(name):
     robot, pose = CATALOG[name], home(name)
     still = np.zeros(robot.freedom)
     held = max(float(np.abs(pteron.inverse_dynamics(robot, pose, still, still)).max()), 1.0)
-    robot = driven(robot, pteron.Drive(coulomb=0.3 * held, viscous=0.02 * held))
+    robot = driven(robot, pteron.legs.Drive(coulomb=0.3 * held, viscous=0.02 * held))
     path = cycle_path(pick_and_place(robot, pose))
     slow = along(robot, path, duration=1.0)
     forces = np.abs(pteron.drive_forces(robot, slow.pose, slow.velocity, slow.acceleration))
@@ -347,7 +347,7 @@ def test_a_force_keeps_its_limit_where_a_joint_reverses_between_samples(name):
 def axis_move(**drive):
     """Return a Tripteron that moves along its first slider alone, and the mass that this moves."""
     robot = MACHINES["tripteron, no gravity"]
-    robot = driven(robot, pteron.Drive(**drive)) if drive else robot
+    robot = driven(robot, pteron.legs.Drive(**drive)) if drive else robot
     path = line_path(robot, [[-0.05, 0.0, 0.0], [0.1, 0.0, 0.0]])
     return robot, path, pteron.mass_matrix(robot, [0.0, 0.0, 0.0])[0, 0]
 
@@ -478,7 +478,8 @@ def test_a_way_that_fails_is_refused_where_it_first_does():
     turned = home("h4") + np.array([0.0, 0.0, 0.0, 1.5])
     with pytest.raises(pteron.UnreachablePose, match=r"\]: phi comes to 1\.5 rad, its limits are"):
         point_to_point(h4, home("h4"), turned, duration=1.0)
-    with pytest.raises(pteron.UnreachablePose, match=r"out of the reach.*is it in millimetres"):
+    told = pytest.raises(pteron.UnreachablePose, match=r"out of the reach.*is it in millimetres")
+    with pytest.warns(pteron.UnlikelyValue, match="are these mm"), told:
         point_to_point(five, [0.0, 138.0], [0.0, 100.0], duration=1.0)
 
 

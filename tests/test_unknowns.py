@@ -67,7 +67,7 @@ def test_friction_that_does_not_fall_is_left_out_and_slow_passages_are_advised()
 
 def test_a_payload_that_is_carried_at_the_end_of_a_log_is_fitted_with_a_delay():
     robot = machine("tripteron")
-    inertia = pteron.PlanarInertia(robot.platform.inertia.mass + 0.4, (0.0, 0.0), 0.01)
+    inertia = pteron.bodies.PlanarInertia(robot.platform.inertia.mass + 0.4, (0.0, 0.0), 0.01)
     heavy = replace(robot, platform=replace(robot.platform, inertia=inertia))
     parts = [
         log_of(one, duration=span, rate=500.0, force_noise=0.05, seed=seed, size=size)

@@ -2,17 +2,22 @@
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from mechanisms import CATALOG, gated
 
 import pteron
 from pteron.manipulator import with_dimensions
+from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.variants import with_elbows
+from pteron.motion import line_path, with_payload
+from pteron.playback import playback
+from pteron.tables import Table
 from pteron.workspace import Box, home_pose, pose_margins, prove
-from pteron.workspace.machine_warnings import elbow_warnings, machine_warnings
-from pteron.workspace.mode_places import mode_places
+from pteron.workspace.mode_places import elbow_warnings, mode_places
 
 
 def mirrored(robot):
@@ -39,6 +44,53 @@ def test_joints_in_degrees_or_millimetres_are_told_beside_the_missing_pose():
         pteron.direct_kinematics("quadrupteron", np.array([30.0, 10.0, 20.0, 80.0]))
     with pytest.raises(pteron.UnreachablePose, match=r"30\.0\]; theta1, .* are these degrees"):
         pteron.direct_kinematics("delta", [10.0, 20.0, 30.0], on_failure="raise")
+
+
+def test_what_the_command_line_hints_at_is_warned_of_in_python():
+    robot = pteron.load("quadrupteron")
+    with pytest.warns(pteron.UnlikelyValue, match="500 kg, .* is it in grams"):
+        with_payload(robot, 500.0)
+    with pytest.warns(pteron.UnlikelyValue, match="^phi up to 6.5: are these degrees"):
+        line_path(robot, [[0.0, 0.0, 0.0, 6.3], [0.0, 0.0, 0.0, 6.5]])
+    columns = ["t", *robot.coordinates]
+    data = np.column_stack([np.arange(5.0), *np.zeros((3, 5)), np.full(5, 6.4)])
+    with pytest.warns(pteron.UnlikelyValue) as told:
+        playback(robot, Table("a.csv", pl.DataFrame(data, schema=columns)))
+    assert [str(one.message).partition(":")[2] for one in told] == [
+        " phi up to 6.4: are these degrees? rad are expected",
+        " t in steps of 1: are these ms? s are expected",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "question"),
+    [
+        ("limits = [-1.5, 0.9]", "limits = [-86.0, 51.0]", "limits: .* are these degrees"),
+        ("upper_length = 0.42", "upper_length = 420.0", "upper_length: .* are these mm"),
+        ("center_of_mass = [-0.5275]", "center_of_mass = [0.5275]", "x = 0.5275 m is not between"),
+    ],
+)
+def test_a_file_is_doubted_where_it_is_loaded(old, new, question, tmp_path):
+    """The catalog is not: a warning is an error in these tests."""
+    text = (Path(pteron.manipulator.__file__).parent / "catalog" / "delta.toml").read_text("utf-8")
+    assert old in text
+    file = tmp_path / "delta.toml"
+    file.write_text(text.replace(old, new, 1), "utf-8")
+    with pytest.warns(pteron.UnlikelyValue, match=f"delta.toml: leg.* 1.*: .*{question}") as told:
+        pteron.load(file)
+    assert {one.filename for one in told} == {__file__}
+    with pytest.warns(pteron.UnlikelyValue, match=question):
+        pteron.parameters(file)
+
+
+def test_bodies_that_pteron_wrote_are_not_doubted(tmp_path):
+    """What identification finds for a body alone is one of many equivalent values."""
+    robot = CATALOG["delta"]
+    values = pteron.parameters(robot)
+    values[[name.startswith("mgx_l") for name in pteron.parameter_names(robot)]] *= -1.0
+    odd = pteron.with_parameters(robot, values)
+    assert len(machine_warnings(odd)) == 3
+    pteron.load(pteron.save(odd, tmp_path / "robot.toml"))  # a warning would be an error
 
 
 def test_a_shaft_that_makes_many_turns_has_the_limits_it_has():

@@ -66,8 +66,8 @@ def test_the_whole_way(tmp_path, monkeypatch, capsys):
     state = cycle.pose, cycle.velocity, cycle.acceleration
     motion = (
         pteron.inverse_kinematics(robot, cycle.pose),
-        pteron.joint_rates(robot, *state[:2]).actuated,
-        pteron.joint_accelerations(robot, *state).actuated,
+        pteron.kinematics.joint_rates(robot, *state[:2]).actuated,
+        pteron.kinematics.joint_accelerations(robot, *state).actuated,
     )
     expected, found = pteron.drive_forces(robot, *state, smooth=True), np.empty(3)
     for k, row in enumerate(expected):

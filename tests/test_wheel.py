@@ -3,6 +3,8 @@
 That it works where it is installed, `make wheels` tries: see tests/installed/matrix.py.
 """
 
+import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +46,18 @@ def test_the_wheel_names_every_extra_and_the_command(wheel: ZipFile):
         assert f"Provides-Extra: {extra}\n" in text
     (entry,) = (name for name in wheel.namelist() if name.endswith("/entry_points.txt"))
     assert "pteron = pteron_command:main" in wheel.read(entry).decode()
+
+
+def test_a_registry_shows_the_pictures_of_readme(wheel: ZipFile):
+    """Where the repository is known; in the wheel of this clone README is as it stands."""
+    (metadata,) = (name for name in wheel.namelist() if name.endswith("/METADATA"))
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert wheel.read(metadata).decode().replace("\r\n", "\n").endswith(text)
+    made = runpy.run_path(str(ROOT / "hatch_build.py"))["with_addresses"]
+    led = made(text, "https://h/p/", "1.0")
+    assert "](https://h/p/raw/v1.0/docs/delta.gif)" in led
+    assert "](https://h/p/blob/v1.0/docs/evidence.md#is-it-right)" in led
+    assert not re.search(r"\]\((?!https://)", led)
 
 
 def test_text_is_read_and_written_in_utf_8_whatever_the_machine_speaks():

@@ -44,7 +44,7 @@ def machine(name):
     if name not in CONES:
         return MACHINES[name]
     name, angle = CONES[name]
-    held = {"platform_cone": pteron.Cone((0.0, 0.0, 1.0), angle)}
+    held = {"platform_cone": pteron.legs.Cone((0.0, 0.0, 1.0), angle)}
     legs = CATALOG[name].legs
     return replace(CATALOG[name], legs=tuple(replace(leg, **held) for leg in legs))
 
@@ -95,7 +95,7 @@ def test_measures_are_sines_and_volumes(name):
     robot = MECHANISMS[name]
     pose, _, _ = states(robot, 50)
     found = pose_margins(robot, pose)
-    l_u, l_l = pteron.link_vectors(robot, pose)
+    l_u, l_l = pteron.kinematics.link_vectors(robot, pose)
     d = np.array([leg.direction for leg in robot.legs])
     # The sine between the links, seen along d: a rod may leave the plane.
     sines = np.abs((np.cross(l_u, l_l) * d).sum(axis=-1))

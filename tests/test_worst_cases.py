@@ -15,7 +15,7 @@ SPEED, ACCELERATION = 3.0, 20.0
 
 def driven(name):
     """A machine with rotors and every kind of friction, and three poses near its home."""
-    drive = pteron.Drive(2.0, 3.0, 0.7, rotor_inertia=1e-4, ratio=50.0)
+    drive = pteron.legs.Drive(2.0, 3.0, 0.7, rotor_inertia=1e-4, ratio=50.0)
     robot = pteron.load(name)
     robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
     rng = np.random.default_rng(0)
@@ -52,7 +52,9 @@ def test_no_sampled_motion_or_error_exceeds_the_worst(name):
     velocity, acceleration = moves[0] * SPEED, moves[1] * ACCELERATION
     forces = np.abs(pteron.drive_forces(robot, poses[:, None], velocity, acceleration)).max(axis=1)
     assert (forces <= worst_forces(robot, poses, SPEED, ACCELERATION)).all()
-    speeds = np.abs(pteron.joint_rates(robot, poses[:, None], velocity).actuated).max(axis=1)
+    speeds = np.abs(pteron.kinematics.joint_rates(robot, poses[:, None], velocity).actuated).max(
+        axis=1
+    )
     worst = worst_speeds(robot, poses, SPEED)
     assert (speeds <= worst).all()
     assert speeds.max() > 0.95 * worst.max()

@@ -79,7 +79,7 @@ def _write(path: Path) -> None:
     for start in range(0, _ROWS, _PIECE):
         time = np.arange(start, min(start + _PIECE, _ROWS)) / _RATE
         motion = _motion(robot, time)
-        rates = pteron.joint_rates(robot, motion[0], motion[1]).actuated
+        rates = pteron.kinematics.joint_rates(robot, motion[0], motion[1]).actuated
         forces = forces_of(*motion) + _FRICTION[0] * np.sign(rates) + _FRICTION[1] * rates
         sliders = np.round(pteron.inverse_kinematics(robot, motion[0]) / 1e-6) * 1e-6
         forces = forces + 0.2 * rng.normal(size=forces.shape)

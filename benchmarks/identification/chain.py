@@ -114,8 +114,8 @@ class Cycles:
         state = pose, velocity / whole.duration, acceleration / whole.duration**2
         return (
             pteron.inverse_kinematics(robot, pose),
-            pteron.joint_rates(robot, *state[:2]).actuated,
-            pteron.joint_accelerations(robot, *state).actuated,
+            pteron.kinematics.joint_rates(robot, *state[:2]).actuated,
+            pteron.kinematics.joint_accelerations(robot, *state).actuated,
         )
 
 

@@ -135,9 +135,9 @@ def joint_friction(robot: pteron.Manipulator, state: State) -> Array:
 
     By virtual work: J^T F = (dq'/dx')^T q', with the rates q' of all passive joints.
     """
-    rates = np.nan_to_num(pteron.joint_rates(robot, state.pose, state.velocity).passive)
+    rates = np.nan_to_num(pteron.kinematics.joint_rates(robot, state.pose, state.velocity).passive)
     unit = np.eye(robot.freedom)
-    shares = np.nan_to_num(pteron.joint_rates(robot, state.pose[:, None], unit).passive)
+    shares = np.nan_to_num(pteron.kinematics.joint_rates(robot, state.pose[:, None], unit).passive)
     work = np.einsum("tij,tkij->tk", rates, shares)
     transposed = pteron.jacobian(robot, state.pose).swapaxes(-1, -2)
     forces: Array = np.linalg.solve(transposed, work[..., None])[..., 0]

@@ -328,8 +328,10 @@ def noise(fault: str, shape: tuple[int, int], rng: np.random.Generator) -> Array
 def commanded(case: Case) -> tuple[Array, Array, Array]:
     """Return coordinates, rates and accelerations of the joints, by the drawn geometry."""
     moved, drawn = case.motion.at(case.time), case.motion.robot
-    rates = pteron.joint_rates(drawn, moved.pose, moved.velocity)
-    seconds = pteron.joint_accelerations(drawn, moved.pose, moved.velocity, moved.acceleration)
+    rates = pteron.kinematics.joint_rates(drawn, moved.pose, moved.velocity)
+    seconds = pteron.kinematics.joint_accelerations(
+        drawn, moved.pose, moved.velocity, moved.acceleration
+    )
     return pteron.inverse_kinematics(drawn, moved.pose), rates.actuated, seconds.actuated
 
 

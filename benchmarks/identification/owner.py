@@ -131,7 +131,9 @@ def true_model(built: pteron.Manipulator) -> Callable[[Array, Array, Array], Arr
     """Return what the machine itself needs, as a feed-forward of the joints."""
     rows = zip(*(getattr(FRICTION, name) for name in _FRICTION), strict=True)
     drives = [
-        pteron.Drive(coulomb=c, viscous=v, offset=o, stribeck=pteron.Stribeck(force, speed))
+        pteron.legs.Drive(
+            coulomb=c, viscous=v, offset=o, stribeck=pteron.legs.Stribeck(force, speed)
+        )
         for c, v, o, force, speed in rows
     ]
     legs = [replace(leg, drive=drive) for leg, drive in zip(built.legs, drives, strict=True)]
@@ -160,7 +162,8 @@ def main() -> None:
         rows = zip(robot.legs, RATIO, RATED, *_DRIVES.values(), strict=True)
         legs = [
             replace(
-                leg, drive=pteron.Drive(ratio=r, rated_torque=t, max_force=force, max_speed=speed)
+                leg,
+                drive=pteron.legs.Drive(ratio=r, rated_torque=t, max_force=force, max_speed=speed),
             )
             for leg, r, t, force, speed in rows
         ]

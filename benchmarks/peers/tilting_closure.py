@@ -44,7 +44,7 @@ class TiltingClosure(LegClosure):
             raise ValueError(f"{robot.name}: the peers have roll, pitch, yaw in the base's frame")
         legs = tuple(KINDS[leg.type].of(leg, platform) for leg in robot.legs)
         points = np.array([leg.platform_point for leg in robot.legs])
-        rows = pteron.twist_jacobian(robot, pteron.random_poses(robot, 1, seed=0)[0])
+        rows = pteron.kinematics.twist_jacobian(robot, pteron.random_poses(robot, 1, seed=0)[0])
         order = tuple(int(i) for i in lu(rows.T, p_indices=True)[0].argsort())
         return cls(legs, np.eye(3), True, carried, points, order)
 

@@ -84,7 +84,7 @@ def _prrr(leg: Any, count: int) -> list[Body]:
     frame = frame_of(leg)
     e = frame.T @ np.array(leg.e) if leg.e != leg.direction else np.array([0.0, 0.0, 1.0])
     mass = leg.upper.mass + leg.slider_mass
-    upper = pteron.PlanarInertia(mass, leg.upper.first_moment, leg.upper.inertia)
+    upper = pteron.bodies.PlanarInertia(mass, leg.upper.first_moment, leg.upper.inertia)
     elbow = np.array([leg.upper_length, 0.0, 0.0])
     lower = _planar(leg.lower, reach=leg.lower_length)
     return [

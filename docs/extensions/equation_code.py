@@ -33,7 +33,7 @@ CODE: dict[str, tuple[str, ...]] = {
         f"{_E}.lagrangian.forward_dynamics",
     ),
     # Base parameters.
-    "B1": (f"{_R}.base_parameters", f"{_R}.base_regressor"),
+    "B1": ("pteron.base_parameters", "pteron.base_regressor"),
     "B2": (f"{_R}.transfers.transfers", f"{_L}.prrr.PRRR.transfers"),
     "B3": (f"{_R}.transfers.transfers",),
     "B4": ("pteron.bodies.inertia.SpatialInertia.shares_of_point",),
@@ -60,7 +60,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "P5": (f"{_E}.pose_paths.stepped", "pteron.kinematics.tilting_assembly.tilting_poses"),
     # Singularities.
     "T1": ("pteron.closures.closure.Closure.measure",),
-    "T2": ("pteron.closures.constant_rows.ConstantRows", "pteron.singular_orientations"),
+    "T2": ("pteron.closures.constant_rows.ConstantRows", "pteron.kinematics.singular_orientations"),
     "T3": (f"{_E}.constraints.constraint_rows", f"{_E}.constraints.constraint_measure"),
     # Clearances.
     "C1": (f"{_E}.clearance.squared_distance",),

@@ -25,23 +25,14 @@ from sphinx.pycode import ModuleAnalyzer
 import pteron
 
 TOPICS: dict[str, tuple[str, ...]] = {
-    "Robots": (
-        *("load", "save", "catalog", "Manipulator", "Platform", "Bar", "Geared", "turned"),
-        *("PRRR", "PSS", "RSS", "RRR", "PRR", "RUPU", "Leg", "Cone", "Drive", "Stribeck"),
-        *("PlanarInertia", "RodInertia", "Radii"),
-    ),
+    "Robots": ("load", "save", "catalog", "Manipulator", "turned", "working_modes"),
     "Parameters": (
-        *("parameters", "parameter_names", "parameter_units", "parameter_data", "Parameter"),
-        *("with_parameters", "base_parameters", "BaseParameters", "base_regressor"),
-        "cheapest_parameters",
+        *("parameters", "parameter_names", "with_parameters"),
+        *("base_parameters", "base_regressor"),
     ),
     "Kinematics": (
-        *("inverse_kinematics", "direct_kinematics", "follow", "jacobian", "joint_rates"),
-        *("joint_accelerations", "JointMotion", "joint_screws", "link_vectors", "link_jacobians"),
-        *("working_mode", "working_modes", "assembly_mode", "singular_orientations"),
-        *("architecture", "Architecture", "is_singular_everywhere", "constraint_measure"),
-        *("random_poses", "pose_of", "position_of", "rotation_of", "twist", "velocity_of"),
-        "twist_jacobian",
+        *("inverse_kinematics", "direct_kinematics", "follow", "jacobian", "random_poses"),
+        *("pose_of", "rotation_of", "twist"),
     ),
     "Dynamics": (
         *("inverse_dynamics", "forward_dynamics", "regressor", "drive_forces"),
@@ -51,13 +42,10 @@ TOPICS: dict[str, tuple[str, ...]] = {
     "Code": ("compile", "export_c", "export_st"),
     "Errors": (
         *("PteronError", "ModelError", "UnreachablePose", "SingularPose", "DataError"),
-        "OutputError",
+        *("OutputError", "UnlikelyValue"),
     ),
 }
 """Names on each page, in order."""
-
-MORE_MODULES = ("pteron.reduction",)
-"""Public, though `_PUBLIC` has its functions only."""
 
 INSIDE = {
     "equations": "The paper, as expressions: [the theory](../../theory/index.md) links here.",
@@ -97,8 +85,7 @@ def by_topic() -> dict[str, tuple[str, ...]]:
 def public_modules() -> list[ModuleType]:
     """Return the modules that `pteron` hands on."""
     values = [getattr(pteron, name) for name in _PUBLIC]
-    found = [value for value in values if isinstance(value, ModuleType)]
-    return [*found, *map(import_module, MORE_MODULES)]
+    return [value for value in values if isinstance(value, ModuleType)]
 
 
 def parts(package: str) -> list[str]:
@@ -110,14 +97,17 @@ def parts(package: str) -> list[str]:
 def _documented(owner: ModuleType, names: Iterable[str], told: set[str]) -> list[str]:
     """Return the lines that list names of a module, and then tell about each.
 
-    What two modules hand on is indexed once; `told` are the places of what is.
+    What two modules hand on is indexed once; `told` are the places of what is. So is a function
+    whose module has its name and a page of its own.
     """
+    inside = {part for package in INSIDE for part in parts(package)}
     lines = [f".. currentmodule:: {owner.__name__}", "", ".. autosummary::", ""]
     lines += [f"   {name}" for name in names] + [""]
     for name in names:
         value = getattr(owner, name)
         place = f"{value.__module__}.{name}" if inspect.isclass(value) else f"{owner}.{name}"
-        again = ["   :no-index:"] if place in told else []
+        twice = place in told or f"{owner.__name__}.{name}" in inside
+        again = ["   :no-index:"] if twice else []
         told.add(place)
         lines += [f".. {directive_for(value)}:: {name}", *again, ""]
     return lines
@@ -135,7 +125,8 @@ def pages() -> dict[str, str]:
         found[f"functions/{topic.lower()}.md"] = _page(topic, _documented(pteron, names, set()))
     for module in public_modules():
         lines = [f".. automodule:: {module.__name__}", "   :no-members:", ""]
-        lines += _documented(module, sorted(module.__all__, key=str.lower), told)
+        own = (name for name in module.__all__ if name not in _PUBLIC)
+        lines += _documented(module, sorted(own, key=str.lower), told)
         path = f"modules/{module.__name__.removeprefix('pteron.')}.md"
         found[path] = _page(f"`{module.__name__}`", lines)
     for package, intro in INSIDE.items():

@@ -1,7 +1,7 @@
 """Pages of source code lead back to the reference, though a name may stand there under two names.
 
 viewcode takes it that all of a file is documented under one module. Here `PRRR` is told as
-`pteron.PRRR`, and its equations beside it as `pteron.legs.prrr.PRRREquations`.
+`pteron.legs.PRRR`, and its equations beside it as `pteron.legs.prrr.PRRREquations`.
 """
 
 from __future__ import annotations

@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 
 import numpy as np
-from matplotlib.image import imread
+from PIL import Image, ImageSequence
+
+Pixels = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 _FRINGE = 2
 """Pixels by which a picture's size may differ, as its text is a little wider."""
@@ -19,14 +21,25 @@ _SHIFT = 0.5
 
 
 def alike(old: Path, new: Path) -> bool:
-    """Return whether two PNG or two SVG files show the same."""
+    """Return whether two pictures, SVG, PNG or GIF, show the same."""
     if not old.is_file():
         return False
     return _same_drawing(old, new) if new.suffix == ".svg" else _same_pixels(old, new)
 
 
 def _same_pixels(old: Path, new: Path) -> bool:
-    a, b = (imread(path)[..., :3].astype(float) for path in (old, new))
+    a, b = _frames(old), _frames(new)
+    if len(a) != len(b):
+        return False
+    return all(_same_frame(one, other) for one, other in zip(a, b, strict=True))
+
+
+def _frames(path: Path) -> list[Pixels]:
+    with Image.open(path) as image:
+        return [np.asarray(one.convert("RGB")) / 255.0 for one in ImageSequence.Iterator(image)]
+
+
+def _same_frame(a: Pixels, b: Pixels) -> bool:
     if max(abs(m - n) for m, n in zip(a.shape, b.shape, strict=True)) > _FRINGE:
         return False
     rows, columns = np.minimum(a.shape[:2], b.shape[:2])

@@ -11,9 +11,12 @@ from pathlib import Path
 
 from pteron.bodies.tables import Bar, Geared, PlanarBody, Table
 from pteron.legs import KINDS
+from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.tables import (
     ConeTable,
     DriveTable,
+    ElasticTable,
+    LuGreTable,
     MachineTable,
     PlatformTable,
     RadiiTable,
@@ -21,7 +24,8 @@ from pteron.manipulator.tables import (
     StribeckTable,
     TiltingTable,
     ToolTable,
-    leg_table,
+    WaveTable,
+    WindingTable,
 )
 
 TABLES: dict[str, type[Table]] = {
@@ -36,6 +40,10 @@ TABLES: dict[str, type[Table]] = {
     "a cone": ConeTable,
     "a drive": DriveTable,
     "stribeck": StribeckTable,
+    "lugre": LuGreTable,
+    "elastic": ElasticTable,
+    "winding": WindingTable,
+    "a wave": WaveTable,
     "reading": ReadingTable,
     **{name: leg_table(kind) for name, kind in KINDS.items()},
 }

@@ -17,10 +17,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
-from pteron import PRR, PRRR, PSS, RPR, RRR, RSS, RUPU, PlanarInertia, RodInertia
+from pteron.bodies import PlanarInertia, RodInertia
 from pteron.bodies.motion import PointMotion, RotationMotion, Turn
 from pteron.kernels import Array
-from pteron.legs import PRS, RPS, RRS, UPS, LegKind
+from pteron.legs import PRR, PRRR, PRS, PSS, RPR, RPS, RRR, RRS, RSS, RUPU, UPS, LegKind
 
 INK, MUTED, PAPER = "#1c2630", "#8a949e", "#ffffff"
 UPPER, LOWER, PLATE, GIVEN = "#0072b2", "#d55e00", "#3d6b8f", "#00795a"

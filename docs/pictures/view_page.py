@@ -11,10 +11,10 @@ import numpy as np
 import pteron
 from pteron.viewer import Viewer, view
 
-_FLAGS = ("--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader")
+_FLAGS = ("--no-sandbox", "--disable-gpu")
 _SIZE = {"width": 1180, "height": 760}
-_STILL = 2500
-"""ms after which the page no longer changes."""
+_STILL = 1500
+"""ms in which a page that is drawn does not change."""
 
 
 def draw(docs: Path) -> None:
@@ -25,14 +25,14 @@ def draw(docs: Path) -> None:
         return
     with view(pteron.load("quadrupteron"), port=0) as viewer:
         viewer.move_to([0.03, 0.05, 0.06, np.radians(25.0)])
-        _shoot(program, viewer, docs / "view.png", ("Show", "workspace slice", "xz"))
+        _shoot(program, viewer, docs / "view.png", "xz")
     with view(pteron.load("3-rrr"), port=0) as viewer:
         viewer.move_to([0.0, 0.3, 0.0])
         _shoot(program, viewer, docs / "view-planar.png", None)
 
 
-def _shoot(program: str, viewer: Viewer, path: Path, choice: tuple[str, str, str] | None) -> None:
-    """Write a picture of the page, after a choice in one of its tabs."""
+def _shoot(program: str, viewer: Viewer, path: Path, plane: str | None) -> None:
+    """Write a picture of the page, with a slice of the workspace."""
     from playwright.sync_api import sync_playwright
 
     viewer.wait()
@@ -41,15 +41,12 @@ def _shoot(program: str, viewer: Viewer, path: Path, choice: tuple[str, str, str
         page = browser.new_page(viewport=_SIZE)  # type: ignore[arg-type]
         page.goto(viewer.url)
         page.wait_for_selector("table.legs")
-        if choice is not None:
-            tab, label, value = choice
-            page.get_by_role("tab", name=tab).click()
-            row = page.get_by_text(label).locator("xpath=ancestor::*[.//input][1]")
-            row.locator("input").first.click()
-            page.get_by_role("option", name=value, exact=True).click()
+        if plane is not None:
+            page.evaluate("document.getElementById('looks').open = true")
+            page.select_option("#plane", plane)
+        before = b""
+        while before != (now := page.screenshot()):
+            before = now
             page.wait_for_timeout(_STILL)
-        # Chromium without a graphics card says so in a corner.
-        page.add_style_tag(content=".mantine-Notifications-root { display: none }")
-        page.wait_for_timeout(_STILL)
-        page.screenshot(path=str(path))
+        path.write_bytes(now)
         browser.close()

@@ -18,7 +18,7 @@ poses = poses[np.isfinite(poses).all(axis=-1)]
 # %%
 # The cranks are the same in all pictures. A pose whose elbows are on other sides belongs to another
 # working mode.
-signs = pteron.working_mode(robot, poses, joints)
+signs = pteron.kinematics.working_mode(robot, poses, joints)
 modes = {tuple(leg.elbow for leg in mode.legs): mode for mode in pteron.working_modes(robot)}
 machines = [modes[tuple(sign)] for sign in signs.tolist()]
 titles = [f"\u03c6 = {np.degrees(pose[2]):.0f}\u00b0" for pose in poses]

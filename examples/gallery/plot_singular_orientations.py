@@ -17,7 +17,7 @@ angles = np.linspace(-np.pi, np.pi, 361)
 poses = np.column_stack([np.tile(home[:3], (361, 1)), angles])
 determinant = np.linalg.det(pteron.jacobian(robot, poses))
 measure = np.abs(determinant) / np.abs(determinant).max()
-singular = pteron.singular_orientations(robot)
+singular = pteron.kinematics.singular_orientations(robot)
 orientations = pteron.plots.regularity_figure(angles, measure, singular, home=home[3])
 
 # %%

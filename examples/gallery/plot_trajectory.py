@@ -19,5 +19,5 @@ courses = pteron.plots.trajectory_figure(motion.time, *state, names=robot.coordi
 # %%
 # What the sliders do.
 joints = pteron.inverse_kinematics(robot, motion.pose)
-rates = pteron.joint_rates(robot, motion.pose, motion.velocity).actuated
+rates = pteron.kinematics.joint_rates(robot, motion.pose, motion.velocity).actuated
 sliders = pteron.plots.joints_figure(motion.time, joints, rates, robot=robot)

@@ -1,6 +1,7 @@
 """Checks of public functions' arguments against their type hints, before a function runs.
 
-`public.publish` calls `check_arguments`, which wraps public functions and classes of a package.
+`public.publish` lets `checking` wrap the public functions of a package; classes that a user makes
+are decorated with `checked_arguments`.
 Machines and arrays of states are checked by the functions, which convert them anyway.
 """
 
@@ -11,18 +12,17 @@ import inspect
 import math
 import operator
 import os
-import sys
 import types
 import typing
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, update_wrapper
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import AbstractArray
 from numpy.typing import ArrayLike
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, PteronError, shown
 
 _CHECKED_LATER = {
     *("RobotLike", "PoseLike", "PoseLike | None", "JointsLike", "JointsLike | None"),
@@ -35,6 +35,9 @@ _LOOKED_AT = 1000
 
 _LARGEST = 2**63
 """Whole numbers must be smaller in size: they count or index elements of arrays, in 64 bits."""
+
+
+_Class = TypeVar("_Class")
 
 
 class Between(NamedTuple):
@@ -51,33 +54,20 @@ class _Kind(NamedTuple):
     holds: Callable[[Any], bool]
 
 
-def check_arguments(
-    package: str, functions: Collection[str] | None = None, *, classes: Collection[str] = ()
-) -> None:
-    """Let the public functions of a package refuse arguments of another kind than they say.
+def checking(function: types.FunctionType) -> types.FunctionType:
+    """Return a function that first refuses arguments of another kind than its type hints say."""
+    hints = {hint for key, hint in function.__annotations__.items() if key != "return"}
+    return _checking(function) if hints - _CHECKED_LATER - {"bool"} else function
 
-    Parameters
-    ----------
-    package : str
-        Its name.
-    functions : collection of str, optional
-        Which of its functions; by default all that `__all__` lists.
-    classes : collection of str
-        Classes that are made from what a user gives, and have no check of their own.
+
+def checked_arguments(made: type[_Class]) -> type[_Class]:
+    """Let a class refuse arguments of another kind than its type hints say, as a decorator.
+
+    It is for classes that are made from what a user gives, and have no check of their own.
     """
-    names = vars(sys.modules[package])
-    for name in names["__all__"] if functions is None else functions:
-        function = names[name]
-        if not isinstance(function, types.FunctionType):
-            continue
-        hints = {hint for key, hint in function.__annotations__.items() if key != "return"}
-        if hints - _CHECKED_LATER - {"bool"}:
-            checking = _checking(function)
-            names[name] = checking
-            # Pickles and doctests look for a function where it says that it is from.
-            setattr(sys.modules[function.__module__], name, checking)
-    for name in classes:
-        names[name].__init__ = _checking(names[name].__init__)
+    any_class: Any = made
+    any_class.__init__ = _checking(any_class.__init__)
+    return made
 
 
 def expect_kinds(
@@ -100,6 +90,15 @@ def expect_kinds(
             wrong.append(f"{name}: {shown(value)} given, {kind.words} expected")
     if wrong:
         raise DataError("; ".join(wrong))
+
+
+def expect_one_of(
+    choices: Sequence[str], error: type[PteronError] = DataError, **given: object
+) -> None:
+    """Refuse values, by the names of their arguments, that are none of the choices."""
+    for name, value in given.items():
+        if value not in choices:
+            raise error(f"{name}: {value!r} is not one of {', '.join(choices)}")
 
 
 def expect_to_fit(name: str, given: object, numbers: float) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Sequence
 from reprlib import Repr
 from typing import Any
@@ -65,6 +67,14 @@ class OutputError(PteronError):
 
 class UnlikelyValue(UserWarning):
     """A value that is possible, but likely in another unit, such as millimetres or degrees."""
+
+
+def warn_unlikely(text: str) -> None:
+    """Issue a warning, `UnlikelyValue`, at the line outside of Pteron that gave the value."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back and frame.f_globals.get("__name__", "").startswith("pteron."):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, UnlikelyValue, stacklevel=level)
 
 
 class UnreachablePose(PteronError):

@@ -6,6 +6,7 @@ import json
 import sys
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distribution
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -25,7 +26,7 @@ def of_extra(extra: str, module: str, need: str, error: type[PteronError] | None
     module : str
         The module's name, with its packages.
     need : str
-        Who needs what, as the message begins: "the viewer needs viser".
+        Who needs what, as the message begins: "films need FFmpeg".
     error : type of PteronError, optional
         The error that is raised, by default `ModelError`.
     """
@@ -37,6 +38,15 @@ def of_extra(extra: str, module: str, need: str, error: type[PteronError] | None
 
         told = f"{need}, which is not installed; {install_command(extra)}"
         raise (error or ModelError)(told) from None
+
+
+def expect_extra(extra: str, module: str, need: str) -> None:
+    """Refuse, before anything slow is imported, to go on without a module that an extra brings.
+
+    The parameters are those of `of_extra`; the module's name has no dots.
+    """
+    if find_spec(module) is None:
+        of_extra(extra, module, need)
 
 
 def install_command(extra: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import asdict, is_dataclass
 from typing import Any
@@ -15,6 +16,11 @@ def json_ready(data: Any) -> Any:
         return [json_ready(value) for value in data]
     data = data.item() if hasattr(data, "item") else data
     return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def json_text(data: Any) -> str:
+    """Return data as the text of a JSON file."""
+    return json.dumps(json_ready(data), indent=1, allow_nan=False) + "\n"
 
 
 def picked(owner: object, *names: str) -> dict[str, Any]:

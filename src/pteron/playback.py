@@ -13,10 +13,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shown, warn_unlikely
 from pteron.identification.logs import Description, Log, LogFile, find_description, read_log
 from pteron.identification.signals import States, preprocessing_of, samples, spline_motion
 from pteron.kernels import Array
+from pteron.kinematics.unlikely_values import warn_of_unlikely
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import reading_scales
 from pteron.motion import Motion, Simulation, check_motion, replay
@@ -32,6 +33,9 @@ from pteron.tables import (
     whole_table,
 )
 from pteron.workspace import home_pose
+
+_SLOW = 0.5
+"""Time between samples above which a warning is given, s."""
 
 
 @dataclass(frozen=True)
@@ -166,6 +170,11 @@ def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
     if start is None and not set(rows.columns) >= set(robot.coordinates):
         start = home_pose(robot)
     motion = replay(robot, rows, start=start)
+    names = [name for name in (*robot.coordinates, *robot.joint_names) if name in rows.columns]
+    warn_of_unlikely(robot, names, rows.numbers(names), f"{rows.source}: ")
+    if (step := float(np.median(np.diff(motion.time)))) >= _SLOW:
+        text = f"{rows.source}: t in steps of {step:g}: are these ms? s are expected"
+        warn_unlikely(text)
     has_forces = set(rows.columns) >= set(robot.force_names)
     forces = rows.numbers(robot.force_names) / reading_scales(robot) if has_forces else None
     return Playback(motion, forces, Path(rows.source).name)

@@ -7,10 +7,30 @@ class: ``old = former_attribute("old", "new")``.
 from __future__ import annotations
 
 import warnings
-from pkgutil import resolve_name
+from importlib import import_module
 from typing import Any
 
+_MOVED = {
+    "bodies": "PlanarInertia RodInertia Parameter",
+    "kinematics": (
+        "Architecture JointMotion architecture assembly_mode constraint_measure "
+        "is_singular_everywhere joint_accelerations joint_rates joint_screws "
+        "link_jacobians link_vectors position_of singular_orientations twist_jacobian "
+        "velocity_of working_mode"
+    ),
+    "legs": "PRR PRRR PSS RPR RRR RSS RUPU Cone Drive Leg Stribeck",
+    "manipulator": "Radii parameter_data parameter_units",
+    "platforms": "Bar Geared Platform",
+    "reduction": "BaseParameters cheapest_parameters",
+}
+"""Names that stood in `pteron` itself, by the package that has them."""
+
 RENAMED = {
+    "pteron": {
+        name: f"pteron.{package}.{name}"
+        for package, names in _MOVED.items()
+        for name in names.split()
+    },
     "pteron.design": {"Told": "pteron.design.ReportedDesign"},
     "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
     "pteron.identification": {
@@ -71,7 +91,10 @@ def former_name(package: str, name: str) -> Any:
         DeprecationWarning,
         stacklevel=3,
     )
-    return resolve_name(present)
+    try:
+        return getattr(import_module(module), own)
+    except AttributeError:
+        return import_module(present)
 
 
 def former_attribute(former: str, present: str) -> property:

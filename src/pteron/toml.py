@@ -174,6 +174,8 @@ def fault_lines(error: ValidationError, model: Any) -> list[str]:
     schema = _schema(model)
     lines = []
     for fault in error.errors(include_url=False):
+        if fault["type"] == "too_short" and len(fault["input"]) >= fault["ctx"]["min_length"]:
+            continue  # some of its items are faults
         location = fault["loc"]
         # What a list of fixed length lacks is a fault of the list.
         if fault["type"] == "missing" and location and isinstance(location[-1], int):
@@ -215,6 +217,14 @@ def _fault(fault: Any, schema: _Node, location: tuple[int | str, ...]) -> str:
         key = ".".join(str(part) for part in location)
         return f"[{key}] is one table, a list of tables expected; write [[{key}]] above each"
     expected = _words(node)
+    whole = all(isinstance(part, str) for part in location)
+    if expected == "a table" and whole and not isinstance(fault["input"], dict):
+        key = ".".join(str(part) for part in location)
+        return f"{given} given, a table expected: [{key}] with {', '.join(_keys(node, ''))}"
+    if kind in ("too_short", "too_long") and "prefixItems" not in node:
+        least, most = context.get("min_length"), context.get("max_length")
+        count = f"at least {least}" if kind == "too_short" else f"at most {most}"
+        return f"{given} given, {expected} expected, {count} of them"
     if kind == "missing" and fault["loc"] == location:
         return f"missing; the file must give {expected or 'it'}"
     if kind in _BOUNDS:
@@ -276,5 +286,7 @@ def _words(node: _Node) -> str:
     several = node.get("prefixItems", [])
     item = _words(several[0] if several else node.get("items", {}))
     count = f"{len(several)} " if several else ""
-    plural = "s" * (len(several) != 1)
-    return f"a list of {count}{item.removeprefix('a ')}{plural}" if item else "a list"
+    item = item.removeprefix("a ")
+    if item.startswith("list"):
+        return f"a list of {count}lists{item.removeprefix('list')}"
+    return f"a list of {count}{item}{'s' * (len(several) != 1)}" if item else "a list"

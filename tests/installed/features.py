@@ -12,7 +12,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from urllib.request import urlopen
 
 import numpy as np
 
@@ -21,16 +20,16 @@ import pteron
 POSE = [0.01, -0.02, 0.03, 0.2]
 VELOCITY, ACCELERATION = [0.1, 0.0, -0.2, 1.0], [2.0, 1.0, 0.0, 5.0]
 FORCES = [31.909, -2.963, 8.508, 5.71]
-"""N, as README prints them."""
+"""N, as docs/start/tour.md prints them."""
 
 
 def expect_forces(forces: object) -> None:
-    """Refuse forces that are not those of README."""
+    """Refuse forces that are not those of the tour."""
     np.testing.assert_allclose(np.asarray(forces), FORCES, atol=6e-4)
 
 
 def first_results() -> None:
-    """Try what README shows first, and that a missing compiler is missed only where it is asked."""
+    """Try what the tour shows first; a missing compiler is missed only where it is asked."""
     robot = pteron.load("quadrupteron")
     state = POSE, VELOCITY, ACCELERATION
     expect_forces(pteron.inverse_dynamics(robot, *state))
@@ -155,12 +154,6 @@ def surfaces() -> None:
     assert all(len(one.triangles) for one in pteron.maps.surfaces(found, "condition"))
 
 
-def viewer() -> None:
-    """Serve the page of the viewer."""
-    with pteron.viewer.view("delta", port=8123) as shown, urlopen(shown.url) as page:
-        assert b"<html" in page.read()
-
-
 EXTRAS: dict[str, tuple[Callable[[], None], str]] = {
     "cluster": (cluster, "distributed"),
     "consistency": (consistency, "clarabel"),
@@ -172,7 +165,6 @@ EXTRAS: dict[str, tuple[Callable[[], None], str]] = {
     "numba": (numba, "numba"),
     "oracles": (oracles, "mujoco"),
     "surfaces": (surfaces, "skimage"),
-    "viewer": (viewer, "viser"),
 }
 """What tries an extra, and a module that it brings."""
 

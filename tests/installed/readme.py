@@ -1,9 +1,10 @@
-"""README's commands in a fresh copy of this clone, set up as README says: ``make first``.
+"""The commands of README and of the tour in a fresh copy of this clone: ``make first``.
 
-What `git` tracks is copied to an empty folder, `make demo` is run there, and then each command that
-README shows with `.venv/bin/`, one after the other, in an empty home. `log.csv` and its held-out
-companion, which a reader records on the machine, are recorded in simulation. A viewer must answer
-and is then ended. It takes some minutes; seconds and commands are printed.
+What `git` tracks is copied to an empty folder, `make demo` is run there, as README says, and then
+each command that README and docs/start/tour.md show with `.venv/bin/`, one after the other, in an
+empty home. `log.csv` and its held-out companion, which a reader records on the machine, are
+recorded in simulation. A viewer must answer and is then ended. It takes some minutes; seconds and
+commands are printed.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ from urllib.request import urlopen
 
 ROOT = Path(__file__).parents[2]
 RECORDED = {"log.csv": "motion.csv", "held-out-log.csv": "motion-held-out.csv"}
-"""Logs that README's commands read, and the motions that are recorded for them."""
+"""Logs that the commands read, and the motions that are recorded for them."""
 
 OPENED = 60.0
 """s, within which a viewer must answer."""
 
 
 def commands(text: str) -> list[list[str]]:
-    """Return README's commands of the environment, as words, without remarks."""
+    """Return a page's commands of the environment, as words, without remarks."""
     lines = re.findall(r"(?m)^ {4}(?:\$ )?(\.venv/bin/.*)$", text)
     return [
         [word for word in shlex.split(re.split(r" +# ", line)[0]) if word != "..."]
@@ -96,7 +97,8 @@ def main() -> None:
                 raise SystemExit(f"exit code {done.returncode}: {done.stdout}{done.stderr}")
 
         run("make", "demo", f"PYTHON={sys.executable}")
-        for words in commands((ROOT / "README.md").read_text(encoding="utf-8")):
+        pages = (ROOT / name for name in ("README.md", "docs/start/tour.md"))
+        for words in commands("".join(page.read_text(encoding="utf-8") for page in pages)):
             if "view" in words:
                 expect_viewer(words, clone, environment)
                 continue

@@ -37,6 +37,6 @@ def platform_state(
     pose = pteron.follow(robot, joints, pteron.workspace.home_pose(robot))
     jacobian = pteron.jacobian(robot, pose)
     velocity = np.linalg.solve(jacobian, rates[..., None])[..., 0]
-    drift = pteron.joint_accelerations(robot, pose, velocity, np.zeros_like(pose))
+    drift = pteron.kinematics.joint_accelerations(robot, pose, velocity, np.zeros_like(pose))
     acceleration = np.linalg.solve(jacobian, (accelerations - drift.actuated)[..., None])[..., 0]
     return State(pose, velocity, acceleration)

@@ -108,7 +108,7 @@ def joint_damping(machine: Tree) -> Array:
     for i, leg in enumerate(legs):
         actuated, upper, lower = unit[first + 3 * i : first + 3 * i + 3]
         rows += [upper, lower]
-        if isinstance(leg, pteron.Leg):
+        if isinstance(leg, pteron.legs.Leg):
             along = float(np.dot(leg.direction, robot.platform.axis))
             if robot.platform.turns and abs(along) > _PARALLEL:
                 rows.append(np.sign(along) * turn - upper - lower)

@@ -51,8 +51,10 @@ class Fourier:
     def __call__(self, time: Array) -> tuple[Array, Array, Array]:
         """Return joint coordinates, rates and accelerations, (T, n) each."""
         pose, velocity, acceleration = self.platform(np.asarray(time, dtype=float))
-        rates = pteron.joint_rates(self.robot, pose, velocity)
-        accelerations = pteron.joint_accelerations(self.robot, pose, velocity, acceleration)
+        rates = pteron.kinematics.joint_rates(self.robot, pose, velocity)
+        accelerations = pteron.kinematics.joint_accelerations(
+            self.robot, pose, velocity, acceleration
+        )
         return pteron.inverse_kinematics(self.robot, pose), rates.actuated, accelerations.actuated
 
 

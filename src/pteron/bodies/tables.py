@@ -30,6 +30,11 @@ Three = tuple[Number, Number, Number]
 Six = tuple[Number, Number, Number, Number, Number, Number]
 
 
+def key(about: str, default: Any = ..., *example: Any) -> Any:
+    """Return a key of a table: what it is, its default where it has one, and an example."""
+    return Field(default, description=about, examples=list(example) or None)
+
+
 class Table(BaseModel):
     """A TOML table in which an unknown key is an error."""
 

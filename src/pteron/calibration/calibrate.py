@@ -13,7 +13,6 @@ from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import raw_fault
 from pteron.calibration.residual_faults import residual_faults
-from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Calibration, HeldOut, calibrated, values_of
 from pteron.calibration.start import placed, starting_poses
 from pteron.calibration.unknowns import blocks_of
@@ -111,10 +110,10 @@ def calibrate(
         partial = Fitter(rows, blocks, start, starting_poses(start, rows)).run()
         other = held_out if held_out is not None else measurements.rows(~kept)
         judged = _held_out(start, partial, blocks, other)
-    fit = Fitter(measurements, blocks, start, poses).run(partial)
-    slopes = _scaled_slopes(start, fit, blocks, measurements)
-    shown = observability_of(start, measurements, blocks, slopes, seed)
-    findings = residual_faults(start, fit, blocks, measurements)
+    fitter = Fitter(measurements, blocks, start, poses)
+    fit = fitter.run(partial)
+    shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
+    findings = residual_faults(fitter, fit)
     return Calibration(
         robot,
         calibrated(fit.guess),
@@ -164,15 +163,15 @@ def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurem
     return HeldOut(int(new.measured.any(axis=1).sum()), **errors)
 
 
-def _scaled_slopes(start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements) -> Array:
+def _scaled_slopes(fitter: Fitter, fit: Fit) -> Array:
     """Return slopes at the measured poses on the machine as drawn, by noise and tolerance."""
-    slopes = MachineSlopes(start.robot, blocks)
+    slopes, start, given = fitter.slopes, fitter.begin, fitter.given
     chosen = evenly(len(given), _RANK_ROWS)
     poses = slopes.poses(start, start.joints(given.readings), fit.poses)
     chosen = chosen[np.isfinite(poses[chosen]).all(axis=1)]
     at = slopes.rows(start, given, poses, chosen)
     sizes = np.array([fit.noise[kind] for kind in given.kind_of])
-    tolerances = tolerances_of(blocks)
+    tolerances = tolerances_of(fitter.blocks)
     tolerances[~np.isfinite(tolerances)] = 1.0
     more = np.sqrt(len(given) / max(len(chosen), 1))
     flat = (more * at.slopes / sizes[:, None] * tolerances).reshape(-1, len(tolerances))

@@ -8,7 +8,7 @@ follow from the same geometry. Where the probe touched, the tool's height is 0.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -238,13 +238,7 @@ def _linuxcnc(text: str, source: str) -> Iterator[_Touched]:
         yield _Touched(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
 
 
-_READERS: tuple[Callable[[str, str], Iterator[_Touched]], ...] = (
-    _map,
-    _g30,
-    _klippy,
-    _marlin,
-    _linuxcnc,
-)
+_READERS = (_map, _g30, _klippy, _marlin, _linuxcnc)
 
 
 def _xyz(x: float, y: float, z: float) -> dict[str, float]:
@@ -266,17 +260,14 @@ def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measureme
     joints = inverse_kinematics(robot, poses, on_failure="nan")
     lost = np.isnan(joints).any(axis=-1)
     if lost.any():
-        raise DataError(
-            told(
-                [
-                    f"{one.place}: the machine as drawn does not reach "
-                    f"{' '.join(f'{a.letter}{one.at.get(a.letter, 0.0):g}' for a in axes)}; is "
-                    "z = 0 the bed in its file?"
-                    for one, bad in zip(touched, lost, strict=True)
-                    if bad
-                ]
-            )
-        )
+        faults = [
+            f"{one.place}: the machine as drawn does not reach "
+            f"{' '.join(f'{a.letter}{one.at.get(a.letter, 0.0):g}' for a in axes)}; is z = 0 the "
+            "bed in its file?"
+            for one, bad in zip(touched, lost, strict=True)
+            if bad
+        ]
+        raise DataError(told(faults))
     heights = 1e-3 * np.array([one.height for one in touched])
     found = Measurements.of(robot, to_readings(robot, joints), heights=heights)
     return replace(found, places=tuple(one.place for one in touched))

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
-from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import KINDS, Measurements
@@ -111,13 +110,13 @@ class Fit:
         size = np.sqrt(np.diag(matrix))
         size[size == 0.0] = 1.0
         try:
-            factor = cho_factor(matrix / np.outer(size, size))
+            factor = scipy.linalg.cho_factor(matrix / np.outer(size, size))
         except np.linalg.LinAlgError:
             raise DataError(
                 "the measurements leave open what has no tolerance: free less, or give `prior` "
                 "finite standard deviations"
             ) from None
-        inverse = cho_solve(factor, np.eye(len(size))) / np.outer(size, size)
+        inverse = scipy.linalg.cho_solve(factor, np.eye(len(size))) / np.outer(size, size)
         return np.asarray(
             inverse if np.ndim(self.shared) == 0 else inverse + inverse @ self.shared @ inverse
         )
@@ -174,7 +173,9 @@ class Fitter:
             at = self._settled(at)
             noise = at.noise | self._noise(at, sought)
             scaled = at.distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
-            limits = chi2.isf(_OUTLYING / len(kept), np.maximum(at.measured.sum(axis=1), 1))
+            limits = scipy.stats.chi2.isf(
+                _OUTLYING / len(kept), np.maximum(at.measured.sum(axis=1), 1)
+            )
             kept = scaled**2 <= limits
             if 2 * kept.sum() < len(kept):  # no rows are the faultless ones
                 kept[:] = True
@@ -273,7 +274,7 @@ class Fitter:
             r[lost[chosen]], slopes[lost[chosen]] = 0.0, 0.0
             squares = np.einsum("nk,nk->n", r, r)
             distances[chosen] = np.sqrt(squares)
-            limit = np.sqrt(chi2.ppf(_DOUBTED, np.maximum(at.measured.sum(axis=1), 1)))
+            limit = np.sqrt(scipy.stats.chi2.ppf(_DOUBTED, np.maximum(at.measured.sum(axis=1), 1)))
             far = np.maximum(distances[chosen], limit)
             weights = np.where(kept[chosen], limit / far, 0.0)
             cost += float(

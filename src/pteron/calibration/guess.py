@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.calibration.measurements import TOOL, Measurements, Place, Plane
 from pteron.calibration.variations import Variation, varied
@@ -129,27 +130,24 @@ class Block:
             values = getattr(guess, self.kind).copy()
             values[list(self.legs)] += step
             return replace(guess, **{self.kind: values})
-        if self.kind == "mark":
-            return replace(guess, marks={**guess.marks, self.name: guess.marks[self.name] + step})
-        if self.kind == "anchor":
-            at = guess.anchors[self.name] + step
-            return replace(guess, anchors={**guess.anchors, self.name: at})
+        if self.kind in ("mark", "anchor"):
+            places = getattr(guess, f"{self.kind}s")
+            moved: Any = {**places, self.name: places[self.name] + step}
+            return replace(guess, **{f"{self.kind}s": moved})
         if self.kind == "plane":
             normal, offset = guess.planes[self.name][:3], guess.planes[self.name][3]
             tilted = normal + across(normal) @ step[:2]
             plane = np.append(tilted / np.linalg.norm(tilted), offset + step[2])
             return replace(guess, planes={**guess.planes, self.name: plane})
-        turn = Rotation.from_rotvec(step[3:]).as_matrix() @ guess.turn
+        turn = scipy.spatial.transform.Rotation.from_rotvec(step[3:]).as_matrix() @ guess.turn
         return replace(guess, turn=turn, shift=guess.shift + step[:3])
 
     def values(self, guess: Guess) -> Array:
         """Return a guess's values of this block; of a direction, which turns, 0."""
         if self.kind in ("zeros", "scales"):
             return np.asarray(getattr(guess, self.kind)[list(self.legs)])
-        if self.kind == "mark":
-            return guess.marks[self.name]
-        if self.kind == "anchor":
-            return guess.anchors[self.name]
+        if self.kind in ("mark", "anchor"):
+            return np.asarray(getattr(guess, f"{self.kind}s")[self.name])
         if self.kind == "plane":
             return np.array([0.0, 0.0, guess.planes[self.name][3]])
         if self.kind == "frame":

@@ -7,7 +7,6 @@ columns.
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,9 +17,9 @@ import polars as pl
 from numpy.typing import NDArray
 
 from pteron.calibration.controller_logs import read_controller_log
-from pteron.calibration.measurements import TOOL, Measurements, Setup
+from pteron.calibration.measurements import TEXTS, TOOL, VALUES, Measurements, Setup
 from pteron.calibration.setup_file import joined as joined_setups, read_setup_file
-from pteron.errors import DataError, UnlikelyValue, shown
+from pteron.errors import DataError, shown, warn_unlikely
 from pteron.kinematics.unlikely_values import unlikely_length, unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings
@@ -99,7 +98,7 @@ def _read(robot: Manipulator, path: str | Path) -> Measurements:
     if faults:
         raise DataError(told(faults), subject=source)
     for text in _unlikely(robot, found, source):
-        warnings.warn(text, UnlikelyValue, stacklevel=3)
+        warn_unlikely(text)
     return found
 
 
@@ -144,7 +143,7 @@ def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _O
     if unread := [name for name in unread if name not in others]:
         text = f"{file.source}: {listed(unread)}: not read; what is measured is called "
         text += listed([*dict.fromkeys((*_POSITION, *robot.coordinates)), "height", "distance"])
-        warnings.warn(text, UnlikelyValue, stacklevel=5)
+        warn_unlikely(text)
     table = whole_table(file)
     first = _first_line(table)
     if first is not None:  # each is else looked for from the file's beginning
@@ -314,12 +313,11 @@ def _joined(parts: Sequence[Measurements], sources: Sequence[str]) -> Measuremen
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0, *map(len, parts)])
-    texts = ("marks", "planes", "anchors", "places")
     whole: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("readings", "positions", "angles", "heights", "distances")
+        for name in ("readings", *VALUES)
     }
-    whole |= {name: sum((getattr(part, name) for part in parts), ()) for name in texts}
+    whole |= {name: sum((getattr(part, name) for part in parts), ()) for name in TEXTS}
     if all(part.times is not None for part in parts):
         whole["times"] = np.concatenate([part.times for part in parts if part.times is not None])
     moved = [

@@ -19,6 +19,9 @@ from pteron.manipulator import Manipulator
 KINDS = ("position", "angle", "height", "distance")
 """Kinds of measurements, each with a noise of its own."""
 
+VALUES, TEXTS = tuple(f"{kind}s" for kind in KINDS), ("marks", "planes", "anchors", "places")
+"""Fields with what was measured in each row, by kind, and what each row is called by."""
+
 TOOL = ""
 """Name of the mark or plane of a row that names none: the tool, and the plane z = 0."""
 
@@ -218,10 +221,9 @@ class Measurements:
         number = np.cumsum(kept) - 1
         origins = np.where(self.origins[kept] >= 0, number[self.origins[kept]], -1)
         changed: dict[str, Any] = {
-            name: tuple(np.array(getattr(self, name), dtype=object)[kept])
-            for name in ("marks", "planes", "anchors", "places")
+            name: tuple(np.array(getattr(self, name), dtype=object)[kept]) for name in TEXTS
         }
-        for name in ("positions", "angles", "heights", "distances"):
+        for name in VALUES:
             changed[name] = getattr(self, name)[kept]
             changed[name][~chosen[kept]] = np.nan
         times = None if self.times is None else self.times[kept]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.exact_rank import RowKind, exact_rank
+from pteron.calibration.exact_rank import exact_rank
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.unseen import told, unseen_combinations
@@ -75,7 +75,7 @@ class Observability:
         )
         here = (
             f"At the measured poses {self.at_poses} (smallest singular value kept "
-            f"{self.smallest_kept:.1e}, largest dropped {self.largest_dropped:.1e})."
+            f"{self.smallest_kept:.2g}, largest dropped {self.largest_dropped:.2g})."
         )
         if self.at_poses < self.rank:
             here += " More, or other, poses would show more."
@@ -105,19 +105,7 @@ def observability_of(
     sizes, axes = _spectrum(slopes, count)
     relative = sizes / max(float(sizes[0]), 1e-300)
     here = int((relative > _ROUNDING).sum())
-    levels = {
-        name: np.unique(given.heights[[plane == name for plane in given.planes]])
-        for name in set(given.planes)
-    }
-    parts = given.positions, given.angles, given.heights, given.distances
-    seen = np.isnan(np.column_stack(parts))
-    ends = [given.marks[row] if row >= 0 else None for row in given.origins]
-    alike = zip(
-        (row.tobytes() for row in seen), given.marks, given.planes, given.anchors, ends, strict=True
-    )
-    some = dict(zip(alike, range(len(given)), strict=True)).values()
-    kinds = tuple(sorted({_kind(given, i, levels) for i in some}, key=repr))
-    rank, primes, rows = exact_rank(start, blocks, kinds, seed)
+    rank, primes, rows = exact_rank(start, blocks, given, seed)
     tolerances = tolerances_of(blocks)
     tolerances[~np.isfinite(tolerances)] = 1.0
     names = [unknown.name for block in blocks for unknown in block.unknowns]
@@ -126,17 +114,11 @@ def observability_of(
         for k in reversed(range(here))
         if sizes[k] < 1.0
     ]
-    return Observability(
-        here if rank is None else rank,
-        count,
-        primes,
-        rows,
-        here,
-        float(relative[here - 1]) if here else 0.0,
-        float(relative[here]) if here < count else 0.0,
-        unseen_combinations(start, blocks, axes[here:], tolerances),
-        tuple(weak[:_NAMED]),
-    )
+    kept, dropped = np.append(0.0, relative)[here], np.append(relative, 0.0)[here]
+    exact = here if rank is None else rank, count, primes, rows
+    unseen = unseen_combinations(start, blocks, axes[here:], tolerances)
+    sizes_beside = here, float(kept), float(dropped)
+    return Observability(*exact, *sizes_beside, unseen, tuple(weak[:_NAMED]))
 
 
 def _spectrum(slopes: Array, count: int) -> tuple[Array, Array]:
@@ -146,18 +128,3 @@ def _spectrum(slopes: Array, count: int) -> tuple[Array, Array]:
     padded[: len(small)] = small
     _, sizes, axes = np.linalg.svd(padded)
     return sizes, axes
-
-
-def _kind(given: Measurements, i: int, levels: dict[str, Array]) -> RowKind:
-    over = bool(~np.isnan(given.heights[i]))
-    return RowKind(
-        tuple((~np.isnan(given.positions[i])).tolist()),
-        tuple((~np.isnan(given.angles[i])).tolist()),
-        over,
-        bool(~np.isnan(given.distances[i])),
-        given.marks[i],
-        given.planes[i] if ~np.isnan(given.heights[i]) else "",
-        given.anchors[i] if given.origins[i] < 0 else None,
-        given.marks[given.origins[i]] if given.origins[i] >= 0 else "",
-        float(given.heights[i]) if len(levels[given.planes[i]]) == 1 and over else None,
-    )

@@ -12,6 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect_one_of
 from pteron.calibration.guess import Guess, tolerances_of, variances
 from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, Plane, Setup
 from pteron.calibration.residuals import MachineSlopes
@@ -145,12 +146,8 @@ def plan(
     robot = as_manipulator(robot)
     if count < 1:
         raise DataError(f"count: {count} given, 1 or more expected")
-    for name, value, choices in (
-        ("measure", measure, Measure),
-        ("criterion", criterion, Criterion),
-    ):
-        if value not in get_args(choices):
-            raise DataError(f"{name}: {value!r} is not one of {', '.join(get_args(choices))}")
+    expect_one_of(get_args(Measure), measure=measure)
+    expect_one_of(get_args(Criterion), criterion=criterion)
     if measure != "poses" and not (robot.platform.lengths or any(robot.platform.tool)):
         raise DataError(
             f"measure: {measure} of a point that stays where it is show nothing of this machine; "

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
 from pteron.calibration.guess import Block, Guess, Unknown
@@ -53,13 +53,11 @@ class Trial(NamedTuple):
     """Residuals (N, K) less those without it, before the other unknowns follow."""
 
 
-def residual_faults(
-    start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
-) -> tuple[Finding, ...]:
+def residual_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
     """Return the fault that explains most residuals, and the rows that do not fit even so."""
-    found, explained = _shown(start, fit, blocks, given)
-    found = found or tuple(_bad_leg(start, fit, blocks, given))
-    return *found, *_outliers(fit, given, ~fit.kept & ~explained)
+    found, explained = _shown(fitter, fit)
+    found = found or tuple(_bad_leg(fitter, fit))
+    return *found, *_outliers(fit, fitter.given, ~fit.kept & ~explained)
 
 
 def _outliers(fit: Fit, given: Measurements, out: NDArray[np.bool_]) -> tuple[Finding, ...]:
@@ -82,10 +80,9 @@ def _size(fit: Fit, row: int) -> str:
     return f"off by {1e3 * abs(left[k]):.3g} {'mrad' if angle else 'mm'}"
 
 
-def _shown(
-    start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
-) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
+def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
     """Return the fault, if any, that best explains what noise does not, and the rows (N,) so."""
+    start, blocks, given = fitter.begin, fitter.blocks, fitter.given
     count = blocks[-1].where.stop
     more = _extended(blocks, given, len(start.robot.legs))
     fitter = Fitter(given, (*blocks, *more), start, fit.poses)
@@ -128,12 +125,12 @@ def _shown(
     frame = [block for block in blocks if block.kind == "frame"]
     for trial in _trials(start, given, chosen, slopes, [*more, *frame], score):
         tried += 1
-        more_than_chance = trial.fall - float(chi2.isf(0.5, trial.freedom))
+        more_than_chance = trial.fall - float(scipy.stats.chi2.isf(0.5, trial.freedom))
         if more_than_chance > gain:
             best, gain = trial, more_than_chance
     explained = np.zeros(len(given), dtype=bool)
     share = _SHARE * float(squares.sum()) / variance
-    if best is None or best.fall <= max(chi2.isf(_CHANCE / tried, best.freedom), share):
+    if best is None or best.fall <= max(scipy.stats.chi2.isf(_CHANCE / tried, best.freedom), share):
         return (), explained
     after = np.linalg.norm(left + remaining(best.moved), axis=-1)
     explained[chosen] = after < _EXPLAINED * np.linalg.norm(left, axis=-1)
@@ -198,17 +195,14 @@ def _trials(
             yield Trial(f"moved {block.kind}", text, len(amounts), fall, moved)
 
 
-def _bad_leg(
-    start: Guess, fit: Fit, blocks: tuple[Block, ...], given: Measurements
-) -> Iterator[Finding]:
+def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
     """Yield the leg whose coordinate alone explains residuals that are not noise."""
-    if not set(given.setup.noise) - {"readings"}:
+    if not set(fitter.given.setup.noise) - {"readings"}:
         return  # noise that was found explains everything
-    names = start.robot.joint_names
-    fitter = Fitter(given, blocks, start, fit.poses)
+    names = fitter.begin.robot.joint_names
     kept = np.flatnonzero(fit.kept)
     chosen = kept[evenly(len(kept), _ROWS)]
-    at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
+    at = fitter.slopes.rows(fit.guess, fitter.given, fit.poses, chosen)
     sizes = np.array([fit.noise[kind] for kind in fitter.kind_of])
     r, columns = at.residuals / sizes, at.by_reading[..., : len(names)] / sizes[:, None]
     along = np.einsum("nki,nk->ni", columns, r)

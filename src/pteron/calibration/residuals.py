@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.calibration.guess import Block, Guess, across
 from pteron.calibration.measurements import Measurements, length_columns, position_axes
@@ -91,17 +91,15 @@ class MachineSlopes:
 
     def joints(self, guess: Guess, poses: Array) -> Array:
         """Return the joint coordinates (N, n) at poses."""
-        return np.asarray(self._kernel(np.array(numbers(guess.robot)), poses)[0])
+        return self._outputs(guess, poses)[0]
 
     def jacobian(self, guess: Guess, poses: Array) -> Array:
         """Return the joints' slopes (N, n, m) against the pose."""
-        return np.asarray(self._kernel(np.array(numbers(guess.robot)), poses)[1])
+        return self._outputs(guess, poses)[1]
 
     def pose_slopes(self, guess: Guess, given: Measurements, poses: Array) -> tuple[Array, Array]:
         """Return the slopes of poses at given joints (N, m, p), and of their marks (N, 3, p)."""
-        chosen = np.arange(len(poses))
-        place, turned, slopes = self._platform(guess, given, poses, chosen)
-        _, moved = self._marks(guess, given, chosen, place, turned, slopes)
+        _, moved, slopes = self._marks(guess, given, poses, np.arange(len(poses)))
         lengths = np.eye(3) if len(self._lengths) == 3 else self._axes[self._lengths]
         whole = np.concatenate([lengths @ slopes[:, :3], slopes[:, 6:]], axis=1)
         return whole[..., : self.count], moved[..., : self.count]
@@ -112,180 +110,180 @@ class MachineSlopes:
 
     def rows(self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers) -> Rows:
         """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
-        n, k = len(chosen), len(self._angular)
-        residuals = np.zeros((n, 5 + k))
         measured = ~np.isnan(np.hstack([part[chosen] for part in given.parts.values()]))
-        # Against all unknowns, and behind them against the joint coordinates, of two rows
-        legs = len(guess.robot.legs)
-        slopes = np.zeros((n, 5 + k, self.count + 2 * legs))
-        own = slopes[..., : self.count + legs]
-        place, turned, moves = self._platform(guess, given, poses, chosen)
-        point, moved = self._marks(guess, given, chosen, place, turned, moves)
-
+        point, apart, slopes = self.slopes(guess, given, poses, chosen, measured)
+        residuals = np.zeros(measured.shape)
         if measured[:, :3].any():
-            # In the instrument's frame: turn' (p - shift).
-            arms = point - guess.shift
             full = np.where(measured[:, :3], given.positions[chosen], 0.0) @ self._axes
-            residuals[:, :3] = (arms @ guess.turn - full) @ self._axes.T
-            local = guess.turn.T @ moved
-            if (frame := self._frame) is not None:
-                local[:, :, frame.start : frame.start + 3] -= guess.turn.T
-                local[:, :, frame.start + 3 : frame.stop] += guess.turn.T @ _skew(arms)
-            own[:, :3] = self._axes @ local
-        if measured[:, 3 : 3 + k].any():
-            own[:, 3 : 3 + k] = moves[:, 6:]
-            self._angles(guess, given, poses, chosen, residuals, slopes)
+            residuals[:, :3] = ((point - guess.shift) @ guess.turn - full) @ self._axes.T
+        if measured[:, 3:-2].any():
+            residuals[:, 3:-2] = self._angles(guess, poses[chosen], given.angles[chosen])
         if measured[:, -2].any():
             planes = np.stack([guess.planes[given.planes[i]] for i in chosen])
-            normals = planes[:, :3]
-            residuals[:, -2] = _dot(normals, point) - planes[:, 3] - given.heights[chosen]
-            own[:, -2] = np.einsum("ni,nik->nk", normals, moved)
-            for block in self.blocks:
-                if block.kind == "plane":
-                    here = np.array([given.planes[i] == block.name for i in chosen])
-                    tilt = across(guess.planes[block.name][:3])
-                    slopes[here, -2, block.where] += np.column_stack(
-                        [point[here] @ tilt, -np.ones(here.sum())]
-                    )
+            residuals[:, -2] = _dot(planes[:, :3], point) - planes[:, 3] - given.heights[chosen]
         if measured[:, -1].any():
-            apart, drifted = self._apart(guess, given, poses, chosen, point, moved)
-            length = np.linalg.norm(apart, axis=-1)
-            along = apart / np.where(length > 0.0, length, 1.0)[:, None]
-            residuals[:, -1] = length - given.distances[chosen]
-            slopes[:, -1] = np.einsum("ni,nik->nk", along, drifted)
+            residuals[:, -1] = np.linalg.norm(apart, axis=-1) - given.distances[chosen]
         residuals[~measured], slopes[~measured] = 0.0, 0.0
         return Rows(residuals, slopes[..., : self.count], slopes[..., self.count :], measured)
 
-    def _platform(
-        self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers
-    ) -> tuple[Array, Array, Array]:
-        """Return P, its axes' matrix, and slopes (N, 6 + k, p + n).
-
-        They are those of the platform's twist and of the pose's angles, against all unknowns and
-        the joint coordinates.
-        """
-        robot = guess.robot
-        geometry = np.array(numbers(robot))
-        at = poses[chosen]
-        _, jacobian, raw, twists, place, turned, *shifts = self._kernel(geometry, at)
-        if not robot.platform.tilts:
-            twists = np.zeros_like(twists)
-            lengths = robot.platform.directions
-            twists[:, :3, : len(lengths)] = lengths.T
-            if robot.platform.turns:
-                twists[:, 3:, -1] = robot.platform.axis
-            place, axes = robot.platform.at(at)
-            turned = np.swapaxes(axes, -1, -2)
-        rates = np.eye(len(robot.coordinates))[self._angular]
-        moves = np.concatenate([twists, np.broadcast_to(rates, (len(at), *rates.shape))], axis=1)
-        by_joint = np.swapaxes(
-            _solved(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
-        )
-        slopes = np.zeros((*moves.shape[:2], self.count))
-        matrix = slope_matrix(robot, self._changes, self._terms, geometry)
-        for block in self.blocks:
-            if block.kind == "geometry":
-                if shifts or (self._owner < 0).any():
-                    against = np.stack(
-                        [raw[:, i] @ matrix[part] for i, part in enumerate(self._columns)], axis=1
-                    )
-                    found = -by_joint @ against
-                    for shift in shifts:
-                        found[:, :6] += shift @ matrix[self._columns[0]]
-                else:
-                    found = np.empty((len(at), by_joint.shape[1], len(self._owner)))
-                    for i, part in enumerate(self._columns):
-                        mine = self._owner == i
-                        against = raw[:, i] @ matrix[part][:, mine]
-                        found[:, :, mine] = -by_joint[:, :, i, None] * against[:, None]
-                slopes[:, :, block.where] = found
-            elif block.kind in ("zeros", "scales"):
-                found = by_joint[:, :, list(block.legs)]
-                if block.kind == "scales":
-                    found = found * given.readings[chosen][:, None, list(block.legs)]
-                slopes[:, :, block.where] = found
-        return place, turned, np.concatenate([slopes, by_joint], axis=-1)
-
-    def _marks(
+    def slopes(
         self,
         guess: Guess,
         given: Measurements,
+        poses: Array,
         chosen: Numbers,
-        place: Array,
-        turned: Array,
-        slopes: Array,
-    ) -> tuple[Array, Array]:
-        """Return the rows' marks (N, 3) in the base frame and their slopes."""
-        own = guess.marked(given.marks[i] for i in chosen.tolist())
-        arms = np.einsum("nij,nj->ni", turned, own)
+        measured: NDArray[np.bool_],
+    ) -> tuple[Array, Array, Array]:
+        """Return marks (N, 3), how far they are from where distances begin, and slopes.
+
+        Slopes (N, K, p + 2 n) are against all unknowns, and behind them against the joint
+        coordinates, of two rows.
+        """
+        legs, frame = len(guess.robot.legs), self._frame
+        point, moved, moves = self._marks(guess, given, poses, chosen)
+        slopes = np.zeros((*measured.shape, self.count + 2 * legs), dtype=point.dtype)
+        own = slopes[..., : self.count + legs]
+        if measured[:, :3].any():
+            # In the instrument's frame: turn' (p - shift).
+            turn = self._numbers(guess.turn)
+            local = turn.T @ moved
+            if frame is not None:
+                arms = point - self._numbers(guess.shift)
+                local[:, :, frame.start : frame.start + 3] -= turn.T
+                local[:, :, frame.start + 3 : frame.stop] += turn.T @ _skew(arms)
+            own[:, :3] = self._in_base(self._axes) @ local
+        if measured[:, 3:-2].any():
+            own[:, 3:-2] = moves[:, 6:]
+            if frame is not None:
+                rates = self._rates(guess, poses[chosen])
+                slopes[:, 3:-2, frame.start + 3 : frame.stop] -= rates
+        if measured[:, -2].any():
+            normals = np.stack([guess.planes[given.planes[i]][:3] for i in chosen])
+            own[:, -2] = np.einsum("ni,nik->nk", self._in_base(normals), moved)
+            for block in self.blocks:
+                if block.kind == "plane":
+                    here = np.array([given.planes[i] == block.name for i in chosen])
+                    tilt = self._in_base(across(guess.planes[block.name][:3]).T).T
+                    slopes[here, -2, block.where] += np.column_stack(
+                        [point[here] @ tilt, -np.ones(here.sum(), dtype=point.dtype)]
+                    )
+        apart = point.copy()
+        if measured[:, -1].any():
+            drifted = np.zeros((*moved.shape[:2], moved.shape[2] + legs), dtype=point.dtype)
+            drifted[..., : moved.shape[2]] = moved
+            origins = given.origins[chosen]
+            between = measured[:, -1] & (origins >= 0)
+            if between.any():
+                end, shifted, _ = self._marks(guess, given, poses, origins[between])
+                apart[between] -= end
+                drifted[between, :, : self.count] -= shifted[..., : self.count]
+                drifted[between, :, -legs:] -= shifted[..., -legs:]
+            for i in np.flatnonzero(measured[:, -1] & ~between):
+                name = given.anchors[chosen[i]]
+                apart[i] -= self._in_base(guess.anchors[name])
+                for block in self.blocks:
+                    if block.kind == "anchor" and block.name == name:
+                        drifted[i, :, block.where] -= np.eye(3, dtype=point.dtype)
+            slopes[:, -1] = np.einsum("ni,nik->nk", self._unit(apart), drifted)
+        return point, apart, slopes
+
+    def _marks(
+        self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers
+    ) -> tuple[Array, Array, Array]:
+        """Return the rows' marks (N, 3) in the base frame, and slopes against all unknowns.
+
+        Behind these against the joint coordinates: the marks' (N, 3, p + n), and those of the
+        platform's twist and of the pose's angles (N, 6 + k, p + n).
+        """
+        at = self._outputs(guess, poses[chosen])
+        joints, jacobian, raw, twists, place, turned, *shifts = at
+        rates = np.eye(len(guess.robot.coordinates), dtype=twists.dtype)[self._angular]
+        more = np.broadcast_to(rates, (len(chosen), *rates.shape))
+        moves = np.concatenate([twists, more], axis=1)
+        by_joint = np.swapaxes(
+            self._solved(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
+        )
+        slopes = np.zeros((*moves.shape[:2], self.count), dtype=moves.dtype)
+        for block in self.blocks:
+            if block.kind == "geometry":
+                slopes[:, :, block.where] = self._by_geometry(guess, by_joint, raw, shifts)
+            elif block.kind in ("zeros", "scales"):
+                found = by_joint[:, :, list(block.legs)]
+                if block.kind == "scales":
+                    read = self._readings(given.readings[chosen], joints)
+                    found = found * read[:, None, list(block.legs)]
+                slopes[:, :, block.where] = found
+        slopes = np.concatenate([slopes, by_joint], axis=-1)
+        marks = self._numbers(guess.marked(given.marks[i] for i in chosen.tolist()))
+        arms = np.einsum("nij,nj->ni", turned, marks)
         moved = slopes[:, :3] - _skew(arms) @ slopes[:, 3:6]
         for block in self.blocks:
             if block.kind == "mark":
                 here = np.array([given.marks[i] == block.name for i in chosen])
                 moved[here, :, block.where] += turned[here]
-        return place + arms, moved
+        return place + arms, moved, slopes
 
-    def _angles(
-        self,
-        guess: Guess,
-        given: Measurements,
-        poses: Array,
-        chosen: Numbers,
-        residuals: Array,
-        slopes: Array,
-    ) -> None:
-        """Fill in the residuals of angles, and their slopes against an unknown frame."""
-        angular, at = self._angular, poses[chosen]
-        read = np.where(np.isnan(given.angles[chosen]), at[:, angular], given.angles[chosen])
-        part = slice(3, 3 + len(angular))
+    def _by_geometry(
+        self, guess: Guess, by_joint: Array, raw: Array, shifts: Sequence[Array]
+    ) -> Array:
+        """Return slopes (N, 6 + k, v) against the variations of the geometry."""
+        matrix, several = self._matrix(guess), bool(shifts) or bool((self._owner < 0).any())
+        found = np.zeros((*by_joint.shape[:2], len(self._owner)), dtype=by_joint.dtype)
+        for i, part in enumerate(self._columns):
+            mine = np.full(len(self._owner), fill_value=True) if several else self._owner == i
+            against = raw[:, i] @ matrix[part][:, mine]
+            found[:, :, mine] -= by_joint[:, :, i, None] * against[:, None]
+        for shift in shifts:
+            found[:, :6] += shift @ matrix[self._columns[0]]
+        return found
+
+    def _angles(self, guess: Guess, at: Array, measured: Array) -> Array:
+        """Return the residuals (N, k) of the angles measured at poses (N, m)."""
+        angular, platform = self._angular, guess.robot.platform
+        read = np.where(np.isnan(measured), at[:, angular], measured)
         if self._frame is None:
-            missed = at[:, angular] - read
-            residuals[:, part] = (missed + np.pi) % (2.0 * np.pi) - np.pi
-            return
-        platform, whole = guess.robot.platform, at.copy()
+            return np.asarray((at[:, angular] - read + np.pi) % (2.0 * np.pi) - np.pi)
+        whole = at.copy()
         whole[:, angular] = read
         told, now = (np.swapaxes(platform.at(x)[1], -1, -2) for x in (whole, at))
-        off = Rotation.from_matrix(now @ np.swapaxes(guess.turn @ told, -1, -2)).as_rotvec()
-        rates = self._rates(guess, at)
-        residuals[:, part] = np.einsum("nij,nj->ni", rates, off)
-        slopes[:, part, self._frame.start + 3 : self._frame.stop] -= rates
+        off = scipy.spatial.transform.Rotation.from_matrix(
+            now @ np.swapaxes(guess.turn @ told, -1, -2)
+        ).as_rotvec()
+        return np.asarray(np.einsum("nij,nj->ni", self._rates(guess, at), off))
 
     def _rates(self, guess: Guess, poses: Array) -> Array:
         """Return the matrix (N, k, 3) that takes an angular velocity to the angles' rates."""
-        platform = guess.robot.platform
-        if not platform.tilts:
-            return np.broadcast_to(np.array(platform.axis), (len(poses), 1, 3))
-        twists = self._kernel(np.array(numbers(guess.robot)), poses)[3]
-        return np.asarray(np.linalg.pinv(twists[:, 3:, self._angular]))
+        turning = self._outputs(guess, poses)[3][:, 3:, self._angular]
+        transposed = np.swapaxes(turning, -1, -2)
+        return self._solved(transposed @ turning, transposed)
 
-    def _apart(
-        self,
-        guess: Guess,
-        given: Measurements,
-        poses: Array,
-        chosen: Numbers,
-        point: Array,
-        moved: Array,
-    ) -> tuple[Array, Array]:
-        """Return marks less where their distances are from, anchors or other rows; with slopes."""
-        apart, legs = point.copy(), len(guess.robot.legs)
-        drifted = np.pad(moved, ((0, 0), (0, 0), (0, legs)))
-        measured, origins = ~np.isnan(given.distances[chosen]), given.origins[chosen]
-        between = measured & (origins >= 0)
-        if between.any():
-            others = origins[between]
-            place, turned, slopes = self._platform(guess, given, poses, others)
-            end, shifted = self._marks(guess, given, others, place, turned, slopes)
-            apart[between] -= end
-            drifted[between, :, : self.count] -= shifted[..., : self.count]
-            drifted[between, :, -legs:] -= shifted[..., -legs:]
-        for i in np.flatnonzero(measured & ~between):
-            name = given.anchors[chosen[i]]
-            apart[i] -= guess.anchors[name]
-            for block in self.blocks:
-                if block.kind == "anchor" and block.name == name:
-                    drifted[i, :, block.where] -= np.eye(3)
-        return apart, drifted
+    # What `exact_rank` does otherwise, in integers modulo a prime
+
+    def _outputs(self, guess: Guess, poses: Array) -> list[Array]:
+        """Return what the kernel gives at poses."""
+        return [*self._kernel(np.array(numbers(guess.robot)), poses)]
+
+    def _matrix(self, guess: Guess) -> Array:
+        """Return the slopes of the geometry's numbers against its variations."""
+        geometry = np.array(numbers(guess.robot))
+        return slope_matrix(guess.robot, self._changes, self._terms, geometry)
+
+    def _readings(self, readings: Array, joints: Array) -> Array:
+        return readings
+
+    def _in_base(self, vectors: Array) -> Array:
+        """Return vectors of the base frame (..., 3)."""
+        return vectors
+
+    def _numbers(self, values: Array) -> Array:
+        return values
+
+    def _unit(self, apart: Array) -> Array:
+        length = np.linalg.norm(apart, axis=-1)
+        return np.asarray(apart / np.where(length > 0.0, length, 1.0)[:, None])
+
+    def _solved(self, matrix: Array, right: Array) -> Array:
+        return _solved(matrix, right)
 
 
 def _solved(matrix: Array, right: Array) -> Array:
@@ -303,7 +301,7 @@ def _solved(matrix: Array, right: Array) -> Array:
 
 
 def _skew(v: Array) -> Array:
-    zero = np.zeros(len(v))
+    zero = np.zeros(len(v), dtype=v.dtype)
     x, y, z = v.T
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
 

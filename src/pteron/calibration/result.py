@@ -7,14 +7,15 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block, Guess, Unknown, tolerances_of, variances
 from pteron.calibration.measurements import TOOL, Measurements
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
+from pteron.json_values import picked
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 from pteron.verdict import Verdict
@@ -30,7 +31,7 @@ _BY_DATA = 0.3
 _BY_TOLERANCE = 0.9
 """The share from which on the value is that of the drawing, within its tolerance."""
 
-_QUANTILE = float(norm.ppf(0.975))
+_QUANTILE = float(scipy.stats.norm.ppf(0.975))
 
 
 @dataclass(frozen=True)
@@ -178,24 +179,18 @@ class Calibration:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the calibration as plain data, as `calibration.json` has it."""
+        values = [{**asdict(value), "interval": list(value.interval)} for value in self.values]
+        outliers = [self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)]
         return {
             "name": self.drawn.name,
-            "values": [
-                {**asdict(value), "interval": list(value.interval)} for value in self.values
-            ],
-            "zeros": self.fit.guess.zeros.tolist(),
-            "scales": self.fit.guess.scales.tolist(),
+            "values": values,
+            **picked(self.fit.guess, "zeros scales"),
             "noise": self.noise,
-            "rank": self.observability.rank,
-            "shown": self.observability.shown,
-            "columns": self.observability.columns,
+            **picked(self.observability, "rank shown columns"),
             "certificate": self.observability.summary(),
-            "unseen": list(self.observability.unseen),
-            "weak": list(self.observability.weak),
-            "held_out": None if self.held_out is None else asdict(self.held_out),
-            "findings": [asdict(finding) for finding in self.findings],
-            "verdict": self.verdict.as_dict(),
-            "outliers": [self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)],
+            **picked(self.observability, "unseen weak"),
+            **picked(self, "held_out findings verdict"),
+            "outliers": outliers,
         }
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.calibration.guess import Guess
 from pteron.calibration.measurements import Measurements, length_columns
@@ -88,7 +88,9 @@ def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
         fixed = np.array([_is_known(given, name) for name in given.marks])[seen]
         used = np.flatnonzero(seen)[fixed] if fixed.sum() >= _FEW else np.flatnonzero(seen)
         p, y = points[used], given.positions[used]
-        turn, _ = Rotation.align_vectors(p - p.mean(axis=0), y - y.mean(axis=0))
+        turn, _ = scipy.spatial.transform.Rotation.align_vectors(
+            p - p.mean(axis=0), y - y.mean(axis=0)
+        )
         matrix = turn.as_matrix()
         guess = replace(guess, turn=matrix, shift=p.mean(axis=0) - matrix @ y.mean(axis=0))
     planes = dict(guess.planes)

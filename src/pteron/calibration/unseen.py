@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess
 from pteron.calibration.variations import AXIAL
+from pteron.reduction.numerical import independent
 
 Array = NDArray[np.float64]
 
@@ -178,18 +179,8 @@ def _size(start: Guess, blocks: Sequence[Block]) -> Array:
 
 def _sparse(rows: Array) -> Array:
     """Return rows that span the same with as few parts as elimination leaves."""
-    work, top = rows.copy(), 0
-    for column in np.argsort(-np.abs(work).max(axis=0, initial=0.0), kind="stable"):
-        if top == len(work):
-            break
-        pivot = top + int(np.abs(work[top:, column]).argmax())
-        if abs(work[pivot, column]) < 1e-6:
-            continue
-        work[[top, pivot]] = work[[pivot, top]]
-        work[top] /= work[top, column]
-        for i in range(len(work)):
-            if i != top:
-                work[i] -= work[i, column] * work[top]
-        top += 1
+    order = np.argsort(-np.abs(rows).max(axis=0, initial=0.0), kind="stable").tolist()
+    taken = independent(rows, order, len(rows), least=1e-6)[0]
+    work = np.asarray(np.linalg.solve(rows[:, taken], rows), dtype=float)
     work[np.abs(work) < 1e-6 * np.abs(work).max(axis=1, initial=1e-300, keepdims=True)] = 0.0
-    return work[:top]
+    return work

@@ -13,9 +13,10 @@ from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
+from pteron.equations.machine import number_places
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
@@ -170,7 +171,7 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
             moved_point[change.axis] += amount
             fields[change.key] = tuple(moved_point)
     for (i, key), turn in turns.items():
-        matrix = Rotation.from_rotvec(turn).as_matrix()
+        matrix = scipy.spatial.transform.Rotation.from_rotvec(turn).as_matrix()
         keys = turning_with(robot.legs[i], key) if i >= 0 else [key]
         if i < 0 and robot.platform.x_axis is not None:
             keys.append("x_axis")
@@ -202,29 +203,24 @@ def _about(axis: Array, point: Array) -> tuple[Array, Array]:
     return outward / np.linalg.norm(outward), np.cross(axis, point)
 
 
-@dataclass(frozen=True)
-class Term:
-    """An entry of d(geometry)/d(variation): a product of numbers of the geometry, or 1.
+Term = tuple[int, int, tuple[int, ...], int]
+"""Row, variation, factors and sign of an entry of d(geometry)/d(variation).
 
-    The geometry is the vector of `equations.machine.numbers`; so the slopes are known in any field.
-    """
-
-    row: int
-    variation: int
-    factors: tuple[int, ...]
-    sign: int
+The entry is a product of numbers of the geometry, or 1. The geometry is the vector of
+`equations.machine.numbers`; so the slopes are known in any field."""
 
 
 def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
     """Return the slopes of a machine's geometry against its variations, but for axial ones."""
-    places, start = _places(robot)
+    places = number_places(robot)
+    start = places[-1]["frame"]
     found: list[Term] = []
     for k, change in enumerate(changes):
         if change.group in AXIAL:
             continue
         at = places[change.leg]
         if change.group != "directions":
-            found.append(Term(at[change.key] + (change.axis or 0), k, (), 1))
+            found.append((at[change.key] + (change.axis or 0), k, (), 1))
             continue
         axis = start + 3 * (change.axis or 0)
         if change.leg < 0:
@@ -234,8 +230,8 @@ def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
             turned = [at[name] for name in _turned(robot.legs[change.leg], change.key, at)]
         for row in turned:
             for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-                found.append(Term(row + a, k, (axis + b, row + c), 1))
-                found.append(Term(row + a, k, (axis + c, row + b), -1))
+                found.append((row + a, k, (axis + b, row + c), 1))
+                found.append((row + a, k, (axis + c, row + b), -1))
     return found
 
 
@@ -253,25 +249,6 @@ def _turned(leg: LegKind, key: str, known: Collection[str]) -> list[str]:
     return names
 
 
-def _places(robot: Manipulator) -> tuple[list[dict[str, int]], int]:
-    """Return where legs' and, last, the platform's quantities stand, and where the frame does."""
-    places: list[dict[str, int]] = []
-    start = 0
-    for leg in robot.legs:
-        places.append({})
-        for q in leg.quantities:
-            places[-1][q.name] = start
-            start += len(q.value)
-        places[-1]["platform_point"] = start
-        start += 6
-    places.append({})
-    at = start + 9
-    for name, value in robot.platform.quantities.items():
-        places[-1][name] = at
-        at += len(value)
-    return places, start
-
-
 def slope_matrix(
     robot: Manipulator,
     changes: Sequence[Variation],
@@ -285,7 +262,7 @@ def slope_matrix(
     point, and a vector that turns it about the axis.
     """
     matrix = np.zeros((len(geometry), len(changes)), dtype=geometry.dtype)
-    places, _ = _places(robot)
+    places = number_places(robot)
     for k, change in enumerate(changes):
         if change.group in AXIAL:
             for i in range(len(robot.legs)) if change.leg < 0 else (change.leg,):
@@ -293,6 +270,6 @@ def slope_matrix(
                 point = geometry[at : at + 3]
                 vectors = radial[i] if radial else _about(np.array(robot.platform.axis), point)
                 matrix[at : at + 3, k] = vectors[change.group == "angles"]
-    for term in terms:
-        matrix[term.row, term.variation] += term.sign * np.prod(geometry[list(term.factors)])
+    for row, k, factors, sign in terms:
+        matrix[row, k] += sign * np.prod(geometry[list(factors)])
     return matrix

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block
@@ -67,7 +67,7 @@ def verdict_of(
                 f"{1e3 * after:.3g} {unit}, {1e3 * before:.3g} before"
             )
             # The error of few rows strays further by chance.
-            chance = np.sqrt(chi2.ppf(_SURE, held_out.rows) / held_out.rows)
+            chance = np.sqrt(scipy.stats.chi2.ppf(_SURE, held_out.rows) / held_out.rows)
             if ratio <= max(_AT_THE_NOISE, chance):
                 found.reasons.append(f"{text}: as noise and intervals expect.")
             else:

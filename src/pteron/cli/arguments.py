@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import deque
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from typer.core import TyperCommand
 
-from pteron.errors import DataError
+from pteron.cli.terminal import warn
+from pteron.errors import DataError, UnlikelyValue
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
+
+    Machine = Manipulator
+else:
+
+    class Machine:
+        """The machine that a command is about, loaded from its ROBOT and --elbows."""
 
 
 STANDARD = "adept"
@@ -140,12 +148,19 @@ def parsed_list(text: str | None, what: str) -> list[float] | None:
     return parsed_numbers([text], ["a number"] * max(1, len(words)), what)
 
 
-def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:
-    """Load a machine, in the working mode that `elbows` says, such as ``++-+``."""
+def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = False) -> Manipulator:
+    """Load a machine, in the working mode that `elbows` says, such as ``++-+``.
+
+    Warnings about its file are shown unless `quiet`.
+    """
     from pteron.manipulator import load
     from pteron.manipulator.variants import with_elbows
 
-    robot = load(name_or_path)
+    with warnings.catch_warnings(record=True) as unlikely:
+        warnings.simplefilter("always", UnlikelyValue)
+        robot = load(name_or_path)
+    if not quiet:
+        warn(str(warning.message) for warning in unlikely)
     if elbows is None:
         return robot
     if set(elbows) - set("+-") or len(elbows) != len(robot.legs):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
-from typer import Exit, echo
+from typer import echo
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine
 from pteron.cli.progress import spinner
+from pteron.cli.result import Result
 from pteron.cli.terminal import is_terminal, plain, show, show_json, table
 from pteron.json_values import picked
 
@@ -24,7 +26,7 @@ _COMMENTS = {"sympy": "#", "latex": "%", "booktabs": "%"}
 
 
 def base(
-    robot: str,
+    machine: Machine,
     *,
     method: Literal["exact", "svd", "qr"] = "exact",
     keep: str | None = None,
@@ -32,9 +34,7 @@ def base(
     format_: Format = "text",
     symbols: bool = False,
     leg_symbols: bool = False,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Find the base inertial parameters: the sums of parameters that act on the forces.
 
     Formats latex and booktabs are lines of mathematics, and a table with values for a paper.
@@ -54,28 +54,32 @@ def base(
     pteron base quadrupteron --keep I_l1,m_l4 --format latex
     """
     written: Symbols = "leg" if leg_symbols else symbols
-    machine = load_robot(robot, elbows)
     with spinner(f"Grouping the inertial parameters of {machine.name}"):
         from pteron.reduction import base_parameters
 
         names = None if keep is None else [name.strip() for name in keep.split(",")]
         found = base_parameters(machine, method, names, shared=shared)
-    if json or format_ == "json":
-        data = found.as_dict()
-        if written:
-            data["symbolic"] = list(found.expressions(symbols=written))
-            data["geometry"] = _geometry(found, written)
-            data["shared_symbols"] = {} if written == "leg" else found.shared_symbols
-        show_json(data)
-    elif format_ == "text":
-        _show(found, written)
+    data = found.as_dict()
+    if written:
+        data["symbolic"] = list(found.expressions(symbols=written))
+        data["geometry"] = _geometry(found, written)
+        data["shared_symbols"] = {} if written == "leg" else found.shared_symbols
+    if format_ == "json":
+        return Result(data, partial(show_json, data))
+    if format_ == "text":
+        return Result(data, partial(_show, found, written))
+    return Result(data, partial(_write, found, written, format_))
+
+
+def _write(
+    found: BaseParameters, symbols: Symbols, form: Literal["sympy", "latex", "booktabs"]
+) -> None:
+    if form == "booktabs":
+        echo(found.to_latex(symbols=symbols))
     else:
-        if format_ == "booktabs":
-            echo(found.to_latex(symbols=written))
-        else:
-            echo("\n".join(map(str, found.expressions(format_, symbols=written))))
-        for line in _closing(found, written):
-            echo(f"{_COMMENTS[format_]} {line}")
+        echo("\n".join(map(str, found.expressions(form, symbols=symbols))))
+    for line in _closing(found, symbols):
+        echo(f"{_COMMENTS[form]} {line}")
 
 
 def _show(found: BaseParameters, symbols: Symbols) -> None:
@@ -119,7 +123,7 @@ def _closing(found: BaseParameters, symbols: Symbols) -> list[str]:
     return [*lines, *found.certificate.summary().splitlines()]
 
 
-def table1(*, json: bool = False) -> None:
+def table1() -> Result:
     """Print the paper's Table 1, as printed and as computed; exit with 1 if they disagree.
 
     Examples
@@ -131,15 +135,13 @@ def table1(*, json: bool = False) -> None:
 
         found = computed()
     wrong = sum(not row.agrees for row in found)
-    if json:
-        show_json([picked(r, "parameter kept printed computed agrees restored") for r in found])
-    else:
-        verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
-        texts = ((r.parameter, plain(r.printed), plain(r.computed)) for r in found)
-        marks = (verdicts[r.agrees] + " *" * r.restored for r in found)
-        rows = ((*text, mark) for text, mark in zip(texts, marks, strict=True))
-        note = "* damaged in the scan of the paper; restored from its legible rows"
-        agree = f"{len(found) - wrong} of {len(found)} rows agree."
-        show(table("", "printed", "computed", "agrees", rows=rows), agree, note)
-    if wrong:
-        raise Exit(1)
+    data = [picked(r, "parameter kept printed computed agrees restored") for r in found]
+    verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
+    rows = (
+        (r.parameter, plain(r.printed), plain(r.computed), verdicts[r.agrees] + " *" * r.restored)
+        for r in found
+    )
+    note = "* damaged in the scan of the paper; restored from its legible rows"
+    agree = f"{len(found) - wrong} of {len(found)} rows agree."
+    told = [table("", "printed", "computed", "agrees", rows=rows), agree, note]
+    return Result(data, told, code=1 if wrong else 0)

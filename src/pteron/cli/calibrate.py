@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from rich.table import Table
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import GRADE_COLORS, ascii_number, plain, show, show_json, table, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import GRADE_COLORS, ascii_number, plain, show, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.calibration import Calibration
     from pteron.manipulator import Manipulator
-    from pteron.report.calibration import Written
 
 _MOST = 12
 """Values that the terminal shows, those that changed most; the page has them all."""
@@ -27,6 +28,7 @@ Measure = Literal["positions", "heights", "poses", "distances"]
 def calibrate(
     log: list[str] | None = None,
     *,
+    machine: Machine,
     robot: str,
     out: str,
     held_out: list[str] | None = None,
@@ -34,9 +36,7 @@ def calibrate(
     prior: str | None = None,
     plan: int | None = None,
     measure: Measure = "positions",
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Find a machine's true geometry from measurements, and say what they cannot show.
 
     The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
@@ -69,18 +69,17 @@ def calibrate(
     """
     if (plan is None) == (not log):
         raise DataError("give logs of measurements, or --plan with the number of poses to measure")
-    machine = load_robot(robot, elbows)
     if plan is not None:
         tolerances = None if prior is None else _prior(prior)
-        _plan(machine, plan, measure, out, free, tolerances, json=json)
-        return
+        return _plan(machine, plan, measure, out, free, tolerances)
     with spinner("Reading the measurements"):
         from pteron.calibration import calibrate as calibrated, read_measurements
         from pteron.report.calibration import numbers, write_calibration
         from pteron.report.write import checked_apart, checked_folder
 
         read = [*(log or ()), *(held_out or ())]
-        sources = [path for path in (*read, robot, *([prior] if prior else ())) if _is_file(path)]
+        given_files = (*read, robot, *([prior] if prior else ()))
+        sources = [path for path in given_files if Path(path).is_file()]
         checked_apart(checked_folder(out) / "robot.toml", sources)
         tolerances = None if prior is None else _prior(prior)
         given = read_measurements(machine, *(log or ()))
@@ -89,14 +88,8 @@ def calibrate(
         result = calibrated(machine, given, free=free, prior=tolerances, held_out=check)
     with spinner("Drawing the report"):
         files = write_calibration(result, out, sources=sources)
-    if json:
-        show_json({"files": [str(path) for path in files.paths], **numbers(result)})
-        return
-    _show(result, files)
-
-
-def _is_file(path: str) -> bool:
-    return Path(path).is_file()
+    data = {"files": [str(path) for path in files.paths], **numbers(result)}
+    return Result(data, partial(_show, result), files.paths)
 
 
 def _prior(path: str) -> dict[str, float]:
@@ -120,9 +113,7 @@ def _plan(
     out: str,
     free: list[str] | None,
     prior: dict[str, float] | None,
-    *,
-    json: bool,
-) -> None:
+) -> Result:
     """Choose the poses to measure, and write the table that the machine runs."""
     from pteron.tables import check_output, write_table
 
@@ -135,10 +126,7 @@ def _plan(
         found = plan(machine, count, measure, free=free, prior=prior)
         path = write_table(pl.DataFrame(found.columns()), out)
     box = {name: list(side) for name, side in zip(("low", "high"), found.region.box, strict=True)}
-    if json:
-        expected = {"before": found.before, "after": found.after}
-        show_json({"file": str(path), "expected": expected, "region": box})
-        return
+    expected = {"before": found.before, "after": found.after}
     low, high = found.region.box
     sides = ", ".join(
         f"{name} {1e3 * a:.0f} to {1e3 * b:.0f} {'mm' if unit == 'm' else 'mrad'}"
@@ -152,18 +140,18 @@ def _plan(
         f"From {found.checked} poses on, some are held out to check the calibration by; with "
         "fewer give a second log (--held-out)."
     )
-    show(
+    told = [
         f"{plain(machine.name)}: {count} poses at which to measure {measure}, in a box where every "
         f"pose is proved to serve: {sides}",
         f"The {what} {off} off by up to {1e3 * found.before:.3g} {unit} as drawn (one standard "
         f"deviation of the tolerances); {1e3 * found.after:.3g} {unit} are expected to be left.",
         *([few] if count < found.checked else []),
-        *written(path),
-    )
+    ]
+    return Result({"file": str(path), "expected": expected, "region": box}, told, [path])
 
 
-def _show(result: Calibration, files: Written) -> None:
-    """Print a verdict, what changed, what shows and what does not, and the files."""
+def _show(result: Calibration) -> None:
+    """Print a verdict, what changed, what shows and what does not."""
     from pteron.report.calibration.values import notes
 
     verdict, shown = result.verdict, result.observability
@@ -177,7 +165,6 @@ def _show(result: Calibration, files: Written) -> None:
         *(f"Cannot be seen, as drawn: {plain(line)}" for line in shown.unseen),
         *(f"[yellow]Weak:[/yellow] {plain(line)}" for line in shown.weak),
         *map(plain, notes(result)),
-        *written(*files.paths),
     )
 
 

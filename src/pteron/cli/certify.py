@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from typer import Exit
-
-from pteron.cli.pose_ranges import pose_ranges, pose_text, span_text
+from pteron.cli.pose_ranges import box_of, pose_ranges, pose_spans, pose_text, span_text
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import note, percent, plain, show, show_json, table
+from pteron.cli.result import Result
+from pteron.cli.terminal import note, percent, plain, show, table, warn
 from pteron.errors import DataError, ModelError
 from pteron.json_values import picked
 
@@ -82,65 +82,57 @@ class Proofs:
             if value is not None and not (value > 0.0 or (value == 0.0 and name != "tolerance")):
                 raise DataError(f"--{name}: {value:g} given, a number {least} expected")
 
-    def deliver(
-        self, robot: Manipulator, slice_: str | None, warnings: list[str], *, as_json: bool
-    ) -> None:
-        """Prove it and print the result; exit with 1 if a box is not proved."""
+    def result(self, robot: Manipulator, slice_: str | None, warnings: list[str]) -> Result:
+        """Prove it and return the result; the exit code is 1 if a box is not proved."""
         if self.prove is None:
-            self._certify(robot, _orientation(robot, slice_), warnings, as_json)
-            return
+            pose = _orientation(robot, slice_)
+            proved = self._certify if robot.platform.lengths else self._leaning
+            return proved(robot, pose, warnings)
         from pteron.workspace import prove
 
         region = _region(robot, self.prove)
-        for text in warnings:
-            note(f"Warning: {text}")
+        warn(warnings)
         with spinner(f"Proving a region for {robot.name}"):
-            found = prove(
-                robot, region, type_i=self.floors["type_i"], type_ii=self.floors["type_ii"]
-            )
-        if as_json:
-            show_json(_proof(found, self.floors) | {"warnings": warnings})
-        else:
-            show(f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(found)))
-            if found.holds and not self.type_ii:
-                show(_MAY_BE_SINGULAR)
-        if not found.holds:
-            raise Exit(_NOT_PROVED)
+            found = prove(robot, region, type_i=self.type_i or 0.0, type_ii=self.type_ii or 0.0)
+        told = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(found))]
+        told += self._unsure if found.holds else []
+        data = _proof(found, self.floors) | {"warnings": warnings}
+        return Result(data, told, code=0 if found.holds else _NOT_PROVED)
 
-    def _certify(self, robot: Manipulator, pose: Array, warnings: list[str], as_json: bool) -> None:
-        from pteron.workspace import conditions, largest_cube, largest_tilt, paving
+    @property
+    def _unsure(self) -> list[str]:
+        return [] if self.type_ii else [_MAY_BE_SINGULAR]
 
-        for text in warnings:
-            note(f"Warning: {text}")
+    def _leaning(self, robot: Manipulator, pose: Array, warnings: list[str]) -> Result:
+        from pteron.workspace import conditions, largest_tilt
+
+        warn(warnings)
+        with spinner(f"Proving how far {robot.name} leans"):
+            leans = largest_tilt(robot, pose, given=conditions(robot, **self.floors))
+        data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
+        told = [
+            _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),
+            f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.",
+        ]
+        return Result(data | {"proved": True, "warnings": warnings}, told + self._unsure)
+
+    def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> Result:
+        from pteron.workspace import conditions, largest_cube, paving
+
+        warn(warnings)
         tolerance = TOLERANCE if self.tolerance is None else self.tolerance
         asked = conditions(robot, **self.floors)
-        if not robot.platform.lengths:
-            with spinner(f"Proving how far {robot.name} leans"):
-                leans = largest_tilt(robot, pose, given=asked)
-            if as_json:
-                data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
-                show_json(data | {"proved": True, "warnings": warnings})
-            else:
-                rest = list(_angles(robot, pose).items())[2:]
-                show(_heading(robot, dict(rest), self.floors))
-                show(f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.")
-                if not self.floors["type_ii"]:
-                    show(_MAY_BE_SINGULAR)
-            return
         with spinner(f"Proving the workspace of {robot.name}"):
             found = paving(robot, pose, tolerance=tolerance, given=asked)
-            shares = found.boundary_shares
+            _ = found.boundary_shares  # takes time, too
             try:
                 cube = largest_cube(robot, pose, given=asked)
             except ModelError:
                 cube = None
         if not found.complete:
             note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
-        if as_json:
-            data = _certified(robot, pose, self.floors, found, shares, cube)
-            show_json(data | {"warnings": warnings})
-        else:
-            _show(robot, pose, self.floors, found, shares, cube)
+        given = found, pose, self.floors, cube
+        return Result(_certified(*given) | {"warnings": warnings}, partial(_show, *given))
 
 
 def _expect_none(given: Mapping[str, object], what: str) -> None:
@@ -168,39 +160,26 @@ def _orientation(robot: Manipulator, slice_: str | None) -> Array:
 
 
 def _region(robot: Manipulator, text: str) -> Box:
-    from pteron.maps.grid import expect_coordinates
-    from pteron.workspace import Box
-
-    held, ranges = pose_ranges(text, "--prove")
-    expect_coordinates(robot, held, ranges)
-    spans = ranges | {name: (value, value) for name, value in held.items()}
+    spans = pose_spans(robot, text, "--prove", "; a proof is of all poses between")
     every = ", ".join(robot.coordinates)
     missing = [name for name in robot.coordinates if name not in spans]
     if missing:
         raise DataError(f"--prove: no {', '.join(missing)}; a region says all of {every}")
-    if any(len(span) > 2 for span in spans.values()):
-        raise DataError("--prove: NAME=LEAST:GREATEST expected; a proof is of all poses between")
-    ordered = [spans[name] for name in robot.coordinates]
-    return Box(tuple(span[0] for span in ordered), tuple(span[1] for span in ordered))
+    return box_of([spans[name] for name in robot.coordinates])
 
 
 def _certified(
-    robot: Manipulator,
-    pose: Array,
-    floors: dict[str, float],
-    found: Paving,
-    shares: dict[str, float],
-    cube: Inscribed | None,
+    found: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None
 ) -> dict[str, Any]:
     return {
-        "robot": robot.name,
-        "held": _angles(robot, pose),
+        "robot": found.robot.name,
+        "held": _angles(found.robot, pose),
         "floors": floors,
         **picked(found, "inner=inner_volume outer=outer_volume unit"),
         "gap": found.gap if found.inner_volume else None,
         "complete": found.complete,
         "boxes": {"inner": len(found.inner), "undecided": len(found.boundary)},
-        "boundary": shares,
+        "boundary": found.boundary_shares,
         "cube": cube and {**picked(cube, "edge center"), "proved": True},
     }
 
@@ -222,15 +201,8 @@ def _proof(found: Proof, floors: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def _show(
-    robot: Manipulator,
-    pose: Array,
-    floors: dict[str, float],
-    found: Paving,
-    shares: dict[str, float],
-    cube: Inscribed | None,
-) -> None:
-    noun, shape = _SHAPES[len(found.axes)]
+def _show(found: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None) -> None:
+    robot, shares, (noun, shape) = found.robot, found.boundary_shares, _SHAPES[len(found.axes)]
     show(_heading(robot, _angles(robot, pose), floors))
     if not found.outer_volume:
         show("Proved: no position serves.")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
-from typer import Exit
-
 from pteron.cli.progress import progress_bar
-from pteron.cli.terminal import note, plain, show, show_json, table, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -22,8 +22,7 @@ def choose(
     *,
     out: str | None = None,
     workers: int = 1,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Choose a machine for a job: which kind, which dimensions, which motors.
 
     The file says what the machine must do: workspace, payload, cycles, accuracy, stiffness, room,
@@ -58,10 +57,15 @@ def choose(
         from pteron.report.write import checked_folder
 
         checked_folder(out)
-    with progress_bar("Choosing") as bar:
-        found = choose_machine(
-            asked, folder=out, workers=workers, progress=lambda share, _: bar(share)
-        )
+    try:
+        with progress_bar("Choosing") as bar:
+            found = choose_machine(
+                asked, folder=out, workers=workers, progress=lambda share, _: bar(share)
+            )
+    except KeyboardInterrupt:
+        if out is not None:
+            note(f"What is finished is kept in {out}; the same command goes on there")
+        raise
     if found.resumed:
         note(f"Gone on in {out}: {', '.join(found.resumed)} finished before")
     files = []
@@ -69,13 +73,8 @@ def choose(
         from pteron.report.choice.write import write_choice
 
         files = write_choice(found, out)
-    if json:
-        show_json(found.data() | ({"files": [str(file) for file in files]} if files else {}))
-    else:
-        _show(found)
-        show(*written(*files))
-    if found.best is None:
-        raise Exit(_NONE)
+    data = found.data() | ({"files": [str(file) for file in files]} if files else {})
+    return Result(data, partial(_show, found), files, _NONE if found.best is None else 0)
 
 
 def _show(found: Choice) -> None:
@@ -92,7 +91,7 @@ def _show(found: Choice) -> None:
         show(
             f"[bold]{one.kind}[/bold]: {plain(drives(one))}",
             f"  mm: {dimensions(one)}",
-            f"  {plain(one.proved)}",
+            f"  {plain(one.proved)}; {plain(one.clear)}",
             f"  margins: {plain(margins(one))}",
         )
     for one in found.candidates:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import note, show, show_json, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import note
 from pteron.errors import DataError
 
 
 def cue(
     motion: str,
     *,
-    robot: str,
+    machine: Machine,
     out: str | None = None,
     page: str | None = None,
     type_ii: float = 0.0,
@@ -25,9 +26,7 @@ def cue(
     tilt_rate: float | None = None,
     rotation: float | None = None,
     smoothing: float | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Show a vehicle's accelerations and turns with a simulator's platform: a classical washout.
 
     The file holds t (s), accelerations ax ay az without gravity (m/s^2) and angular rates wx wy wz
@@ -61,10 +60,11 @@ def cue(
     pteron cue drive.csv --robot simulator.toml --out cue.csv
     pteron cue flight.csv --robot simulator.toml --scale 0.3 --page cue.html
     """
+    import numpy as np
+
     from pteron.motion import Washout, cue as shown, limits_of, peaks
     from pteron.tables import check_output, write_table
 
-    machine = load_robot(robot, elbows)
     if out is None and page is None:
         raise DataError("nothing to write; give --out FILE.csv, --page FILE.html or both")
     if out is not None:
@@ -91,22 +91,16 @@ def cue(
         if peak.share > 1.0:
             note(f"Note: {peak.told()}; a smaller --scale asks less")
     low, high = found.region.box
-    if json:
-        show_json(
-            {
-                "robot": machine.name,
-                "duration": found.duration,
-                "samples": len(found.time),
-                "box": {
-                    name: [float(a), float(b)]
-                    for name, a, b in zip(machine.coordinates, low, high, strict=True)
-                },
-                "proved": bool(found.proof.holds),
-                "pressed": found.pressed,
-                "files": files,
-            }
-        )
-        return
+    box = np.stack([low, high], axis=-1).tolist()
+    data = {
+        "robot": machine.name,
+        "duration": found.duration,
+        "samples": len(found.time),
+        "box": dict(zip(machine.coordinates, box, strict=True)),
+        "proved": bool(found.proof.holds),
+        "pressed": found.pressed,
+        "files": files,
+    }
     units = (machine.platform.units, low, high)
     sides = ", ".join(
         f"{name} {1e3 * a:.4g} to {1e3 * b:.4g} mm"
@@ -114,9 +108,10 @@ def cue(
         else f"{name} {57.29578 * a:.4g} to {57.29578 * b:.4g} deg"
         for name, unit, a, b in zip(machine.coordinates, *units, strict=True)
     )
-    show(
-        f"{found.duration:.4g} s, {len(found.time)} samples, within a box that is proved: {sides}",
+    length = f"{found.duration:.4g} s, {len(found.time)} samples"
+    told = [
+        f"{length}, within a box that is proved: {sides}",
         f"pressed together by at most {found.pressed:.0%}",
         peaks_table(largest),
-        *written(*files),
-    )
+    ]
+    return Result(data, told, files)

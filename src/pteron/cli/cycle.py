@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from pteron.cli.arguments import check_rate, load_robot, parsed_list
+from rich.table import Table
+
+from pteron.cli.arguments import Machine, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import note, show, show_json, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import note, show
 from pteron.errors import DataError
 from pteron.json_values import picked
 
@@ -29,7 +33,7 @@ _DENSE = 10
 
 
 def cycle(
-    robot: str,
+    machine: Machine,
     *,
     kind: Kind | None = None,
     from_: str | None = None,
@@ -50,12 +54,9 @@ def cycle(
     jerk: str | None = None,
     tool_speed: float | None = None,
     tool_acceleration: float | None = None,
-    payload: str | None = None,
-    tool: str | None = None,
+    carried: Carried,
     out: str | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Make a motion, within the limits, and see what it asks of the drives.
 
     The standard pick-and-place cycle, 25 mm up, 305 mm across, 25 mm down and back; straight lines
@@ -109,8 +110,7 @@ def cycle(
     """
     from pteron.motion import limits_of
 
-    carried = Carried.of(payload, tool)
-    machine = carried.on(load_robot(robot, elbows))
+    machine = carried.on(machine)
     check_rate(rate)
     if out is not None:
         from pteron.tables import check_output
@@ -158,7 +158,7 @@ def cycle(
             )
         else:
             motion = standard_motion(machine, around, scale, limits, duration, optimal, step)
-    _deliver(machine, way, motion, limits, carried, out=out, as_json=json)
+    return _result(machine, way, motion, limits, carried, out)
 
 
 def _expect_fitting(way: str, given: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
@@ -171,16 +171,14 @@ def _expect_fitting(way: str, given: dict[str, tuple[Any, tuple[str, ...]]]) -> 
             )
 
 
-def _deliver(
+def _result(
     machine: Manipulator,
     way: str,
     motion: Motion,
     limits: MotionLimits,
     carried: Carried,
-    *,
     out: str | None,
-    as_json: bool,
-) -> None:
+) -> Result:
     import numpy as np
 
     from pteron.motion import peaks
@@ -196,28 +194,29 @@ def _deliver(
 
         write_table(motion_frame(machine, motion), out)
     bound = getattr(motion, "polynomial", None)
-    if as_json:
-        data = {
-            "robot": machine.name,
-            "kind": way,
-            **asdict(carried),
-            "duration": motion.duration,
-            "samples": len(motion.time),
-            "start": motion.pose[0].tolist(),
-            "end": motion.pose[-1].tolist(),
-            "quintic_duration": bound,
-            "scale": getattr(motion, "scale", None),
-            "peaks": [
-                picked(p, "quantity=name leg size unit limit share") | {"leg": p.leg or None}
-                for p in found
-            ],
-            "file": out,
-        }
-        show_json(data)
-        return
+    data = {
+        "robot": machine.name,
+        "kind": way,
+        **asdict(carried),
+        "duration": motion.duration,
+        "samples": len(motion.time),
+        "start": motion.pose[0].tolist(),
+        "end": motion.pose[-1].tolist(),
+        "quintic_duration": bound,
+        "scale": getattr(motion, "scale", None),
+        "peaks": [
+            picked(p, "quantity=name leg size unit limit share") | {"leg": p.leg or None}
+            for p in found
+        ],
+        "file": out,
+    }
     text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
     if bound is not None:
         text += f"; a polynomial in time along the same path takes {bound:.4g} s"
-    show(text, peaks_table(found), *written(*([out] if out else [])))
+    return Result(data, partial(_show, [text, peaks_table(found)], out), [out] if out else [])
+
+
+def _show(told: list[str | Table], out: str | None) -> None:
+    show(*told)
     if out is None:
         note("Note: no file is written; to have the motion, add --out FILE.csv")

@@ -5,13 +5,15 @@ With `--out` all that is evaluated is kept in a folder, and the search goes on t
 
 from __future__ import annotations
 
-import json as json_module
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.progress import progress_bar
-from pteron.cli.terminal import note, plain, show, show_json, table, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import DataError
+from pteron.extras import expect_extra
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,8 +32,7 @@ def design(
     sweep: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Search for the dimensions of a machine that are best for what is asked of it.
 
     The file names the machine to begin with, the numbers that may change, what must be kept
@@ -61,6 +62,7 @@ def design(
     pteron design search.toml --out best --seed 7 --workers 4
     pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786
     """
+    expect_extra("design", "pymoo", "a search needs pymoo")
     from pteron.design import Summary, read_spec
 
     asked = read_spec(spec)
@@ -78,11 +80,8 @@ def design(
     front = _found(asked, out, sweep, workers, scheduler)
     summary = Summary(front)
     files = [] if out is None else _write(summary, Path(out))
-    if json:
-        show_json(summary.data() | ({"files": [str(file) for file in files]} if files else {}))
-        return
-    _show(summary)
-    show(*written(*files))
+    data = summary.data() | ({"files": [str(file) for file in files]} if files else {})
+    return Result(data, partial(_show, summary), files)
 
 
 def _tell_resumed(folder: Path) -> None:
@@ -110,12 +109,12 @@ def _found(
 
 def _write(summary: Summary, folder: Path) -> list[Path]:
     from pteron.atomic import write_texts
-    from pteron.json_values import json_ready
+    from pteron.json_values import json_text
     from pteron.plots import save_figure
     from pteron.tables import write_table
 
     rows = summary.table()
-    figures = json_module.dumps(json_ready(summary.data()), indent=1, allow_nan=False) + "\n"
+    figures = json_text(summary.data())
     texts = {"report.md": summary.page(), "design.json": figures, **summary.robots()}
     return [
         *write_texts(folder, texts),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.terminal import show, show_json, written
+from pteron.cli.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
@@ -54,10 +53,9 @@ class Destination:
         data: dict[str, Any],
         more: Callable[[], dict[str, str]],
         person: Callable[[], None],
-        *,
-        as_json: bool,
-    ) -> None:
-        """Write files if they are asked for; then print for a program or for a person.
+        code: int = 0,
+    ) -> Result:
+        """Write files if they are asked for, and return the command's result.
 
         `data` are the figures, `more` makes the other files of a folder, by name, and `person`
         prints what a person reads.
@@ -69,13 +67,9 @@ class Destination:
             files = [write_table(table, str(self.out))]
         elif self.out is not None:
             from pteron.atomic import write_texts
-            from pteron.json_values import json_ready
+            from pteron.json_values import json_text
 
-            figures = json.dumps(json_ready(data), indent=1, allow_nan=False) + "\n"
-            texts = {f"{self.name}.csv": table.write_csv(), f"{self.name}.json": figures}
+            texts = {f"{self.name}.csv": table.write_csv(), f"{self.name}.json": json_text(data)}
             files = write_texts(self.out, texts | more())
-        if as_json:
-            show_json(data | ({"files": [str(file) for file in files]} if files else {}))
-            return
-        person()
-        show(*written(*files))
+        told = {"files": [str(file) for file in files]} if files else {}
+        return Result(data | told, person, files, code)

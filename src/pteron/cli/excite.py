@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rich.table import Table
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine
 from pteron.cli.progress import progress_bar
-from pteron.cli.terminal import note, show, show_json, table, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import note, table
 from pteron.errors import ModelError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ _MEASURES = {
 
 
 def excite(
-    robot: str,
+    machine: Machine,
     *,
     out: str | None = None,
     space: Literal["platform", "joints"] = "platform",
@@ -53,9 +54,8 @@ def excite(
     seconds: float = 60.0,
     seed: int = 0,
     workers: int | None = None,
-    elbows: str | None = None,
     json: bool = False,
-) -> None:
+) -> Result:
     """Find a periodic trajectory from whose forces the base parameters are seen best.
 
     The file leads in from rest, repeats the trajectory, and leads out to rest in the pose where it
@@ -120,7 +120,6 @@ def excite(
     pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60
     pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,
     """
-    machine = load_robot(robot, elbows)
     from pteron.identification.excitation import (
         Layout,
         Limits,
@@ -184,24 +183,23 @@ def excite(
                 f"{name}: the limits are not kept between samples; choose another --seed"
             )
     files = [] if out is None else found.write(out, rate, periods, layout, cycles, slow)
-    if json:
-        more: dict[str, Any] = {"start": led.start, "end": led.end, "duration": led.duration}
-        more |= {"held_out": cycles and cycles.as_dict(), "slow": slow and slow.duration}
-        show_json({**found.as_dict(), **more, "files": [str(path) for path in files]})
-        return
-    show(_quality(found), _margins(left))
-    show(
+    more: dict[str, Any] = {"start": led.start, "end": led.end, "duration": led.duration}
+    more |= {"held_out": cycles and cycles.as_dict(), "slow": slow and slow.duration}
+    data = {**found.as_dict(), **more, "files": [str(path) for path in files]}
+    told: list[str | Table] = [
+        *(_quality(found), _margins(left)),
         f"From rest to rest in {led.duration:g} s: periodic from {led.start:g} to {led.end:g} s, "
-        "lead-in before, lead-out behind."
-    )
+        "lead-in before, lead-out behind.",
+    ]
     if cycles is not None:
-        show(
+        told.append(
             f"To hold out: {cycles.count} pick-and-place cycles of {cycles.length:.4g} s, "
             f"{cycles.cycle.scale:.0%} of the standard size."
         )
     if slow is not None:
-        show(f"Slowly: the same way in {slow.duration:g} s, for friction that falls with speed.")
-    show(*written(*files))
+        slowly = f"the same way in {slow.duration:g} s, for friction that falls with speed."
+        told.append(f"Slowly: {slowly}")
+    return Result(data, told, files)
 
 
 def _held_out(found: Excitation, rate: float) -> RepeatedCycle | None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, Literal
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine
+from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import note, show, show_json, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import note
 from pteron.errors import DataError
 
 _TRUSTED = "trustworthy"
@@ -24,7 +26,7 @@ _TARGETS = (
 
 
 def export(
-    robot: str,
+    machine: Machine,
     *,
     c: str | None = None,
     st: str | None = None,
@@ -44,9 +46,9 @@ def export(
     wrench: bool = False,
     output: Output = "force",
     base: str | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+    tool: str | None = None,
+    gains: str | None = None,
+) -> Result:
     """Write code for a controller, or the machine as another engine or tool wants it.
 
     With --c or --st: kinematics, Jacobian, dynamics and regressor, in functions that return a
@@ -55,8 +57,8 @@ def export(
     drives has `feed_forward` as well: what the drives must give, with friction, and
     `joint_feed_forward`, the same from the motion of the joints. With --base they take what `pteron
     identify` found, as it lists it, and are called `feed_forward_base` and
-    `joint_feed_forward_base`. The others write one thing each, with no options but --elbows and
-    --json.
+    `joint_feed_forward_base`. The others write one thing each, with no options but --tool,
+    --elbows and --json.
 
     Options
     -------
@@ -78,6 +80,10 @@ def export(
     --output UNIT: What drives are told: force at the joints, torque of the motors, or percent of
         what they are rated for.
     --base FILE: The identification.json of pteron identify: its values go into the code.
+    --tool NAME: Mount a tool of the machine's file: its body is in the parameters and models that
+        are written, its centre point is the tool's.
+    --gains FILE: The gains.toml of pteron tune: its controller, with these gains, beside what
+        --function names.
 
     Examples
     --------
@@ -87,6 +93,7 @@ def export(
     pteron export quadrupteron --fmu models
     pteron export linear-delta --klipper printer
     pteron export robot.toml --base result/identification.json --c controller
+    pteron export robot.toml --tool gripper --c controller
     """
     folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
     asked = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
@@ -97,30 +104,39 @@ def export(
         "wrench": wrench,
         "output": output != "force",
         "base": base,
+        "gains": gains,
     }
     _check(asked, [name for name, given in options.items() if given])
-    machine = load_robot(robot, elbows)
+    if tool is not None and base is not None:
+        raise DataError(
+            f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "
+            "out, and let the controller call set_payload_base"
+        )
+    machine = Carried(tool=tool).mounted(machine)
     files = []
     with spinner(f"Writing code for {machine.name}"):
+        from pteron.controllers import Controller, read_gains
         from pteron.export import Real, export_c, export_st
         from pteron.export.identified_parameters import read_identified
 
         grade = read_identified(machine, base).grade if base is not None else _TRUSTED
+        asked_for: list[str | Controller] | None = [*function] if function else None
+        if gains is not None:
+            asked_for = [*(function or []), read_gains(machine, gains)]
         if c is not None:
             real: Real = "float" if float_ else "double"
             look: dict[str, Any] = {"real": real, "specialised": specialised}
-            files += export_c(machine, function, c, **look, wrench=wrench, output=output, base=base)
+            files += export_c(
+                machine, asked_for, c, **look, wrench=wrench, output=output, base=base
+            )
         if st is not None:
-            files += export_st(machine, function, st, wrench=wrench, output=output, base=base)
+            files += export_st(machine, asked_for, st, wrench=wrench, output=output, base=base)
         for name, folder in asked.items():
             if name not in ("c", "st"):
                 files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
-    if json:
-        show_json({"robot": machine.name, "files": [str(path) for path in files]})
-        return
-    show(*written(*files))
+    return Result({"robot": machine.name, "files": [str(path) for path in files]}, files=files)
 
 
 def _check(asked: dict[str, str], options: list[str]) -> None:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from pteron.cli.arguments import STANDARD, load_robot
+from pteron.cli.arguments import STANDARD, Machine
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import progress_bar, spinner
-from pteron.cli.terminal import plain, show, show_json, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import plain
 from pteron.errors import DataError
+from pteron.extras import expect_extra
 from pteron.json_values import picked
 
 
 def film(
-    robot: str,
+    machine: Machine,
     *,
     out: str,
     cycle: str = STANDARD,
@@ -23,11 +25,8 @@ def film(
     size: str = "960x720",
     turns: float = 0.0,
     forces: bool = False,
-    payload: str | None = None,
-    tool: str | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+    carried: Carried,
+) -> Result:
     """Film a machine that goes through a cycle, in real time or slow motion, as MP4 or GIF.
 
     The view is the same from the first frame to the last, or goes round the machine with --turns;
@@ -50,14 +49,12 @@ def film(
     pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4
     pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif
     """
-    machine = load_robot(robot, elbows)
     from pteron.dynamics import drive_forces
     from pteron.plots import film as filmed
     from pteron.plots.films import checked_film
 
     checked_film(out)
     sides = _sides(size)
-    carried = Carried.of(payload, tool)
     machine, carrying = carried.mounted(machine), carried.on(machine)
     with spinner(f"A cycle of {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
@@ -72,15 +69,20 @@ def film(
         **picked(made, "duration speed frames fps size"),
         "file": str(made.path),
     }
-    if json:
-        show_json(data)
-        return
     pace = "in real time" if made.speed == 1.0 else f"at {made.speed:.3g} times its speed"
-    show(
+    told = (
         f"{motion.duration:.4g} s of {plain(machine.name)} {pace}: {made.duration:.3g} s, "
-        f"{made.frames} frames of {made.size[0]}x{made.size[1]}",
-        *written(made.path),
+        f"{made.frames} frames of {made.size[0]}x{made.size[1]}"
     )
+    return Result(data, [told], [made.path])
+
+
+def _expect_ffmpeg(given: dict[str, Any]) -> None:
+    if given["out"].lower().endswith(".mp4"):
+        expect_extra("film", "imageio_ffmpeg", "MP4 films need FFmpeg (a .gif does not)")
+
+
+vars(film)["before"] = _expect_ffmpeg
 
 
 def _sides(text: str) -> tuple[int, int]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
 from rich.table import Table
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine, load_robot
 from pteron.cli.progress import Times, spinner, stages
+from pteron.cli.result import Result
 from pteron.cli.terminal import (
     GRADE_COLORS,
     ascii_number,
@@ -17,9 +19,7 @@ from pteron.cli.terminal import (
     note,
     plain,
     show,
-    show_json,
     table,
-    written,
 )
 from pteron.errors import DataError
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from pteron.identification import Bounds, Identification, Terms
     from pteron.identification.consistency.bounds import Box
     from pteron.manipulator import Manipulator
-    from pteron.report.identification import Written
 
 _NARROW = 56
 """Columns of a terminal below which tables are shortened: the page has them whole."""
@@ -49,6 +48,7 @@ Derivatives = Literal["periodic", "central", "spline"]
 def identify(
     log: list[str],
     *,
+    machine: Machine,
     robot: str,
     out: str,
     held_out: list[str] | None = None,
@@ -67,9 +67,7 @@ def identify(
     period: float | None = None,
     cad: str = "robot",
     box: list[str] | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Identify a machine from recorded motions, and say whether the result can be trusted.
 
     With --payload, what a payload adds is found from the motion recorded with it and without: in
@@ -109,7 +107,6 @@ def identify(
     pteron identify log.csv --robot quadrupteron --out identified
     pteron identify a.csv b.csv --held-out c.csv --robot my-robot.toml --out identified
     """
-    machine = load_robot(robot, elbows)
     named = {"robot": "robot", "none": None}
     drawn: Any = named[cad] if cad in named else load_robot(cad)
     with spinner("Opening the logs"):
@@ -140,10 +137,8 @@ def identify(
         files = write_identification(result, folder, sources=sources)
     if is_terminal():
         note(times.told())
-    if json:
-        show_json({"files": [str(path) for path in files.paths], **numbers(result)})
-        return
-    _show(result, files)
+    data = {"files": [str(path) for path in files.paths], **numbers(result)}
+    return Result(data, partial(_show, result), files.paths)
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
@@ -210,7 +205,7 @@ def _box(text: str) -> tuple[str, Box]:
     return body.strip(), ((x0, x1), (y0, y1))
 
 
-def _show(result: Identification, files: Written) -> None:
+def _show(result: Identification) -> None:
     """Print a verdict, the errors, the values, what was found in the logs, and the files."""
     verdict = result.verdict
     worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
@@ -223,7 +218,6 @@ def _show(result: Identification, files: Written) -> None:
         *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
         *_payload(result),
         *(f"[yellow]Note:[/yellow] {plain(one.message)}" for one in result.findings),
-        *written(*files.paths),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import MOTION, Failure, load_robot, parsed_numbers
+from pteron.cli.arguments import MOTION, Failure, Machine, parsed_numbers
 from pteron.cli.table_rows import (
     Rows,
     check_destination,
@@ -23,12 +23,11 @@ if TYPE_CHECKING:
 
 
 def inverse(
-    robot: str,
+    machine: Machine,
     pose: list[str] | None = None,
     *,
     table: str | None = None,
     out: str | None = None,
-    elbows: str | None = None,
     on_failure: Failure = "raise",
     json: bool = False,
 ) -> None:
@@ -51,7 +50,6 @@ def inverse(
     from pteron.kinematics import inverse_kinematics
     from pteron.manipulator.readings import to_readings
 
-    machine = load_robot(robot, elbows)
     columns = machine.coordinates
     rows = given_rows(machine, table, pose, "pose", columns)
     added = machine.joint_names
@@ -69,12 +67,11 @@ def inverse(
 
 
 def direct(
-    robot: str,
+    machine: Machine,
     joints: list[str] | None = None,
     *,
     table: str | None = None,
     out: str | None = None,
-    elbows: str | None = None,
     on_failure: Failure | None = None,
     json: bool = False,
 ) -> None:
@@ -101,7 +98,6 @@ def direct(
     from pteron.kinematics import direct_kinematics
     from pteron.manipulator.readings import from_readings
 
-    machine = load_robot(robot, elbows)
     columns = machine.joint_names
     rows = given_rows(machine, table, joints, "joints", columns)
     failure: Failure = on_failure or ("raise" if rows.single else "nan")
@@ -140,7 +136,7 @@ def _modes(table: Table, poses: NDArray[Any], coordinates: tuple[str, ...]) -> T
 
 
 def forces(
-    robot: str,
+    machine: Machine,
     *,
     pose: str | None = None,
     velocity: str | None = None,
@@ -149,7 +145,6 @@ def forces(
     drives: bool = False,
     table: str | None = None,
     out: str | None = None,
-    elbows: str | None = None,
     on_failure: Failure = "raise",
     json: bool = False,
 ) -> None:
@@ -182,7 +177,6 @@ def forces(
     from pteron.manipulator.readings import reading_scales
     from pteron.motion import overloads
 
-    machine = load_robot(robot, elbows)
     m, n = machine.freedom, machine.joint_count
     names = machine.column_names
     loads = names["wrench"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,8 @@ from typer import Exit
 
 from pteron.cli.arguments import load_robot, signs
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import complain, note, plain, show, show_json, table, write
+from pteron.cli.result import Result
+from pteron.cli.terminal import complain, plain, show, table, warn, write
 from pteron.errors import DataError, ModelError, OutputError, PteronError
 from pteron.json_values import picked
 
@@ -30,27 +32,21 @@ _FAULTY = 2
 """Exit code for a faulty file."""
 
 
-def catalog(*, json: bool = False) -> None:
+def catalog() -> Result:
     """List the machines that come with Pteron.
 
     Examples
     --------
     pteron catalog --json
     """
-    _list(json)
-
-
-def _list(json: bool) -> None:
     from pteron.manipulator import catalog as names, load
 
     found = [{**_machine(robot), "legs": len(robot.legs)} for robot in map(load, names())]
-    if json:
-        show_json(found)
-        return
     keys = ("name", "motion", "coordinates", "types", "working_mode")
     cells = ((one[key] for key in keys) for one in found)
     rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
-    show(table("name", "motion", "pose", "legs", "elbows", rows=rows, names=("name",)))
+    made = table("name", "motion", "pose", "legs", "elbows", rows=rows, names=("name",))
+    return Result(found, [made])
 
 
 def new(
@@ -64,8 +60,7 @@ def new(
     mass_from: list[str] | None = None,
     out: str | None = None,
     overwrite: bool = False,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Write a file for a machine of your own, which says what every key is.
 
     It is a machine like KIND, to put your numbers into; without KIND the kinds are listed. The
@@ -94,8 +89,7 @@ def new(
     pteron new delta --base-radius 0.2 --crank 0.25 --rod 0.55 --mass-from aluminium-tube:30x2
     """
     if kind is None:
-        _list(json)
-        return
+        return catalog()
     from pteron.atomic import write_text
     from pteron.manipulator.explained import explained
 
@@ -112,12 +106,11 @@ def new(
     text = explained(kind, {key: value for key, value in given.items() if value not in (None, {})})
     if out is not None:
         write_text(out, text)
-    if json:
-        show_json({"kind": kind, "file": out, "text": text})
-    elif out is None:
-        write(text)
-    else:
-        show(f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}")
+    data = {"kind": kind, "file": out, "text": text}
+    if out is None:
+        return Result(data, partial(write, text))
+    told = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
+    return Result(data, [told])
 
 
 def _interval(text: str | None) -> tuple[float, float] | None:
@@ -149,7 +142,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
     }
 
 
-def check(file: str, *, elbows: str | None = None, json: bool = False) -> None:
+def check(file: str, *, elbows: str | None = None) -> Result:
     """Check a machine's file and say what the machine is.
 
     It fails if the file is not valid, telling all its faults, if the machine is singular at every
@@ -168,35 +161,29 @@ def check(file: str, *, elbows: str | None = None, json: bool = False) -> None:
     pteron check robot.toml
     """
     try:
-        robot = load_robot(file, elbows)
+        robot = load_robot(file, elbows, quiet=True)
     except ModelError as error:
         for fault in error.faults:
             complain(f"{error.subject}: {fault}")
         raise Exit(_FAULTY) from None
-    from pteron.workspace.machine_warnings import machine_warnings
+    from pteron.manipulator.machine_warnings import machine_warnings
 
     unlikely = machine_warnings(robot)
-    for text in unlikely:
-        note(f"Warning: {file}: {text}")
+    warn(unlikely, f"{file}: ")
     try:
         with spinner(f"Looking where {robot.name} can work"):
             found = _findings(robot, unlikely)
-        for text in found["doubts"][len(unlikely) :]:
-            note(f"Warning: {file}: {text}")
+        warn(found["doubts"][len(unlikely) :], f"{file}: ")
     except PteronError as error:
         raise ModelError(error.message, subject=file) from None
-    if json:
-        show_json(found)
-    else:
-        _show(robot, found)
+    return Result(found, partial(_show, robot, found))
 
 
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.kinematics import architecture, singular_orientations
     from pteron.workspace import home_pose, limited_joints, pose_margins
-    from pteron.workspace.drive_warnings import load_warnings
-    from pteron.workspace.machine_warnings import elbow_warnings
-    from pteron.workspace.mode_places import mode_places
+    from pteron.workspace.load_warnings import load_warnings
+    from pteron.workspace.mode_places import elbow_warnings, mode_places
     from pteron.workspace.screw_lengths import screw_warnings
 
     # Refuses a singular layout, and one without a common reach with by how much legs miss it

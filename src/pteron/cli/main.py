@@ -27,12 +27,14 @@ from pteron.cli.identify import identify
 from pteron.cli.interrupts import insistent_interrupts
 from pteron.cli.inverse_direct_forces import direct, forces, inverse
 from pteron.cli.machines import catalog, check, new
-from pteron.cli.options import help_of
+from pteron.cli.options import help_of, typed
 from pteron.cli.play import play
 from pteron.cli.report import report
+from pteron.cli.result import Result
 from pteron.cli.simulate import simulate
 from pteron.cli.size import size
 from pteron.cli.terminal import complain, note
+from pteron.cli.tune import tune
 from pteron.cli.view import view
 from pteron.cli.workspace import workspace
 from pteron.errors import PteronError, UnlikelyValue
@@ -60,6 +62,7 @@ class CommandGroup(TyperGroup):
         try:
             with insistent_interrupts(), warnings.catch_warnings():
                 warnings.showwarning = _noted
+                warnings.simplefilter("default", UnlikelyValue)
                 status = super().main(*args, **extra | {"standalone_mode": False})
                 sys.stdout.flush()
             if status == _INTERRUPTED:  # Typer has caught it
@@ -126,11 +129,11 @@ app = Typer(
 )
 
 
-_COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
+_COMMANDS: dict[str, tuple[Callable[..., Result | None], ...]] = {
     "Machines": (catalog, new, check, report),
     "See it": (view, play, film, workspace),
     "Compute": (inverse, direct, forces, base, table1),
-    "Move": (cycle, cue, simulate, size),
+    "Move": (cycle, cue, simulate, size, tune),
     "Design": (choose, design),
     "From a log to a controller": (calibrate, excite, identify, export),
 }
@@ -169,8 +172,8 @@ def pteron(context: Context, *, version: bool = False) -> None:
 app.callback(invoke_without_command=True, **help_of(pteron))(pteron)
 for _panel, _functions in _COMMANDS.items():
     for _function in _functions:
-        _cls = NumbersCommand if _function in _NUMERIC else Command
-        app.command(cls=_cls, rich_help_panel=_panel, **help_of(_function))(_function)
+        _cls, _typed = NumbersCommand if _function in _NUMERIC else Command, typed(_function)
+        app.command(cls=_cls, rich_help_panel=_panel, **help_of(_typed))(_typed)
 
 
 def main() -> None:

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from pteron.shapes import PoseLike
     from pteron.tables import Table
 
-_SLOW = 0.5
-"""Time between samples above which a warning is given, s."""
-
 _UNLIKE = 3.0
 """Greatest ratio of a motion's length by its velocities to that by its poses, or inverse of it."""
 
@@ -57,9 +54,7 @@ def played(robot: Manipulator, file: str) -> Playback:
 
 
 def _of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
-    """Return the motion of a table, after notes on its unlikely values."""
-    import numpy as np
-
+    """Return the motion of a table; what it cannot do may be in another unit."""
     from pteron.kinematics.unlikely_values import unlikely_values
     from pteron.playback import of_table
 
@@ -68,16 +63,12 @@ def _of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) ->
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
     values = rows.numbers(names)
     try:
-        found = of_table(robot, rows, start)
+        return of_table(robot, rows, start)
     except (UnreachablePose, SingularPose) as error:
         unlikely = "; ".join(unlikely_values(robot, names, values))
         if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):
             raise
         raise PteronError(f"{error}; {file}: {unlikely}") from None
-    note_unlikely(robot, names, values, file)
-    if float(np.median(np.diff(found.motion.time))) >= _SLOW:
-        note(f"Note: {file}: t in steps of {found.motion.time[1]:g}: are these ms? s are expected")
-    return found
 
 
 def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
@@ -131,14 +122,10 @@ class Carried:
     def on(self, robot: Manipulator) -> Manipulator:
         """Return the machine with it."""
         from pteron.motion import with_payload
-        from pteron.motion.payload import payload_warning
 
         robot = self.mounted(robot)
         body = self.payload, self.payload_center, self.payload_inertia or 0.0
-        carrying = with_payload(robot, *body)
-        if doubt := payload_warning(robot, self.payload):
-            note(f"Warning: {doubt}")
-        return carrying
+        return with_payload(robot, *body)
 
     def mounted(self, robot: Manipulator) -> Manipulator:
         """Return the machine with the tool alone."""

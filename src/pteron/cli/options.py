@@ -13,13 +13,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from inspect import cleandoc, signature
+from functools import wraps
+from inspect import Parameter, Signature, cleandoc, signature
 from typing import Annotated, Any, get_type_hints
 
 from typer import Argument, Context, Option
 
 from pteron.cli import completion
+from pteron.cli.arguments import Machine, load_robot
 from pteron.cli.exported_functions import FUNCTIONS
+from pteron.cli.motion_argument import Carried
+from pteron.cli.result import Result
 
 _SECTION = re.compile(r"\n\n(\w+)\n-+\n")
 _LINE = re.compile(r"(\S+?)(?:, (-\w))?(?: (\S+))?: (.*?)(?: \[default: (.*)\])?$")
@@ -36,7 +40,7 @@ ROBOT: A machine of the catalog (see pteron catalog) or a TOML file.
 --payload MASS@X,Y,Z: What the platform carries, kg, such as 0.5, which is at the tool's centre
     point; 0.5@0,0,-0.03 has its centre of mass there in the platform's frame, m, and
     0.5@0,0,-0.03@2e-4 its inertia about that, kg m^2. [default: none]
---tool NAME: Mount a tool of the machine's file, one of its [[tools]].
+--tool NAME: Mount a tool of the machine's file, one of its table tools.
 --cycle CYCLE: adept, the standard pick-and-place cycle, or a table of a motion.
 --duration: Of the standard cycle, s. [default: 10 m/s^2 at the tool]
 --scheduler ADDRESS: A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.
@@ -53,6 +57,47 @@ _COMPLETION = {
 }
 
 
+def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
+    """Return a command as it is typed.
+
+    Its `machine` is loaded from ROBOT in the working mode of --elbows, what it carries is read from
+    --payload and --tool, and its result is printed for a person or, with --json, for a program.
+    """
+    hints, own = get_type_hints(command), signature(command).parameters
+    options: dict[str, Parameter] = {}
+    for name, given in own.items():
+        if hints[name] is Machine:
+            options["robot"] = given.replace(name="robot", annotation=str)
+        elif hints[name] is Carried:
+            options |= {each: _option(each, str | None) for each in ("payload", "tool")}
+        else:
+            options[name] = given.replace(annotation=hints[name])
+    if "machine" in own:
+        options.setdefault("elbows", _option("elbows", str | None))
+    options.setdefault("json", _option("json", bool, default=False))
+
+    @wraps(command)
+    def run(**values: Any) -> None:
+        passed = {name: value for name, value in values.items() if name in own}
+        if "before" in vars(command):  # a missing extra is told before a machine is read
+            vars(command)["before"](passed)
+        if "carried" in own:
+            passed["carried"] = Carried.of(values["payload"], values["tool"])
+        if "machine" in own:
+            passed["machine"] = load_robot(values["robot"], values["elbows"])
+        found = command(**passed)
+        if found is not None:
+            found.tell(as_json=values["json"])
+
+    run.__dict__["__signature__"] = Signature(list(options.values()))
+    run.__annotations__ = {name: option.annotation for name, option in options.items()}
+    return run
+
+
+def _option(name: str, kind: Any, *, default: Any = None) -> Parameter:
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+
+
 def help_of(command: Callable[..., None]) -> dict[str, Any]:
     """Give a command's parameters their options; return its help and what stands at its end."""
     text, *sections = _SECTION.split(cleandoc(command.__doc__ or ""))
@@ -63,16 +108,16 @@ def help_of(command: Callable[..., None]) -> dict[str, Any]:
         for line in re.sub(r"\n +", " ", lines).splitlines():
             name, about = _read(line)
             found[name] = about if title in _OPTIONS else about | {"rich_help_panel": title}
-    hints = get_type_hints(command, include_extras=True)
+    hints, options = get_type_hints(command), []
     for name, parameter in signature(command).parameters.items():
-        key = name.rstrip("_").replace("_", "-")
+        key, kind = name.rstrip("_").replace("_", "-"), hints[name]
         if parameter.kind is parameter.KEYWORD_ONLY:
             about = dict(found.get(f"--{key}", {}))
-            own = Option(f"--{key}", *about.pop("short", ()), **about)
-            command.__annotations__[name] = Annotated[hints[name], own]
-        elif hints[name] is not Context:
-            own = Argument(**found.get(key, {}))
-            command.__annotations__[name] = Annotated[hints[name], own]
+            kind = Annotated[kind, Option(f"--{key}", *about.pop("short", ()), **about)]
+        elif kind is not Context:
+            kind = Annotated[kind, Argument(**found.get(key, {}))]
+        options.append(parameter.replace(annotation=kind))
+    command.__dict__["__signature__"] = Signature(options)
     paragraphs = (" ".join(part.split()) for part in text.split("\n\n"))
     end = "\n\n".join(["[bold]Examples[/bold]", *examples.splitlines()])
     return {"help": "\n\n".join(paragraphs), "epilog": end}

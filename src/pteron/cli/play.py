@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pteron.cli.arguments import STANDARD, load_robot
+from pteron.cli.arguments import STANDARD, Machine
 from pteron.cli.motion_argument import Carried, played
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import plain, show, show_json
+from pteron.cli.result import Result
+from pteron.cli.terminal import plain
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -17,16 +18,13 @@ if TYPE_CHECKING:
 
 
 def play(
-    robot: str,
+    machine: Machine,
     motion: str | None = None,
     *,
     out: str = "motion.html",
     cycle: str | None = None,
-    payload: str | None = None,
-    tool: str | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+    carried: Carried,
+) -> Result:
     """Show a motion in 3-D: one page that needs no other file or network.
 
     The page has the machine as it moves, in real time or slower, with its forces, joints and pose
@@ -52,7 +50,7 @@ def play(
     """
     from pteron.report.write import checked_page, write_motion_page
 
-    machine = Carried.of(payload, tool).on(load_robot(robot, elbows))
+    machine = carried.on(machine)
     if motion is not None and cycle is not None:
         raise DataError("MOTION and --cycle given; give one of them")
     checked_page(out)
@@ -60,21 +58,17 @@ def play(
         found = _playback(machine, motion or cycle or STANDARD)
         page = write_motion_page(machine, found, out)
     samples, size = len(found.motion.time), page.stat().st_size
-    if json:
-        show_json(
-            {
-                "robot": machine.name,
-                "page": str(page),
-                "bytes": size,
-                "source": found.source or STANDARD,
-                "log": found.log,
-                "duration": found.motion.duration,
-                "samples": samples,
-            }
-        )
-        return
-    show(f"{plain(machine.name)}: {found.motion.duration:.4g} s, {samples} samples")
-    show(f"Written: {plain(str(page))}, {size / 1e6:.1f} MB")
+    data = {
+        "robot": machine.name,
+        "page": str(page),
+        "bytes": size,
+        "source": found.source or STANDARD,
+        "log": found.log,
+        "duration": found.motion.duration,
+        "samples": samples,
+    }
+    told = f"{plain(machine.name)}: {found.motion.duration:.4g} s, {samples} samples"
+    return Result(data, [told, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
+    from pteron.workspace import Box
 
 
 def pose_ranges(
@@ -36,6 +43,29 @@ def pose_ranges(
         else:
             ranges[name] = given
     return held, ranges
+
+
+def pose_spans(
+    robot: Manipulator, text: str, option: str, use: str
+) -> dict[str, tuple[float, ...]]:
+    """Return the least and the greatest value of each coordinate that an option's text names.
+
+    `use` is what a message adds about them.
+    """
+    from pteron.maps.grid import expect_coordinates
+
+    held, ranges = pose_ranges(text, option)
+    expect_coordinates(robot, held, ranges)
+    if any(len(span) > 2 for span in ranges.values()):
+        raise DataError(f"{option}: NAME=LEAST:GREATEST expected{use}")
+    return ranges | {name: (value, value) for name, value in held.items()}
+
+
+def box_of(spans: Iterable[tuple[float, ...]]) -> Box:
+    """Return the box of poses between the least and the greatest value of each coordinate."""
+    from pteron.workspace import Box
+
+    return Box(*zip(*spans, strict=True))
 
 
 def pose_text(name: str, value: float) -> str:

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import json as json_module
+import json
 import math
 from typing import Any
 
 from rich.table import Table
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine
 from pteron.cli.motion_argument import played
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import note, plain, show, show_json, table
+from pteron.cli.result import Result
+from pteron.cli.terminal import plain, table, warn
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 """Keys of report.json with a value for each sample of the motion, too long to print."""
 
 
 def report(
-    robot: str,
+    machine: Machine,
     *,
     out: str,
     motion: str | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Write a report on a machine: one page with pictures, and its numbers.
 
     The page is report.html, the numbers are in report.json beside it.
@@ -39,23 +38,20 @@ def report(
     pteron report quadrupteron --out report
     pteron report quadrupteron --motion motion.csv --out report
     """
-    machine = load_robot(robot, elbows)
     with spinner(f"Writing the report on {machine.name}"):
+        from pteron.manipulator.machine_warnings import machine_warnings
         from pteron.report import write_report
 
         shown = None if motion is None else played(machine, motion)
         page = write_report(machine, out, motion=shown)
-    found = json_module.loads((page.parent / "report.json").read_text(encoding="utf-8"))
-    for text in found["doubts"]:
-        note(f"Warning: {text}")
-    for text in found["cycle"]["overloads"]:
-        note(f"Warning: {text}")
-    if json:
-        cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
-        show_json({"page": str(page), **found, "cycle": cycle})
-        return
-    show(_machine(found), _legs(found["cycle"], found["joints"]), _costs(found["costs"]))
-    show(f"Written to {plain(str(page))}")
+    found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
+    known = machine_warnings(machine, bodies=False)  # told where the machine was loaded
+    doubts = [text for text in found["doubts"] if text not in known]
+    warn([*doubts, *found["cycle"]["overloads"]])
+    cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
+    tables = _machine(found), _legs(found["cycle"], found["joints"]), _costs(found["costs"])
+    told = [*tables, f"Written to {plain(str(page))}"]
+    return Result({"page": str(page), **found, "cycle": cycle}, told)
 
 
 def _machine(found: dict[str, Any]) -> Table:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from typer import Exit
-
-from pteron.cli.arguments import STANDARD, check_rate, load_robot
+from pteron.cli.arguments import STANDARD, Machine, check_rate, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import is_terminal, note, plain, show, table, write
+from pteron.cli.result import Result
+from pteron.cli.terminal import is_terminal, note, plain, show, table, warn, write
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -28,16 +28,16 @@ Name = Literal["computed-torque", "feed-forward", "pd", "adaptive", "adaptive-dr
 
 
 def simulate(
-    robot: str,
+    machine: Machine,
     *,
     cycle: str = STANDARD,
     controller: Name = "computed-torque",
-    payload: str | None = None,
-    tool: str | None = None,
+    carried: Carried,
     cycles: int = 1,
     duration: float | None = None,
     rate: float = 1000.0,
     bandwidth: float | None = None,
+    gains: str | None = None,
     model: str | None = None,
     encoder: float = 0.0,
     delay: float = 0.0,
@@ -46,8 +46,7 @@ def simulate(
     anyway: bool = False,
     out: str | None = None,
     elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Simulate a machine with its drives under a controller.
 
     The rigid bodies with the payload, the drives' friction and rotors move under what the
@@ -65,6 +64,7 @@ def simulate(
     --cycles: How many, one after the other.
     --rate: Samples of the controller a second.
     --bandwidth: Of the controller, rad/s. [default: a tenth of the rate]
+    --gains FILE: The controller of pteron tune's gains.toml, its law and rate too.
     --model ROBOT: What the controller takes the machine for; by default what it is, payload and
         all.
     --encoder: Step of the encoders at the joints, m or rad; 0 is exact.
@@ -80,22 +80,25 @@ def simulate(
     pteron simulate robot.toml --controller adaptive --model drawing.toml --cycles 10 --out run
     pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv
     """
-    machine = load_robot(robot, elbows)
+    from pteron.controllers import read_gains
     from pteron.motion import Sensors, simulate as simulated
 
+    if gains is not None and bandwidth is not None:
+        raise DataError("--gains, --bandwidth: both given; leave one of them out")
     if cycles < 1:
         raise DataError(f"--cycles: {cycles} given, 1 or more expected")
     check_rate(rate)
     destination = Destination(out, "simulation")
     destination.check()
-    carried = Carried.of(payload, tool)
     carrying = carried.on(machine)
     at_tool = carried.payload_center is None
     machine = carried.mounted(machine) if at_tool else carrying
     believed = None if model is None else _model(machine, model, elbows)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
-        acts = _controller(controller, motion, 1.0 / rate, bandwidth)
+        acts, told = controller_of(controller, motion, 1.0 / rate, bandwidth), str(controller)
+        if gains is not None:
+            acts, told = read_gains(carrying, gains), gains
         motion = motion if cycles == 1 else motion.repeated(cycles)
         overloads = _overloads(carrying, motion)
         if overloads and not anyway:
@@ -107,20 +110,13 @@ def simulate(
         how |= {"model": believed, "payload": carried.payload if at_tool else 0.0, "method": method}
         found = simulated(machine, motion, acts, **how)
         found = replace(found, payload=found.payload * 0.0 + carried.payload)
-    for text in overloads:
-        note(f"Warning: {text}")
+    warn(overloads)
     if found.stopped:
         note(f"Stopped {found.stopped}")
-    data = _data(found, controller, cycle, carried)
-    destination.deliver(
-        found.table(),
-        data,
-        lambda: _pictures(found),
-        partial(_tell, found, data, carried, out),
-        as_json=json,
-    )
-    if found.stopped:
-        raise Exit(_ENDED)
+    data = _data(found, told, cycle, carried)
+    person = partial(_tell, found, data, carried, out)
+    code = _ENDED if found.stopped else 0
+    return destination.deliver(found.table(), data, partial(_pictures, found), person, code)
 
 
 def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
@@ -138,7 +134,7 @@ def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
     return model
 
 
-def _controller(name: Name, motion: Motion, period: float, bandwidth: float | None) -> Controller:
+def controller_of(name: Name, motion: Motion, period: float, bandwidth: float | None) -> Controller:
     """Return a controller; an adaptive one learns the parameters that the motion excites."""
     from pteron.controllers import Adaptive, ComputedTorque, FeedForwardPD, PDGravity
 
@@ -169,9 +165,17 @@ def _data(found: Simulation, controller: str, cycle: str, carried: Carried) -> d
 
     robot, error = found.robot, found.error
     power = found.forces * found.joint_rates
-    sizes = {"force": found.forces, "speed": found.joint_rates, "power": power}
-    peaks = {name: np.abs(values).max(axis=0).tolist() for name, values in sizes.items()}
-    rms = [float(np.sqrt(np.mean(force**2))) for force in found.forces.T]
+    drives = {
+        "peak_force": np.abs(found.forces).max(axis=0),
+        "rms_force": [np.sqrt(np.mean(force**2)) for force in found.forces.T],
+        "peak_speed": np.abs(found.joint_rates).max(axis=0),
+        "peak_power": np.abs(power).max(axis=0),
+        "at_its_limit": found.saturated,
+    }
+    tracking = {
+        "largest": np.abs(error).max(axis=0),
+        "rms": [np.sqrt(np.mean(one**2)) for one in error.T],
+    }
     return {
         "robot": robot.name,
         "cycle": cycle,
@@ -181,26 +185,14 @@ def _data(found: Simulation, controller: str, cycle: str, carried: Carried) -> d
         "samples": len(found.time),
         "step": None if np.isnan(found.step) else found.step,
         "stopped": found.stopped,
-        "tracking": [
-            {
-                "coordinate": name,
-                "largest": float(np.abs(error[:, i]).max()),
-                "rms": float(np.sqrt(np.mean(error[:, i] ** 2))),
-            }
-            for i, name in enumerate(robot.coordinates)
-        ],
-        "drives": [
-            {
-                "leg": i + 1,
-                "peak_force": peaks["force"][i],
-                "rms_force": rms[i],
-                "peak_speed": peaks["speed"][i],
-                "peak_power": peaks["power"][i],
-                "at_its_limit": float(found.saturated[i]),
-            }
-            for i in range(len(robot.legs))
-        ],
+        "tracking": _rows({"coordinate": robot.coordinates} | tracking),
+        "drives": _rows({"leg": range(1, len(robot.legs) + 1)} | drives),
     }
+
+
+def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of columns that are as long."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _pictures(found: Simulation) -> dict[str, str]:

@@ -6,18 +6,19 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import rich.table
-from typer import Exit
 
-from pteron.cli.arguments import STANDARD, load_robot
+from pteron.cli.arguments import STANDARD, Machine
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
-from pteron.cli.pose_ranges import pose_ranges
+from pteron.cli.pose_ranges import box_of, pose_spans
 from pteron.cli.progress import spinner
-from pteron.cli.terminal import note, plain, show, table
-from pteron.errors import DataError, UnlikelyValue
+from pteron.cli.result import Result
+from pteron.cli.terminal import plain, show, table, warn
+from pteron.errors import UnlikelyValue
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
@@ -41,11 +42,10 @@ _BEST = 3
 
 
 def size(
-    robot: str,
+    machine: Machine,
     *,
     cycle: list[str] | None = None,
-    payload: str | None = None,
-    tool: str | None = None,
+    carried: Carried,
     duration: float | None = None,
     dwell: list[float] | None = None,
     within: str | None = None,
@@ -53,14 +53,12 @@ def size(
     motors: str | None = None,
     margin: float = 1.0,
     out: str | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Size the motors: peak and RMS force, speed, power and energy of each drive over a cycle.
 
     The standard cycle is done at all places of the workspace and at all turns about the vertical,
-    and the worst of them counts and is named; a motion from a table is done as it stands. Several
-    cycles are done one after the other, each with its rest.
+    the platform turned with it or not, and the worst of them counts and is named; a motion from a
+    table is done as it stands. Several cycles are done one after the other, each with its rest.
 
     Forces are those of the drives: the bodies with the payload, friction and the rotors, as the
     machine's file has them. What is not enough is told by leg and amount, of the drives in the file
@@ -94,7 +92,6 @@ def size(
     pteron size quadrupteron --cycle pick.csv --dwell 0.2 --cycle home.csv --dwell 5
     pteron size delta --within x=-0.1:0.1,y=-0.1:0.1,z=-0.9:-0.8
     """
-    machine = load_robot(robot, elbows)
     from pteron.motion import choose, read_motors, size as sized
 
     with warnings.catch_warnings():  # each motor's are notes below
@@ -102,14 +99,12 @@ def size(
         chosen = () if motors is None else read_motors(motors)
     destination = Destination(out, "sizing")
     destination.check()
-    for motor in chosen:
-        for text in motor.warnings:
-            note(f"Warning: {text}")
+    warn(text for motor in chosen for text in motor.warnings)
     cycles = cycle or [STANDARD]
     where = within or ("workspace" if cycles == [STANDARD] else "here")
     places: Any = {"workspace": "workspace", "here": None}
-    spans = {} if where in places else _spans(machine, where)
-    carried = Carried.of(payload, tool)
+    such = ", such as x=-0.1:0.1,y=-0.1:0.1"
+    spans = {} if where in places else pose_spans(machine, where, "--within", such)
     carrying = carried.on(machine)
     with spinner(f"Sizing the drives of {machine.name}"):
         motions = [cycle_of(carrying, one, duration) for one in cycles]
@@ -118,40 +113,26 @@ def size(
         found = sized(carrying, motions, places=region, **how)
         fits = choose(found, chosen, margin=margin)
     lacking = [*_weak(found, margin), *_unserved(found, fits, margin)]
-    for text in lacking:
-        note(f"Warning: {text}")
+    warn(lacking)
     asked = _Asked(" and ".join(cycles), carried, where, margin)
     # A list of motors is what its choice is asked for.
-    destination.deliver(
+    return destination.deliver(
         _fits_table(found, fits) if fits and out is None else found.table(),
         _data(found, fits, asked),
-        lambda: _more(found, fits),
-        lambda: _show(found, fits, asked),
-        as_json=json,
+        partial(_more, found, fits),
+        partial(_show, found, fits, asked),
+        _OVERLOADED if lacking else 0,
     )
-    if lacking:
-        raise Exit(_OVERLOADED)
 
 
 @dataclass(frozen=True)
 class _Asked:
-    """What was asked for, in the words of the options."""
+    """The request, in the words of the options."""
 
     cycle: str
     carried: Carried
     within: str
     margin: float
-
-
-def _spans(machine: Manipulator, text: str) -> dict[str, tuple[float, ...]]:
-    """Return the values and ranges of coordinates that --within says."""
-    from pteron.maps.grid import expect_coordinates
-
-    held, ranges = pose_ranges(text, "--within")
-    expect_coordinates(machine, held, ranges)
-    if any(len(span) > 2 for span in ranges.values()):
-        raise DataError("--within: NAME=LEAST:GREATEST expected, such as x=-0.1:0.1,y=-0.1:0.1")
-    return ranges | {name: (value, value) for name, value in held.items()}
 
 
 def _box(
@@ -167,8 +148,7 @@ def _box(
     half[lengths] = np.linalg.norm(half[lengths])
     middle = (low + high) / 2.0
     taken = zip(machine.coordinates, middle - half, middle + half, strict=True)
-    ordered = [spans.get(name, (float(a), float(b))) for name, a, b in taken]
-    return Box(tuple(span[0] for span in ordered), tuple(span[1] for span in ordered))
+    return box_of([spans.get(name, (float(a), float(b))) for name, a, b in taken])
 
 
 def _weak(found: Sizing, margin: float) -> list[str]:
@@ -338,7 +318,9 @@ def _places(found: Sizing) -> list[rich.table.Table]:
         rows.append(
             (leg, _NAMED[one["quantity"]], pose, f"{math.degrees(one['turn']) % 360:.4g} deg")
         )
-    names = "leg", "is greatest", f"about {' '.join(found.robot.coordinates)}", "turned"
+    platform, coordinates = found.robot.platform, " ".join(found.robot.coordinates)
+    units = ", ".join(["m"] * bool(platform.lengths) + ["rad"] * bool(platform.angles))
+    names = "leg", "is greatest", f"about {coordinates} ({units})", "turned"
     return [table(*names, rows=rows, numbers=("leg", "turned"))] if rows else []
 
 

@@ -131,6 +131,12 @@ def note(message: str) -> None:
     echo(_visible(message), err=True)
 
 
+def warn(messages: Iterable[str], source: str = "") -> None:
+    """Print a line on standard error for each warning; `source` goes before what it says."""
+    for message in messages:
+        note(f"Warning: {source}{message}")
+
+
 def complain(message: str) -> None:
     """Print an error as one line on standard error; lines to paste into a file stay lines."""
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)

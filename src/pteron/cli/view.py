@@ -11,7 +11,7 @@ from typing import Any
 
 from typer import echo
 
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine, load_robot
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show_json
@@ -21,24 +21,24 @@ _TICK = 0.5
 
 
 def view(
-    robot: str,
+    machine: Machine,
     *,
     motion: str | None = None,
-    payload: str | None = None,
-    tool: str | None = None,
+    carried: Carried,
     compare: str | None = None,
     enlarge: float | None = None,
+    beside: list[str] | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
     no_browser: bool = False,
-    elbows: str | None = None,
     json: bool = False,
 ) -> None:
     """Show a machine in the browser, where it can be moved; Ctrl-C ends it.
 
-    Sliders move the platform or the joints; the page tells the drives' forces, the condition
-    number and how far the machine is from singularities and limits, shows slices of the workspace
-    and plays motions, logs and simulations. docs/view.md tells more.
+    Sliders and the mouse move the platform or the joints, or a spring pulls at it; the page tells
+    the drives' forces, the condition number and how far the machine is from singularities and
+    limits, shows slices of the workspace and plays motions, logs and simulations. docs/view.md
+    tells more.
 
     Options
     -------
@@ -46,6 +46,7 @@ def view(
         or a log.
     --compare ROBOT: Another machine with such legs, in grey in the same pose.
     --enlarge TIMES: How often the compared machine's differences are taken. [default: well seen]
+    --beside ROBOT: A further machine, side by side with the first; as often as you like.
     --host: The address to serve at; by default this machine alone.
     --port: Its port, or the next one that is free; 0 is any.
     --no-browser: Print the address, and open no browser.
@@ -56,11 +57,12 @@ def view(
     pteron view quadrupteron --motion adept --payload 0.5
     pteron view robot.toml --motion log.csv --port 9000 --no-browser
     pteron view calibrated/robot.toml --compare robot.toml --enlarge 50
+    pteron view delta --beside par4 --beside hexa --motion adept
     """
-    carried = Carried.of(payload, tool)
-    machine = carried.mounted(load_robot(robot, elbows))
-    if carried.payload_center is not None:  # the page's own payload is at the tool
-        machine, carried = carried.on(load_robot(robot, elbows)), Carried()
+    if carried.payload_center is None:
+        machine = carried.mounted(machine)
+    else:  # the page's own payload is at the tool
+        machine, carried = carried.on(machine), Carried()
     with spinner(f"Preparing {machine.name}"):
         from pteron.viewer import view as opened
         from pteron.viewer.guard import is_here
@@ -70,6 +72,7 @@ def view(
             "payload": carried.payload,
             "compare": compare,
             "enlarge": enlarge,
+            "beside": [load_robot(one) for one in beside or ()],
         }
         viewer = opened(machine, host=host, port=port, **shown)
     # Ctrl-C is the usual way to end it.

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.atomic import checked_file
-from pteron.cli.arguments import load_robot
+from pteron.cli.arguments import Machine
 from pteron.cli.certify import Proofs
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.progress import progress_bar, spinner
-from pteron.cli.terminal import is_terminal, note, show, show_json, write, written
+from pteron.cli.result import Result
+from pteron.cli.terminal import is_terminal, note, show, warn, write, written
 from pteron.errors import DataError, ModelError, OutputError
 
 if TYPE_CHECKING:
@@ -47,7 +49,7 @@ _DPI = 200.0
 
 
 def workspace(
-    robot: str,
+    machine: Machine,
     *,
     index: list[str] | None = None,
     slice_: str | None = None,
@@ -61,9 +63,7 @@ def workspace(
     tolerance: float | None = None,
     type_i: float | None = None,
     type_ii: float | None = None,
-    elbows: str | None = None,
-    json: bool = False,
-) -> None:
+) -> Result:
     """Map the workspace: where the machine reaches, what ends it, and how good it is there.
 
     An index of performance is mapped over the poses of a grid; with none, the distance to the end
@@ -111,11 +111,9 @@ def workspace(
     maps = {"index": index, "points": points, "out": out, "workers": workers}
     other = {"scheduler": scheduler, "engine": None if engine == "auto" else engine}
     proofs.check({**maps, **other}, slice_)
-    machine = load_robot(robot, elbows)
     warnings = _warnings(machine)
     if proofs.asked:
-        proofs.deliver(machine, slice_, warnings, as_json=json)
-        return
+        return proofs.result(machine, slice_, warnings)
     from pteron.maps import map_index
 
     names = _checked_indices(machine, index or [])
@@ -129,12 +127,10 @@ def workspace(
         )
     with spinner(f"The reach of {machine.name}"):
         grid = _grid(machine, slice_, points, ending)
-    for text in warnings:
-        note(f"Warning: {text}")
+    warn(warnings)
     with spinner(f"The reach of {machine.name}"):
         volume = _volume(machine, grid)
-    for text in (outside := _outside(grid, volume)):
-        note(f"Warning: {text}")
+    warn(outside := _outside(grid, volume))
     with progress_bar(f"Mapping {machine.name}") as tell:
         found = map_index(
             machine,
@@ -149,15 +145,16 @@ def workspace(
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(found, out, ending)
     data = map_data(found, volume, [*warnings, *outside], out)
-    if json:
-        show_json(data)
-    elif is_terminal():
+    return Result(data, partial(_show, found, volume, data, out))
+
+
+def _show(found: Map, volume: ReachVolume | None, data: dict[str, Any], out: str | None) -> None:
+    if is_terminal():
         show_map(found, volume, data)
     else:
         write(map_rows(data).write_csv())
-    if out is not None and not json:
-        line = written(out)[0]
-        show(line) if is_terminal() else note(line)
+    if out is not None:
+        (show if is_terminal() else note)(*written(out))
 
 
 def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:

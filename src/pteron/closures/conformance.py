@@ -13,7 +13,7 @@ from pteron.bodies.motion import Expression
 from pteron.closures import kind_for
 from pteron.closures.closure import plain_rows
 from pteron.legs.kind import LegKind
-from pteron.platforms import Platform, equations_class
+from pteron.platforms import Platform
 
 
 def faults(
@@ -44,7 +44,7 @@ def faults(
     points = [ca.SX(ca.DM(list(leg.platform_point))) for leg in legs]
     fixed = [ca.SX(ca.DM(list(leg.fixed_offset))) for leg in legs]
     frame = [ca.SX(ca.DM(list(axis))) for axis in platform.frame]
-    own = equations_class(platform)(frame, points, fixed)
+    own = platform.kind(frame, points, fixed)
     kind = kind_for([type(one) for one in equations], type(own))
     if kind is None:
         return ("no closure fits these legs under this platform",)

@@ -10,8 +10,9 @@ import numpy as np
 from pteron.equations.control import ADAPTED, GAINS, MEMORY, Layout, estimated, lengths
 from pteron.equations.drives import drive_names
 from pteron.errors import DataError
-from pteron.kernels import Array, as_array, numeric
+from pteron.kernels import Array, Program, as_array, columns_of, numeric, program
 from pteron.kernels.choice import Adaptive
+from pteron.kernels.loops import machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters
 from pteron.shapes import JointsLike, PerJoint, PoseLike
@@ -108,6 +109,18 @@ class Law:
         if not status.all():
             forces[status == 0.0] = np.nan
         return forces, kept
+
+    @cached_property
+    def program(self) -> Program:
+        """The law as a program, for `pteron.kernels.loops.Loop`."""
+        columns = None if self.base is None else columns_of(self.base)
+        return program(self.model, self.what, columns, guarded=True)
+
+    @property
+    def numbers(self) -> dict[str, Array]:
+        """Its gains and the model's numbers, as `pteron.kernels.loops.Loop.run` takes them."""
+        found = machine_numbers(self.model, self.program, "law")
+        return found | {"law_gains": self.gains.reshape(1, 1, -1)}
 
     @cached_property
     def _kernel(self) -> Adaptive:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
-from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.dynamics import drive_forces
 from pteron.errors import ModelError
@@ -105,7 +105,7 @@ class MotorMargin:
             }
 
         middle = np.log(motor.max_speed / fastest if fastest else 1.0)
-        found = minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             lambda log_ratio: -np.log(min(margins(np.exp(log_ratio)).values())),
             bounds=(middle - _DECADES * np.log(10.0), middle + np.log(10.0)),
             method="bounded",

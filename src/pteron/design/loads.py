@@ -13,7 +13,8 @@ from pteron.bodies.tables import Number, Six, Table, Three
 from pteron.indices import ALUMINIUM, STEEL, Elasticity, Section, Tolerances
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion import Motion, line_path, pick_and_place, with_payload
+from pteron.motion import Motion, line_path, pick_and_place
+from pteron.motion.payload import carrying
 from pteron.motion.trajectories.time_law import sampled
 from pteron.motion.trajectories.time_polynomials import polynomial
 from pteron.motion.trajectories.timed_path import timed_path
@@ -61,7 +62,7 @@ class PayloadTable(Table):
         given = self.inertia
         tensor = given if isinstance(given, tuple) else (given, 0.0, 0.0, given, 0.0, given)
         tilts = inertia_count(robot.platform.inertia.kinds) > 1
-        return with_payload(robot, self.mass, self.center, tensor if tilts else tensor[5])
+        return carrying(robot, self.mass, self.center, tensor if tilts else tensor[5])
 
 
 class CycleTable(Table):
@@ -106,7 +107,7 @@ class CycleTable(Table):
 
     @property
     def words(self) -> str:
-        """What it is, in a line: "4 points in 0.4 s, then 0.1 s of rest"."""
+        """The cycle in a line: "4 points in 0.4 s, then 0.1 s of rest"."""
         what = (
             f"{len(self.points)} points" if self.points else f"pick-and-place x {self.scale:.12g}"
         )

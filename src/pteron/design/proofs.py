@@ -16,7 +16,7 @@ from pteron.design.design import Design
 from pteron.design.region import placed_pose, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
-from pteron.kernels import Array
+from pteron.kernels import Array, alike
 from pteron.workspace import Box, Proof, Region, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.samples import Samples, fixed_samples
@@ -216,7 +216,8 @@ def workspace_share(design: Design, proof: Proof) -> float:
 
 def _proof(design: Design, region: Region) -> Proof:
     floors = design.task.floors
-    return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
+    with alike(design.task.robot):
+        return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
 
 
 def _least(design: Design, proof: Proof) -> float:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import qmc  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.design.front import Front, Proofs
 from pteron.design.rows import design_table
@@ -94,7 +94,7 @@ def _surveyed(task: Task, first: int) -> pl.DataFrame:
 def survey_designs(task: Task, first: int, count: int) -> Array:
     """Return designs (count, V) of the survey's sequence, beginning with number `first`."""
     low, high = task.ranges
-    sequence = qmc.Sobol(len(low), scramble=False)
+    sequence = scipy.stats.qmc.Sobol(len(low), scramble=False)
     if first:
         sequence.fast_forward(first)
     shift = np.random.default_rng(task.spec.search.seed).random(len(low))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -15,7 +14,7 @@ from pteron.design.quantities import quantities
 from pteron.design.region import workspace_shape
 from pteron.design.spec import FloorsTable, Spec
 from pteron.design.variables import Variable, moved, variables_of
-from pteron.errors import DataError, ModelError, UnlikelyValue
+from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.kernels import Array, Kernel, compile
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
@@ -88,7 +87,7 @@ class Task:
         if faults:
             raise DataError(told(faults), subject=spec.source)
         if spec.payload is not None and (text := payload_warning(robot, spec.payload.mass)):
-            warnings.warn(text, UnlikelyValue, stacklevel=2)
+            warn_unlikely(text)
         return cls(spec, robot, variables, motors)
 
     def __getstate__(self) -> dict[str, Any]:

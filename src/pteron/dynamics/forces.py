@@ -158,7 +158,8 @@ def drive_forces(
     >>> import numpy as np, pteron
     >>> from dataclasses import replace
     >>> robot = pteron.load("tripteron")
-    >>> legs = [replace(leg, drive=pteron.Drive(coulomb=3.0, viscous=10.0)) for leg in robot.legs]
+    >>> drive = pteron.legs.Drive(coulomb=3.0, viscous=10.0)
+    >>> legs = [replace(leg, drive=drive) for leg in robot.legs]
     >>> state = np.zeros(3), [0.1, 0.2, -0.3], np.zeros(3)
     >>> driven = pteron.drive_forces(replace(robot, legs=legs), *state)
     >>> (driven - pteron.inverse_dynamics(robot, *state)).round(9)
@@ -214,7 +215,7 @@ def drive_accelerations(
     >>> import numpy as np, pteron
     >>> from dataclasses import replace
     >>> robot = pteron.load("tripteron")
-    >>> legs = [replace(leg, drive=pteron.Drive(rotor_inertia=2.0)) for leg in robot.legs]
+    >>> legs = [replace(leg, drive=pteron.legs.Drive(rotor_inertia=2.0)) for leg in robot.legs]
     >>> robot, rest = replace(robot, legs=legs), np.zeros(3)
     >>> forces = pteron.drive_forces(robot, rest, rest, [1.0, 2.0, 3.0], smooth=True)
     >>> pteron.drive_accelerations(robot, rest, rest, forces).round(9)

@@ -33,4 +33,4 @@ if REACH not in gymnasium.registry:
         max_episode_steps=EPISODE,
     )
 
-_publish(__name__, checked=True, classes=("PteronEnv", "PteronVectorEnv"))
+_publish(__name__, checked=True)

@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import checked_arguments
 from pteron.environments.construction import world_of
 from pteron.environments.picture import EnvironmentPicture
 from pteron.environments.state import EpisodeState
@@ -20,6 +21,7 @@ Numbers = NDArray[Any]
 """Arrays of observations and actions: float32."""
 
 
+@checked_arguments
 class PteronEnv(gymnasium.Env[Numbers, Numbers]):
     """A machine whose drives' forces are the actions, to reach a pose or to follow a motion.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +15,24 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class EpisodeState:
-    """Pose, velocity and target (..., m) of machines, and the time of their episodes (...), s."""
+    """Pose, velocity and target (..., m) of machines, and the time of their episodes (...), s.
+
+    `drives` (..., K) is the state of drives that bend or lag, as `pteron.motion.advance` has it.
+    """
 
     pose: Array
     velocity: Array
+    drives: Array
     target: Array
     clock: Array
 
     def put(self, chosen: Bools, others: EpisodeState) -> EpisodeState:
         """Return these states with `others` in place of the chosen ones, a mask (B,)."""
-        found = self.pose.copy(), self.velocity.copy(), self.target.copy(), self.clock.copy()
-        new = others.pose, others.velocity, others.target, others.clock
-        for into, values in zip(found, new, strict=True):
-            into[chosen] = values
+        found = [getattr(self, part.name).copy() for part in fields(self)]
+        for into, part in zip(found, fields(others), strict=True):
+            into[chosen] = getattr(others, part.name)
         return EpisodeState(*found)
 
     def row(self, i: int) -> EpisodeState:
         """Return the state of one machine."""
-        return EpisodeState(self.pose[i], self.velocity[i], self.target[i], self.clock[i])
+        return EpisodeState(*(getattr(self, part.name)[i] for part in fields(self)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,17 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from pteron.arguments import checked_arguments
 from pteron.environments.construction import world_of
 from pteron.environments.environment import Numbers, checked_mode, spaces
 from pteron.environments.picture import EnvironmentPicture
 from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike
-from pteron.motion import Motion
+from pteron.motion import Machines, Motion
 
 
+@checked_arguments
 class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
     """Many environments like `PteronEnv`, whose machines go on in one call.
 
@@ -35,6 +38,9 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         Number of environments.
     max_episode_steps : int, optional
         Steps after which an episode is truncated.
+    machines : Machines, optional
+        The machine of each environment (domain randomisation), `num_envs` of them, such as
+        `pteron.motion.machines_about` draws: their masses, friction and payload differ.
 
     Raises
     ------
@@ -67,6 +73,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         tolerance: float = 0.005,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
+        machines: Machines | None = None,
     ) -> None:
         for name, value in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
             if value is not None and value < 1:
@@ -74,6 +81,13 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self.world = world_of(
             robot, motion=motion, period=period, spread=spread, tolerance=tolerance
         )
+        if machines is not None:
+            if len(machines) != num_envs or machines.robot != self.world.robot:
+                raise DataError(
+                    f"machines: {len(machines)} of {machines.robot.name} given, {num_envs} of "
+                    f"{self.world.robot.name} expected, one for each environment"
+                )
+            self.world = replace(self.world, machines=machines)
         self.num_envs = num_envs
         pair = spaces(self.world.bounds, len(self.world.forces))
         self.single_observation_space, self.single_action_space = pair

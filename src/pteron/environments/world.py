@@ -15,7 +15,8 @@ from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, numeric
 from pteron.manipulator import Manipulator
-from pteron.motion import Motion, advance
+from pteron.motion import Machines, Motion, advance
+from pteron.motion.simulation.plant import drive_states
 from pteron.workspace import pose_margins
 
 LEVER = 0.1
@@ -67,6 +68,8 @@ class World:
         Margin, see `pteron.workspace.PoseMargins`, of starts and targets.
     motion : Motion or None
         What is to be followed, again and again; None where a pose is to be reached.
+    machines : Machines or None
+        The machine of each episode, where they are not all the same.
     """
 
     robot: Manipulator
@@ -79,6 +82,7 @@ class World:
     tolerance: float
     least: float
     motion: Motion | None
+    machines: Machines | None = None
 
     @cached_property
     def bounds(self) -> Array:
@@ -128,9 +132,11 @@ class World:
             clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
             if "pose" not in given:
                 poses, velocity, _ = self.motion.at(self.motion.time[0] + clock)
+        begun = np.broadcast_to(given.get("pose", poses), poses.shape)
         return EpisodeState(
-            np.broadcast_to(given.get("pose", poses), poses.shape),
+            begun,
             velocity,
+            drive_states(self.robot, begun, velocity),
             np.broadcast_to(given.get("target", targets), poses.shape),
             clock,
         )
@@ -194,10 +200,12 @@ class World:
             If the action has another shape, or is not of finite numbers.
         """
         action = np.clip(self._action(action, state.pose.shape), -1.0, 1.0)
-        pose, velocity, going = advance(
-            self.robot, state.pose, state.velocity, action * self.forces, self.step, self.count
+        pose, velocity, drives, going = advance(
+            *(self.robot, state.pose, state.velocity, action * self.forces, self.step, self.count),
+            machines=self.machines,
+            drives=state.drives,
         )
-        new = EpisodeState(pose, velocity, state.target, state.clock + self.period)
+        new = EpisodeState(pose, velocity, drives, state.target, state.clock + self.period)
         distance = self.distance(new)
         reward = 1.0 - np.tanh(2.0 * distance / self.spread)
         reward = reward - EFFORT * (action**2).mean(axis=-1)

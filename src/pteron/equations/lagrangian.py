@@ -88,6 +88,12 @@ def solve_positive_definite(matrix: Expression, right: Expression) -> Expression
 
     CasADi's own `solve` on SX expressions loses two digits on these systems.
     """
+    lower, pivots = factors(matrix)
+    return backward(lower, forward(lower, right) / pivots)
+
+
+def factors(matrix: Expression) -> tuple[Expression, Expression]:
+    """Return L and the diagonal (n, 1) of D, of L D L^T = a positive definite matrix."""
     n = matrix.shape[0]
     lower = ca.SX.eye(n)
     pivots: list[Expression] = []
@@ -96,10 +102,21 @@ def solve_positive_definite(matrix: Expression, right: Expression) -> Expression
         for i in range(j + 1, n):
             rest = sum(lower[i, k] * lower[j, k] * pivots[k] for k in range(j))
             lower[i, j] = (matrix[i, j] - rest) / pivots[j]
-    solution = [ca.SX(0)] * n
-    for i in range(n):
-        solution[i] = right[i] - sum(lower[i, k] * solution[k] for k in range(i))
+    return lower, ca.vertcat(*pivots)
+
+
+def forward(lower: Expression, right: Expression) -> Expression:
+    """Return L^-1 times a matrix."""
+    rows: list[Expression] = []
+    for i in range(lower.shape[0]):
+        rows.append(right[i, :] - sum(lower[i, k] * rows[k] for k in range(i)))
+    return ca.vertcat(*rows)
+
+
+def backward(lower: Expression, right: Expression) -> Expression:
+    """Return L^-T times a column."""
+    n = lower.shape[0]
+    found = [ca.SX(0)] * n
     for i in reversed(range(n)):
-        later = sum(lower[k, i] * solution[k] for k in range(i + 1, n))
-        solution[i] = solution[i] / pivots[i] - later
-    return ca.vertcat(*solution)
+        found[i] = right[i] - sum(lower[k, i] * found[k] for k in range(i + 1, n))
+    return ca.vertcat(*found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import accumulate, chain
 from typing import Any
 
 import casadi as ca
@@ -13,7 +14,7 @@ from pteron.bodies.parameters import PLATFORM, Parameter, parameter_list
 from pteron.closures import Closure, kind_for
 from pteron.legs.leg import LegEquations, LegMotion
 from pteron.manipulator import Manipulator
-from pteron.platforms import PlatformEquations, equations_class
+from pteron.platforms import PlatformEquations
 from pteron.platforms.motion import PlatformMotion
 
 
@@ -52,6 +53,7 @@ class Machine:
         return parameter_list([leg.kinds for leg in self.legs], self.platform.kinds)
 
     @classmethod
+    @lru_cache(maxsize=64)
     def of(cls, robot: Manipulator) -> Machine:
         """Return one machine, in numbers."""
         legs = tuple(leg.equations() for leg in robot.legs)
@@ -95,7 +97,7 @@ class Machine:
         gravity: Expression,
     ) -> Machine:
         more = {**more, "planes": [leg.holds for leg in legs]}
-        platform = equations_class(robot.platform)(frame, points, fixed, more)
+        platform = robot.platform.kind(frame, points, fixed, more)
         closure = kind_for([type(leg) for leg in legs], type(platform))
         assert closure is not None  # the manipulator has asked
         return cls(robot, legs, platform, closure(legs, platform), gravity)
@@ -145,7 +147,6 @@ class Machine:
         return legs, self.platform.moments(blocks[PLATFORM, ()])
 
 
-@lru_cache(maxsize=64)
 def closure_of(robot: Manipulator) -> Closure:
     """Return the closure of one machine, in numbers."""
     return Machine.of(robot).closure
@@ -161,3 +162,13 @@ def numbers(robot: Manipulator) -> list[float]:
     for vector in (*robot.platform.frame, *robot.platform.quantities.values(), robot.gravity):
         values += vector
     return values
+
+
+def number_places(robot: Manipulator) -> list[dict[str, int]]:
+    """Return where each quantity begins in that vector: those of each leg, and of the platform."""
+    sizes = [{q.name: len(q.value) for q in leg.quantities} for leg in robot.legs]
+    owned = [one | {"platform_point": 3, "fixed_offset": 3} for one in sizes]
+    quantities = robot.platform.quantities.items()
+    owned.append({"frame": 9} | {name: len(value) for name, value in quantities})
+    starts = accumulate(chain.from_iterable(one.values() for one in owned), initial=0)
+    return [{name: next(starts) for name in one} for one in owned]

@@ -1,7 +1,9 @@
 """Export of C99 for a controller: a header and a source, with a test program and a CMakeLists.txt.
 
 The code has no allocation, no static state, one exit a function, nothing but math.h. Comparisons
-are C99's macros, which are quiet for NaN: a plain `<` raises the flag of invalid operations.
+are C99's macros, which are quiet for NaN: a plain `<` raises the flag of invalid operations. In
+double precision sines, cosines and exponentials are the library's own arithmetic, so that a
+controller's code gives the bits that `simulate` has, on whatever machine it runs.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from pteron.export.names import prefix_of
 from pteron.kernels import Array
 from pteron.kernels.code import (
     C,
+    arithmetic,
     c_constant,
     names_of,
     rendered,
@@ -135,6 +138,7 @@ def c_texts(
         "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
         "tolerance": 1e-4 if single else 1e-10,
+        **arithmetic(),
     }
     files = {
         f"{prefix}.h": "header.h.j2",
@@ -186,7 +190,12 @@ class CPrinter:
 
     def _operations(self) -> dict[str, str]:
         """Return how operations are written; roots and quotients are guarded."""
-        printed = single_precision(C) if self.real == "float" else dict(C)
+        own = {
+            "sin": f"{self.prefix}_sincos({{0}}).sine",
+            "cos": f"{self.prefix}_sincos({{0}}).cosine",
+            "exp": f"{self.prefix}_exponential({{0}})",
+        }
+        printed = single_precision(C) if self.real == "float" else C | own
         one, zero = self.number(1.0), self.number(0.0)
         return printed | {
             "less": f"isless({{0}}, {{1}}) ? {one} : {zero}",

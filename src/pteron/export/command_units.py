@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 import casadi as ca
 
+from pteron.arguments import expect_one_of
 from pteron.bodies.motion import Expression
 from pteron.equations.laws import LAWS
 from pteron.errors import ModelError
@@ -39,8 +40,7 @@ def factors(robot: Manipulator, output: Output) -> tuple[float, ...]:
     ModelError
         If a leg's drive does not say what is needed; it names the first leg and key.
     """
-    if output not in get_args(Output):
-        raise ModelError(f"output: {output!r} is not one of {', '.join(get_args(Output))}")
+    expect_one_of(get_args(Output), ModelError, output=output)
     found = []
     for i, leg in enumerate(robot.legs, start=1):
         drive = leg.drive or Drive()
@@ -71,9 +71,7 @@ def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
     ports[place] = replace(ports[place], name=NAMES[output])
     scale = ca.reshape(ca.DM(factors(robot, output)), results[place].shape)
     results[place] = results[place] * scale
-    names = [port.name for port in given.inputs], [port.name for port in ports]
-    function = ca.Function(given.name, symbols, results, *names)
-    return Program(given.name, function, given.inputs, tuple(ports))
+    return Program.of(given.name, symbols, given.inputs, results, ports)
 
 
 _PER_READING = {
@@ -106,9 +104,7 @@ def at_readings(given: Program, robot: Manipulator) -> Program:
         else:
             power = _PER_READING.get(port.name, 0)
             results.append(per_joint(result, power) if power else result)
-    names = [port.name for port in given.inputs], [port.name for port in given.outputs]
-    function = ca.Function(given.name, symbols, results, *names)
-    return Program(given.name, function, given.inputs, given.outputs)
+    return Program.of(given.name, symbols, given.inputs, results, given.outputs)
 
 
 def told_meaning(robot: Manipulator, output: Output) -> str:

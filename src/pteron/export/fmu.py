@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import io
 import platform
-import subprocess
 import sys
 import tempfile
 import zipfile
@@ -32,9 +31,11 @@ from pteron.export.fmu_variables import fmu_variables
 from pteron.export.functions import chosen
 from pteron.export.names import prefix_of
 from pteron.export.start_pose import start_pose
+from pteron.export.tools import tool_lines
 from pteron.kernels import Array, as_array
 from pteron.kernels.c import c_compiler
 from pteron.kernels.code import rendered
+from pteron.kernels.compilers import built
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import refuse_readings
@@ -119,7 +120,7 @@ def export_fmu(
     values = {
         "banner": banner(robot, "FMU of FMI 3.0"),
         "name": quoteattr(robot.name),
-        "description": quoteattr(" ".join(banner(robot, "FMU")[:1])),
+        "description": quoteattr(" ".join([*banner(robot, "FMU")[:1], *tool_lines(robot)])),
         "tool": quoteattr(f"Pteron {version('pteron')}"),
         "quoted": lambda value: quoteattr(str(value)),
         "prefix": prefix,
@@ -184,25 +185,9 @@ def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
         )
     place, suffix = _platform()
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        for name, text in sources.items():
-            (folder / name).write_text(text, encoding="utf-8")
-        library = folder / f"{prefix}{suffix}"
-        files = [name for name in sources if name.endswith(".c")]
-        done = subprocess.run(
-            [*command, *_FLAGS, *files, "-o", library.name, "-lm"],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            check=False,
-        )
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
-            raise ModelError(
-                f"fmu: its code could not be compiled with {' '.join(command)}: {lines[0]}; set "
-                "the environment variable CC to another compiler"
-            )
+        library = Path(scratch) / f"{prefix}{suffix}"
+        advice = "set the environment variable CC to another compiler"
+        built(command, _FLAGS, sources, library, "fmu: its code", advice)
         return library.read_bytes(), f"binaries/{place}/{library.name}"
 
 

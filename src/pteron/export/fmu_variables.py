@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -158,23 +158,22 @@ _Part = tuple[str, Kind, str, list[FmuVariable]] | tuple[str, Kind, str, list[Fm
 
 
 def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
-    coordinates = robot.platform.coordinates
-    units = robot.units
+    pairs = list(zip(robot.platform.coordinates, robot.units, strict=True))
     legs = list(enumerate((leg.joint for leg in robot.legs), start=1))
+    start = dict(zip(robot.platform.coordinates, pose.tolist(), strict=True))
 
-    def of_pose(word: str, per: str, told: str, start: list[float] | None) -> list[FmuVariable]:
+    def of_pose(word: str, per: str, told: str, start: Mapping[str, float]) -> list[FmuVariable]:
         return [
-            FmuVariable(f"{word}.{name}", unit + per, f"{told} {name}", start[k] if start else None)
-            for k, (name, unit) in enumerate(zip(coordinates, units, strict=True))
+            FmuVariable(word.format(name), unit + per, told.format(name), start.get(name))
+            for name, unit in pairs
         ]
 
-    rest = [0.0] * len(coordinates)
     yield "time", "TIME", "offsetof(Values, time)", [FmuVariable("time", "s", "Time")]
-    states = of_pose("pose", "", "Platform pose,", [float(v) for v in pose])
+    states = of_pose("pose.{}", "", "Platform pose, {}", start)
     yield "pose", "STATE", "offsetof(Values, state)", states
-    states = of_pose("velocity", "/s", "Rate of the pose's", rest)
+    states = of_pose("velocity.{}", "/s", "Rate of the pose's {}", dict.fromkeys(start, 0.0))
     yield "velocity", "STATE", "offsetof(Values, state) + M * sizeof(double)", states
-    results = of_pose("acceleration", "/s2", "Acceleration of the pose's", None)
+    results = of_pose("acceleration.{}", "/s2", "Acceleration of the pose's {}", {})
     yield "acceleration", "RESULT", "ACCELERATION", results
     results = [FmuVariable(f"{j.coordinate}{i}", j.unit, f"Leg {i}: the {j.noun}") for i, j in legs]
     yield "joints", "RESULT", "JOINTS", results
@@ -183,32 +182,30 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
         for i, j in legs
     ]
     yield "joint_rates", "RESULT", "JOINT_RATES", results
-    results = [
-        FmuVariable(f"reach_reserve{i}", "1", f"Leg {i}: the simulation ends where this is 0")
-        for i, _ in legs
-    ]
+    text = "Leg {}: the simulation ends where this is 0"
+    results = [FmuVariable(f"reach_reserve{i}", "1", text.format(i)) for i, _ in legs]
     yield "reserves", "RESULT", "RESERVES", results
     inputs = [
-        FmuVariable(
-            f"{j.force}{i}", j.force_unit.replace(" ", "."), f"Leg {i}: the drive's {j.force}", f
-        )
-        for (i, j), f in zip(legs, (float(v) for v in forces), strict=True)
+        FmuVariable(f"{j.force}{i}", _dotted(j.force_unit), f"Leg {i}: the drive's {j.force}", f)
+        for (i, j), f in zip(legs, forces.tolist(), strict=True)
     ]
     yield "forces", "INPUT", "offsetof(Values, forces)", inputs
+    text = "What acts on the platform at P along {}"
     inputs = [
-        FmuVariable(f"wrench.{name}", unit, f"What acts on the platform at P along {along}", 0.0)
+        FmuVariable(f"wrench.{name}", unit, text.format(along), 0.0)
         for name, unit, along in _wrench(robot.platform)
     ]
     yield "wrench", "INPUT", "offsetof(Values, wrench)", inputs
     # Each state's rate is a variable of its own: some tools do not take an output in its place.
     for name, per, place in (("pose", "/s", "VELOCITY"), ("velocity", "/s2", "ACCELERATION")):
-        rates = [
-            FmuVariable(f"der({name}.{c})", unit + per, f"Rate of {name}.{c}")
-            for c, unit in zip(coordinates, units, strict=True)
-        ]
+        rates = of_pose(f"der({name}.{{}})", per, f"Rate of {name}.{{}}", {})
         yield f"{name}_rates", "RESULT", place, rates, name
     yield from _payload(robot)
     yield "drives", "START", "offsetof(Values, drives)", list(_drives(robot))
+
+
+def _dotted(unit: str) -> str:
+    return unit.replace(" ", ".")
 
 
 def _wrench(platform: Platform) -> Iterator[tuple[str, str, str]]:
@@ -236,15 +233,15 @@ def _payload(robot: Manipulator) -> Iterator[_Part]:
         yield "payload.centre", "START", "offsetof(Values, center)", told
     if platform.angles:
         axis = "Its inertia about the axis through its own centre"
-        told = [FmuVariable("payload.inertia", "kg.m2", axis, 0.0, 0.0)]
+        names = {"nertia": axis}
         if platform.tilts:
-            told = [
-                FmuVariable(
-                    *(f"payload.i{pair}", "kg.m2", f"I{pair} about its own centre", 0.0),
-                    0.0 if pair[0] == pair[1] else None,
-                )
-                for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
-            ]
+            pairs = ("xx", "xy", "xz", "yy", "yz", "zz")
+            names = {pair: f"I{pair} about its own centre" for pair in pairs}
+        least = dict.fromkeys(("nertia", "xx", "yy", "zz"), 0.0)
+        told = [
+            FmuVariable(f"payload.i{name}", "kg.m2", text, 0.0, least.get(name))
+            for name, text in names.items()
+        ]
         yield "payload.inertia", "START", "offsetof(Values, inertia)", told
 
 
@@ -269,7 +266,7 @@ def _drives(robot: Manipulator) -> Iterator[FmuVariable]:
                 "stribeck_speed": f"{leg.joint.unit}/s",
                 "rest_speed": f"{leg.joint.unit}/s",
             }
-            unit = units.get(name, leg.joint.force_unit.replace(" ", "."))
+            unit = units.get(name, _dotted(leg.joint.force_unit))
             least = None if name == "offset" else 0.0
             yield FmuVariable(
                 f"drive{i}.{name}", unit, f"Leg {i}: {texts[name]}", float(next(values)), least

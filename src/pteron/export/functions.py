@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 
 from pteron.controllers import CONTROLLERS, Controller
@@ -40,7 +41,6 @@ from pteron.kernels import (
     Graph,
     Port,
     Program,
-    columns_of,
     graph_of,
     program,
     specialised as with_values,
@@ -229,10 +229,10 @@ def _exported(
     base = (identified or Identified.of(robot)) if name.endswith(_BASE) else None
     if base:
         given = base_program(what, base, wrench=loaded, folded=specialised)
+    elif controller:
+        given = _without_status(controller.law(robot).program)
     else:
-        learnt = controller.base(robot) if controller else None
-        columns = None if learnt is None else columns_of(learnt)
-        given = program(robot, what, columns, wrench=loaded, named=True)
+        given = program(robot, what, wrench=loaded, named=True)
     bodies = "parameters" in {port.name for port in given.inputs} or name in SELECTED
     if identified and bodies:
         other = f"ask for {what + _BASE}" if what in (*REDUCIBLE, _PAYLOAD) else "leave it out"
@@ -282,6 +282,15 @@ def _exported(
         tables,
         tuple(_evaluated(given, graph, state) for state in states[1:]),
     )
+
+
+def _without_status(given: Program) -> Program:
+    """Return a program without its last output, all others the same to the bit."""
+    symbols = given.function.sx_in()
+    names = [port.name for port in given.inputs], [port.name for port in given.outputs[:-1]]
+    results = given.function.call(symbols)[:-1]
+    function = ca.Function(given.name, symbols, results, *names)
+    return Program(given.name, function, given.inputs, given.outputs[:-1])
 
 
 def _table(

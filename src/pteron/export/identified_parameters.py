@@ -26,7 +26,6 @@ from pteron.kernels import (
     program,
     specialised as with_values,
 )
-from pteron.kernels.passes import optimised
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
@@ -175,16 +174,11 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
     more = load.function(mass, center, inertia, ca.SX.zeros(parameters.shape))
     given = ca.SX.sym(_NAME, base.rank)
     grouping = ca.sparsify(ca.SX(ca.DM(base.grouping)))
-    loaded = f"loaded_{_NAME}"
-    function = ca.Function(
-        load.name,
-        [mass, center, inertia, given],
-        [given + ca.mtimes(grouping, more.T)],
-        [*(port.name for port in load.inputs[:3]), _NAME],
-        [loaded],
-    )
     ports = (*load.inputs[:3], Port(_NAME, (base.rank,), shared=True))
-    return Program(load.name, optimised(function), ports, (Port(loaded, (base.rank,)),))
+    loaded, found = Port(f"loaded_{_NAME}", (base.rank,)), given + ca.mtimes(grouping, more.T)
+    return Program.of(
+        load.name, [mass, center, inertia, given], ports, [found], [loaded]
+    ).optimised()
 
 
 def _recombined(given: Program, matrix: Array) -> Program:
@@ -195,6 +189,5 @@ def _recombined(given: Program, matrix: Array) -> Program:
     ports[place] = Port(_NAME, matrix.shape[1:], shared=True)
     taken = list(symbols)
     taken[place] = ca.mtimes(ca.sparsify(ca.SX(ca.DM(matrix))), symbols[place])
-    names = [port.name for port in ports], [port.name for port in given.outputs]
-    function = ca.Function(given.name, symbols, given.function.call(taken), *names)
-    return Program(given.name, optimised(function), tuple(ports), given.outputs)
+    results = given.function.call(taken)
+    return Program.of(given.name, symbols, ports, results, given.outputs).optimised()

@@ -11,9 +11,8 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.identification.estimators import weighted
 from pteron.identification.logs import Log
-from pteron.identification.long_matrices import scaled
 from pteron.identification.model import Model
-from pteron.identification.observation import LinearModel, Observations, observations_of
+from pteron.identification.observation import LinearModel, Observations, observations_of, scaled
 from pteron.identification.plausibility import unphysical
 from pteron.identification.signals import Preprocessing
 

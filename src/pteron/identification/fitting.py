@@ -30,7 +30,6 @@ from pteron.identification.observation import LinearModel, Observations, observa
 from pteron.identification.plausibility import left_over
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
-from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
 METHODS = (*ESTIMATORS, "instrumental", "likelihood")
@@ -98,8 +97,17 @@ def check_recordings(
 
 
 def check_payload(fit: Sequence[Recording]) -> None:
-    """Refuse recordings that do not tell when a payload is carried."""
-    if all(one.head().payload is None for one in fit):
+    """Refuse recordings that do not tell when a payload is carried, or carry several."""
+    heads = [one.head() for one in fit]
+    masses = {head.payload_mass: head.source for head in heads if head.payload_mass is not None}
+    if len(masses) > 1:
+        several = ", ".join(f"{mass:g} kg in {source}" for mass, source in masses.items())
+        raise LogError(
+            "no payload",
+            fit[0].source,
+            f"several payloads, {several}; identify one at a time, each with the log without it",
+        )
+    if all(head.payload is None for head in heads):
         raise LogError(
             "no payload",
             fit[0].source,
@@ -131,14 +139,11 @@ def preprocessing_for(
 
 
 def fit_observations(
-    model: LinearModel,
-    one: Recording,
-    preprocessing: Preprocessing,
-    progress: Callable[[int], None],
+    model: LinearModel, one: Recording, preprocessing: Preprocessing
 ) -> Observations:
     """Return a recording's observations; where it has no poses, say whether joints are swapped."""
     try:
-        return observations_of(model, one.samples(progress), preprocessing)
+        return observations_of(model, one.samples(), preprocessing)
     except LogError as error:
         if error.reason != "no pose":
             raise
@@ -167,18 +172,12 @@ def balanced(parts: Sequence[Observations]) -> Observations:
     usual = median_noise(whole, found.residuals)
     if (usual <= _NOISELESS * np.abs(whole.forces).max(axis=0)).any():
         return whole
-    scales = [np.clip(usual / np.maximum(one, 1e-300), 1.0 / _MOST, _MOST) for one in rest]
-    return stacked([_scaled(part, one) for part, one in zip(parts, scales, strict=True)])
-
-
-def _scaled(part: Observations, factor: Array) -> Observations:
-    """Return observations with each actuator's rows times a factor (n,)."""
-    return replace(
-        part,
-        matrix=part.matrix * factor[:, None],
-        forces=part.forces * factor,
-        gain=part.gain / factor,
-    )
+    scaled = []
+    for part, one in zip(parts, rest, strict=True):
+        factor = np.clip(usual / np.maximum(one, 1e-300), 1.0 / _MOST, _MOST)
+        rows, forces = part.matrix * factor[:, None], part.forces * factor
+        scaled.append(replace(part, matrix=rows, forces=forces, gain=part.gain / factor))
+    return stacked(scaled)
 
 
 def estimated(

@@ -144,12 +144,8 @@ def identify(
 
     def observe(columns: LinearModel, delay: float | None = None) -> Observations:
         late = [how if delay is None else replace(how, delay=delay) for how in preprocessing]
-        return balanced(
-            [
-                fit_observations(columns, one, how, _reader(report, "Filtering"))
-                for one, how in zip(fit, late, strict=True)
-            ]
-        )
+        told = zip(_told(fit, report, "Filtering"), late, strict=True)
+        return balanced([fit_observations(columns, one, how) for one, how in told])
 
     found, more = Unknowns(), np.zeros(())
     if model.terms.stribeck == "auto":
@@ -179,14 +175,8 @@ def identify(
     # Judge by what was held out, which betrays columns that are not what they are called
     modes = [None] * len(check) if others else [how.start for how in preprocessing]
     held = [
-        judged(
-            model,
-            estimate.values,
-            one,
-            preprocessing_for(robot, one, wanted, start),
-            _reader(report, "Checking"),
-        )
-        for one, start in zip(check, modes, strict=True)
+        judged(model, estimate.values, one, preprocessing_for(robot, one, wanted, start))
+        for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
     ]
     by_held_out = verdict_of(held, repeats=not others)
     impossible = unphysical(model, observations, estimate)
@@ -204,8 +194,8 @@ def identify(
     faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
     verdict = verdict_of(held, faults, repeats=not others, limits=limits)
     fitted = tuple(
-        predict(model, estimate.values, one.beginning(), how, _reader(report, "Predicting"))
-        for one, how in zip(fit, preprocessing, strict=True)
+        predict(model, estimate.values, one.beginning(), how)
+        for one, how in zip(_told(fit, report, "Predicting"), preprocessing, strict=True)
     )
 
     # Find what the data show by themselves, and real bodies
@@ -269,6 +259,11 @@ def _reader(report: Stage, task: str) -> Callable[[int], None]:
         report(task, done, done)
 
     return tell
+
+
+def _told(recordings: Sequence[Recording], report: Stage, task: str) -> list[Recording]:
+    """Return recordings that report how many of their rows are read for a task."""
+    return [replace(one, tell=_reader(report, task)) for one in recordings]
 
 
 def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, float], ...] | None:

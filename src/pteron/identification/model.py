@@ -11,10 +11,11 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from pteron.arguments import checked_arguments, expect_one_of
 from pteron.bodies.parameters import unit_of
 from pteron.equations.friction import PassiveJoint, passive_joints
 from pteron.errors import ModelError
-from pteron.identification.long_matrices import scaled
+from pteron.identification.observation import scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion
 from pteron.kernels import Array
@@ -33,6 +34,7 @@ _DEPENDENT = 1e-9
 """Residual of a column on those before it, relative to it, below which it depends on them."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Terms:
     """Terms of the model beside the base parameters.
@@ -71,10 +73,7 @@ class Terms:
                 raise ModelError(f"stribeck: {self.stribeck} given, speeds above 0 expected")
             found = tuple(speeds.tolist())
             object.__setattr__(self, "stribeck", found if len(found) > 1 else found[0])
-        if self.passive not in get_args(Passive):
-            raise ModelError(
-                f"passive: {self.passive!r} is not one of {', '.join(get_args(Passive))}"
-            )
+        expect_one_of(get_args(Passive), ModelError, passive=self.passive)
 
 
 class Term(NamedTuple):
@@ -244,9 +243,9 @@ class Model:
         motion = states.pose, states.velocity, states.acceleration
         parts = [base_regressor(robot, self.base, *motion)]
         if terms.coulomb:
-            parts.append(_diagonal(np.sign(states.joint_rates)))
+            parts.append(diagonal(np.sign(states.joint_rates)))
         if terms.viscous:
-            parts.append(_diagonal(states.joint_rates))
+            parts.append(diagonal(states.joint_rates))
         if terms.offset:
             parts.append(np.broadcast_to(np.eye(n), (len(states), n, n)))
         if terms.passive != "none":
@@ -256,10 +255,10 @@ class Model:
                 chosen = [places[joint] for joint in joints]
                 parts.append(columns[..., chosen].sum(axis=-1, keepdims=True))
         if terms.rotors:
-            parts.append(_diagonal(states.joint_accelerations))
+            parts.append(diagonal(states.joint_accelerations))
         if (speeds := self.stribeck_speeds) is not None:
             rates = states.joint_rates
-            parts.append(_diagonal(np.sign(rates) * np.exp(-((rates / speeds) ** 2))))
+            parts.append(diagonal(np.sign(rates) * np.exp(-((rates / speeds) ** 2))))
         if terms.payload:
             carried = unchecked(robot, "regressor", *motion)
             carried = carried[..., -len(robot.platform.inertia.kinds) :]
@@ -338,6 +337,6 @@ def _probes(robot: Manipulator) -> States:
     return States.of(np.zeros(_PROBES), motion, np.arange(_PROBES) % 2)
 
 
-def _diagonal(values: Array) -> Array:
+def diagonal(values: Array) -> Array:
     """Return (R, n, n): a column for each joint."""
     return np.asarray(values[..., None] * np.eye(values.shape[-1]))

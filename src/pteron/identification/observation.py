@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d  # type: ignore[import-untyped]
 
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
@@ -192,7 +192,7 @@ def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> A
     """
     moves = (np.abs(rates) >= slow).astype(float)
     size, mode = 2 * rows + 1, "wrap" if wraps else "nearest"
-    return np.asarray(minimum_filter1d(moves, size, axis=0, mode=mode))
+    return np.asarray(scipy.ndimage.minimum_filter1d(moves, size, axis=0, mode=mode))
 
 
 def _filtered(model: LinearModel, block: SampleBlock, preprocessing: Preprocessing) -> Observations:
@@ -203,7 +203,7 @@ def _filtered(model: LinearModel, block: SampleBlock, preprocessing: Preprocessi
     moving = (moving * block.smooth[:, None])[inner]
     states, forces = block.states.part(inner), block.forces[inner]
     kept = decimation.centers(len(states))
-    return _assembled(
+    return assembled(
         model,
         decimation(moving[..., None] * model.matrix(states)),
         decimation(moving * forces),
@@ -214,7 +214,7 @@ def _filtered(model: LinearModel, block: SampleBlock, preprocessing: Preprocessi
     )
 
 
-def _assembled(
+def assembled(
     model: LinearModel,
     matrix: Array,
     forces: Array,
@@ -271,15 +271,9 @@ def _periodic(
     kept = np.linspace(start, start + period, count, endpoint=False)
 
     def regressor(time: Array, used: Array, first_row: int) -> Array:
-        states = States.of_joints(
-            model.robot,
-            series.at(time),
-            time,
-            preprocessing.start,
-            payload=None if log.payload is None else np.full(len(time), log.payload[0]),
-            source=log.source,
-            first_row=first_row,
-        )
+        phases = None if log.payload is None else np.full(len(time), log.payload[0])
+        at = replace(log, time=time, payload=phases, first_row=first_row)
+        states = States.of_log(model.robot, at, series.at(time), preprocessing.start)
         return np.asarray(used[..., None] * model.matrix(states))
 
     places = (log.time - start) * (per_period / period)
@@ -303,7 +297,7 @@ def _periodic(
         rows = basis @ projection.coefficients(lambda part: used[part] * log.forces[part], n)
         noise = projection.noise(used, kept)
     payload = np.full(count, 0 if log.payload is None else log.payload[0], dtype=np.int64)
-    return _assembled(model, matrix, rows, noise, kept, payload, np.sqrt(count / log.rows))
+    return assembled(model, matrix, rows, noise, kept, payload, np.sqrt(count / log.rows))
 
 
 def _projected_noise(moving: Array, count: int) -> Array:
@@ -322,3 +316,18 @@ def _projected(signal: Array, count: int) -> Array:
     """Return one period's samples (T, ...) as `count` samples of its lowest harmonics (odd)."""
     spectrum = np.fft.rfft(signal, axis=0)[: count // 2 + 1]
     return np.asarray(np.fft.irfft(spectrum, n=count, axis=0) * (count / len(signal)))
+
+
+def scaled(columns: Array) -> tuple[Array, Array]:
+    """Return columns (R, k) divided by their lengths, and these (k,); 1 for a column of zeros."""
+    lengths = np.linalg.norm(columns, axis=0)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    return columns / lengths, lengths
+
+
+def triangle(pieces: Iterable[Array], size: int) -> Array:
+    """Return the QR decomposition's R (k, k) of rows (R, k) in pieces, k being `size`."""
+    factor: Array = np.zeros((size, size))
+    for piece in pieces:
+        factor = np.asarray(np.linalg.qr(np.vstack([factor, piece]), mode="r"))
+    return factor

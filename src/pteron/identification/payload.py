@@ -8,7 +8,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.bodies.inertia import PlanarInertia, SpatialInertia, inertia_count
 from pteron.bodies.parameters import LENGTH_POWERS
@@ -167,7 +167,9 @@ class Payload:
     def felt(self) -> bool:
         """Whether the values differ from those of no payload by more than chance (Wald, 0.1 %)."""
         chosen = [self.estimate.names.index(name) for name in self.names]
-        return self.estimate.wald(self.values, chosen) > float(chi2.isf(CHANCE, len(chosen)))
+        return self.estimate.wald(self.values, chosen) > float(
+            scipy.stats.chi2.isf(CHANCE, len(chosen))
+        )
 
     @property
     def allowed_for(self) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.identification.consistency import Consistency
 from pteron.identification.consistency.bodies import bodies_of
@@ -165,7 +165,7 @@ class Factor(NamedTuple):
     @property
     def chance(self) -> float:
         """Probability that it seems so far from one where it is one."""
-        return float(2.0 * norm.sf(abs(self.value - 1.0) / max(self.deviation, 1e-300)))
+        return float(2.0 * scipy.stats.norm.sf(abs(self.value - 1.0) / max(self.deviation, 1e-300)))
 
 
 def known_values(

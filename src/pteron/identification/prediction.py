@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
 from pteron.identification.model import Model
 from pteron.identification.observation import in_motion
@@ -130,23 +129,16 @@ class Prediction:
 
 
 def predict(
-    model: Model,
-    values: Array,
-    recording: Recording,
-    preprocessing: Preprocessing,
-    progress: Callable[[int], None] | None = None,
+    model: Model, values: Array, recording: Recording, preprocessing: Preprocessing
 ) -> Prediction:
-    """Return the prediction of a recording by a model with values (p,), with its preprocessing.
-
-    `progress` is called with the number of rows just read.
-    """
+    """Return the prediction of a recording by a model with values (p,), with its preprocessing."""
     n = len(model.robot.legs)
     plain = np.where(np.isin(model.kinds, FRICTION), 0.0, values)
     counts, total = np.zeros(n), 0
     sums = np.zeros((7, n))
     shown: list[Array] = []
     step = max(recording.rows // _KEPT, 1)
-    for block in samples(model.robot, recording.samples(progress), preprocessing):
+    for block in samples(model.robot, recording.samples(), preprocessing):
         states, measured = block.states.part(block.fresh), block.forces[block.fresh]
         matrix = model.matrix(states)
         predicted, without = matrix @ values, matrix @ plain
@@ -202,5 +194,5 @@ def _stands_out(error: Array, noise: Array) -> NDArray[np.bool_]:
 
     An error that lasts longer than a few samples is no outlier, but not understood.
     """
-    around = median_filter(error, size=(_AROUND, 1), mode="nearest")
+    around = scipy.ndimage.median_filter(error, size=(_AROUND, 1), mode="nearest")
     return np.asarray(np.abs(error - around) > _STANDS_OUT * noise)

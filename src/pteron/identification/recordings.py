@@ -7,13 +7,13 @@ aside.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
-from pteron.identification.logs.time_stamps import TimeStamps
+from pteron.identification.logs.log import TimeStamps
 from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
@@ -35,12 +35,14 @@ FITTED = 0.7
 class Recording:
     """A log, or its rows `start` to `stop`, that can be read more than once.
 
-    Rows count from 0, without row `stop`, which may lie beyond the last.
+    Rows count from 0, without row `stop`, which may lie beyond the last. `tell` is called with the
+    number of rows just read.
     """
 
     log: Log | LogFile
     start: int
     stop: int
+    tell: Callable[[int], None] | None = field(default=None, repr=False, compare=False)
 
     @property
     def source(self) -> str:
@@ -62,16 +64,16 @@ class Recording:
         """Return the log itself where it is in memory, else its first piece."""
         if isinstance(self.log, Log):
             return self.log.part(self.start, self.stop)
-        return next(iter(self.pieces(None)))
+        return next(iter(replace(self, tell=None).pieces()))
 
-    def pieces(self, progress: Callable[[int], None] | None = None) -> Iterator[Log]:
+    def pieces(self) -> Iterator[Log]:
         """Yield the rows in order, a piece at a time."""
         if isinstance(self.log, Log):
             yield self.log.part(self.start, self.stop)
-            if progress is not None:
-                progress(self.rows)
+            if self.tell is not None:
+                self.tell(self.rows)
             return
-        for piece in self.log.pieces(progress=progress):
+        for piece in self.log.pieces(progress=self.tell):
             if piece.first_row >= self.stop:
                 return
             first = max(self.start - piece.first_row, 0)
@@ -85,9 +87,9 @@ class Recording:
             return self
         return replace(self, stop=min(self.stop, self.start + _LOOKED_AT))
 
-    def samples(self, progress: Callable[[int], None] | None = None) -> Log | Iterator[Log]:
+    def samples(self) -> Log | Iterator[Log]:
         """Return the log where it is in memory, else its pieces."""
-        return self.head() if isinstance(self.log, Log) else self.pieces(progress)
+        return self.head() if isinstance(self.log, Log) else self.pieces()
 
 
 def recording(

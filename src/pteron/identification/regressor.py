@@ -162,7 +162,13 @@ def estimate(
 
     def alike(numbers: ArrayLike) -> Observations:
         """Return instruments as observations of the samples that are fitted."""
-        part = _like(whole, numbers).part(slice(len(fit.time)))
+        given = finite(numbers, "instruments")
+        if given.size != whole.matrix.size:
+            raise DataError(
+                f"instruments: shape {given.shape} given, that of the regressor, "
+                f"{whole.matrix.shape}, expected"
+            )
+        part = replace(whole, matrix=given.reshape(whole.matrix.shape)).part(slice(len(fit.time)))
         return part if found is None else part.columns(found.kept)
 
     again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
@@ -186,17 +192,6 @@ def estimate(
         verdict_of([prediction], repeats=held_out is None),
         found,
     )
-
-
-def _like(whole: Observations, instruments: ArrayLike) -> Observations:
-    """Return instruments as observations of the same samples."""
-    numbers = finite(instruments, "instruments")
-    if numbers.size != whole.matrix.size:
-        raise DataError(
-            f"instruments: shape {numbers.shape} given, that of the regressor, "
-            f"{whole.matrix.shape}, expected"
-        )
-    return replace(whole, matrix=numbers.reshape(whole.matrix.shape))
 
 
 def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:

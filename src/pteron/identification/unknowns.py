@@ -15,14 +15,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
 
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
-from pteron.identification.long_matrices import scaled
 from pteron.identification.model import Model
-from pteron.identification.observation import LinearModel, Observations
+from pteron.identification.observation import LinearModel, Observations, scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
@@ -101,30 +100,23 @@ class Unknowns:
 
 @dataclass(frozen=True)
 class _ExtendedModel:
-    """A model with a group of columns behind it that are each actuator's own, (R, n, k)."""
+    """A model with a group of columns behind it that are each actuator's own."""
 
-    model: Model
-    count: int
-    columns: Callable[[States], Array]
+    robot: Manipulator
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    kinds: tuple[str, ...]
+    matrix: Callable[[States], Array]
 
-    @property
-    def robot(self) -> Manipulator:
-        return self.model.robot
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return (*self.model.names, *(f"column {k}" for k in range(self.count)))
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        return (*self.model.units, *("" for _ in range(self.count)))
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        return (*self.model.kinds, *("stribeck" for _ in range(self.count)))
-
-    def matrix(self, states: States) -> Array:
-        return np.concatenate([self.model.matrix(states), self.columns(states)], axis=-1)
+def _extended(model: Model, count: int, columns: Callable[[States], Array]) -> _ExtendedModel:
+    """Return a model with so many columns (R, n, k) more."""
+    names = (*model.names, *(f"column {k}" for k in range(count)))
+    units, kinds = (*model.units, *("",) * count), (*model.kinds, *("stribeck",) * count)
+    return _ExtendedModel(
+        *(model.robot, names, units, kinds),
+        lambda states: np.concatenate([model.matrix(states), columns(states)], axis=-1),
+    )
 
 
 def settled(
@@ -164,7 +156,7 @@ def settled(
         if speeds is not None:
             model = model.falling(speeds)
         columns = partial(_slopes, model, seen, values, late)
-        rows = observe(_ExtendedModel(model, len(seen) + late, columns), found.delay)
+        rows = observe(_extended(model, len(seen) + late, columns), found.delay)
         plain = rows.columns(range(p))
         whole, part = weighted(rows), weighted(plain)
         values, more = part.values, whole.covariance[:p, :p] - part.covariance
@@ -201,11 +193,13 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
         return np.asarray(np.sign(rates) * falls)
 
-    rows = observe(_ExtendedModel(model, _COLUMNS, columns))
+    rows = observe(_extended(model, _COLUMNS, columns))
     plain = rows.columns(range(p))
     noise = weighted(plain).noise
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
-    spline = make_interp_spline(np.log(shares), np.eye(_COLUMNS), k=5)(np.log(tried))
+    spline = scipy.interpolate.make_interp_spline(np.log(shares), np.eye(_COLUMNS), k=5)(
+        np.log(tried)
+    )
     speeds = np.full(n, np.inf)
     for _ in range(2):
         # Of all columns, and the forces, what the others leave; the noise is that of the last fit.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,6 +63,9 @@ _HIDDEN: dict[str, tuple[str, str]] = {
 }
 """Faults that a log may hide: the reason, and a remedy."""
 
+_MANY = 100.0
+"""Multiple from which no digits are told."""
+
 
 def verdict_of(
     held_out: Sequence[Prediction],
@@ -121,11 +124,7 @@ def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -
 
 
 def judged(
-    model: Model,
-    values: Array,
-    recording: Recording,
-    preprocessing: Preprocessing,
-    progress: Callable[[int], None] | None = None,
+    model: Model, values: Array, recording: Recording, preprocessing: Preprocessing
 ) -> Prediction:
     """Return the prediction by a model with values (p,) of a recording that was not fitted.
 
@@ -133,14 +132,14 @@ def judged(
     the whole recording, and samples at rest, which do not count, have less noise than others. No
     value is fitted to this, and a wrong model stays wrong at every cut-off.
     """
-    found = predict(model, values, recording, preprocessing, progress)
+    found = predict(model, values, recording, preprocessing)
     if preprocessing.cutoff is None or preprocessing.derivatives == "periodic":
         return found
     for share in _LOWER:
         if _of_prediction(found).grade == "trustworthy":
             break
         lower = replace(preprocessing, cutoff=share * preprocessing.cutoff)
-        other = predict(model, values, recording, lower, progress)
+        other = predict(model, values, recording, lower)
         found = min(found, other, key=lambda one: float(one.robust_nrms.max()))
     return found
 
@@ -169,22 +168,21 @@ def _of_prediction(prediction: Prediction) -> Opinion:
         )
     elif ratio[worst] > AT_THE_FLOOR:
         found.grade = _graded(float(missed[worst]), SMALL)
-    errors = ", ".join(f"{value:.2f}" for value in prediction.nrms)
-    floors = ", ".join(f"{value:.2f}" for value in prediction.floor)
     found.reasons.append(
-        f"{prediction.source}: held-out NRMS of {errors} % where noise alone makes {floors} %."
+        f"{prediction.source}: held-out NRMS of {percentages(prediction.nrms)} where noise alone "
+        f"makes {percentages(prediction.floor)}."
     )
     if (share := float(prediction.outliers.max())) > 0.0:
-        robust = ", ".join(f"{value:.2f}" for value in prediction.robust_nrms)
         found.reasons.append(
             f"{prediction.source}: up to {100.0 * share:.2g} % of a force's samples stand out; "
-            f"without them the NRMS is {robust} %, which is what counts."
+            f"without them the NRMS is {percentages(prediction.robust_nrms)}, which is what counts."
         )
         found.steps.append("Forces stand out: --estimator huber counts such samples less.")
     if found.grade == "trustworthy" and ratio[worst] > AT_THE_FLOOR:
         found.reasons.append(
-            f"The error of actuator {worst + 1} is {ratio[worst]:.2g} times the noise: the model "
-            f"misses {missed[worst]:.1f} % of its force beyond it; up to {SMALL:g} % is trusted."
+            f"The error of actuator {worst + 1} is {times(ratio[worst])} the noise: the model "
+            f"misses {percentages([missed[worst]], 1)} of its force beyond it; up to {SMALL:g} % "
+            "is trusted."
         )
     elif found.grade != "trustworthy":
         found.reasons.append(
@@ -225,7 +223,8 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
     off = float(shown.off[worst])
     found.lower(_graded(off, CYCLE))
     found.reasons.append(
-        f"A pick-and-place cycle as fast as this motion is expected to be up to {off:.2g} % off "
+        f"A pick-and-place cycle as fast as this motion is expected to be up to "
+        f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
         "not."
     )
@@ -235,3 +234,28 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
             "faster or longer."
         )
     return found
+
+
+def percentages(values: Iterable[float], places: int = 2) -> str:
+    """Return percentages with so many places, or that all are less than their last one.
+
+    Examples
+    --------
+    >>> percentages([1.234, 0.0]), percentages([3e-10, 1e-12])
+    ('1.23, 0.00 %', 'less than 0.01 %')
+    """
+    shown, least = list(values), 10.0**-places
+    if all(0.0 <= value < least for value in shown):
+        return f"less than {least:g} %"
+    return f"{', '.join(f'{value:.{places}f}' for value in shown)} %"
+
+
+def times(ratio: float) -> str:
+    """Return how many times one value is another.
+
+    Examples
+    --------
+    >>> times(3.14159), times(3.1e3)
+    ('3.1 times', 'more than 100 times')
+    """
+    return f"more than {_MANY:g} times" if ratio > _MANY else f"{ratio:.2g} times"

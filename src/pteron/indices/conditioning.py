@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
-from scipy.stats import qmc  # type: ignore[import-untyped]
 
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError
@@ -109,7 +109,7 @@ def global_conditioning(
     power = max(int(np.ceil(np.log2(count / _GROUPS))), 0)
     sums = []
     for generator in np.random.default_rng(seed).spawn(_GROUPS):
-        unit = qmc.Sobol(int(free.sum()), rng=generator).random_base2(power)
+        unit = scipy.stats.qmc.Sobol(int(free.sum()), rng=generator).random_base2(power)
         poses = np.tile(low, (len(unit), 1))
         poses[:, free] += unit * (high - low)[free]
         margin = numeric(robot, "reach")(poses)[0]

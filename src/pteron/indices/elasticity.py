@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from pteron.arguments import checked_arguments
 from pteron.bodies.vectors import number
 from pteron.errors import ModelError
 from pteron.manipulator import Manipulator
@@ -108,6 +109,7 @@ Springs = tuple[tuple[float, ...], tuple[tuple[Section | None, Section | None], 
 """The actuators' stiffness, and the sections of the upper and the lower link, of every leg."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Elasticity:
     """Stiffnesses of a machine's actuators and links.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pteron.arguments import checked_arguments
 from pteron.errors import DataError
 from pteron.indices.sensitivities import at_tool, geometric_sensitivities
 from pteron.kernels import Array
@@ -15,6 +16,7 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import Numbers, OnFailure, PerCoordinate, PoseLike
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Tolerances:
     """Tolerances of a machine: each number is a limit (+-) about the nominal value, or a deviation.

@@ -116,9 +116,9 @@ def bounded(robot: RobotLike, what: str) -> Bounded:
 @lru_cache(maxsize=256)
 def _bounded(robot: Manipulator, what: str) -> Bounded:
     built = program(robot, what, plain=True)
-    others = [p.name for p in built.inputs if p.name != "pose" and p.name not in FIXED]
-    if others or built.inputs[0].name != "pose":
-        told = ", ".join(p.name for p in built.inputs)
+    names = [port.name for port in built.inputs]
+    if "pose" not in names or set(names) - {"pose", *FIXED}:
+        told = ", ".join(names)
         raise ModelError(f"what: {what!r} depends on {told}; bounds are on functions of the pose")
     pose = ca.SX.sym("pose", robot.freedom)
     given = [

@@ -36,12 +36,12 @@ from pteron.kernels.code import (
     rendered,
     single_precision,
 )
-from pteron.kernels.compilers import run
+from pteron.kernels.compilers import built, run
 from pteron.kernels.exponential import straight
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
 
-_FLAGS = (
+FLAGS = (
     *("-std=c99", "-O3", "-march=native", "-fno-math-errno", "-fPIC"),
     # Nobody looks at the traps of floating-point operations; minding them keeps loops scalar.
     "-fno-trapping-math",
@@ -49,14 +49,19 @@ _FLAGS = (
     # from pairing them; loops, which are what is vectorised here, do not need that.
     *("-ffp-contract=off", "-fno-tree-slp-vectorize"),
 )
+"""Options of the compiler."""
 
-_LINKED = (
+LINKED = (
     "-shared",
     # On macOS a module must say that Python itself brings the symbols of its interface.
     *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()),
 )
+"""Options of a library."""
 
-_LIBRARY = "pteron_kernel" + EXTENSION_SUFFIXES[0]
+SUFFIX = EXTENSION_SUFFIXES[0]
+"""The end of a library's name."""
+
+_LIBRARY = "pteron_kernel" + SUFFIX
 
 
 def c_compiler() -> tuple[str, ...] | None:
@@ -84,7 +89,8 @@ def _command(given: str, path: str) -> tuple[str, ...] | None:
 
 
 @lru_cache(maxsize=4)
-def _version(command: tuple[str, ...]) -> str:
+def compiler_version(command: tuple[str, ...]) -> str:
+    """Return what a compiler says of itself."""
     return run([*command, "--version"]).stdout
 
 
@@ -165,7 +171,7 @@ class Code:
                 f'target: "c" needs a C compiler and Python\'s headers, {why}; '
                 'install them, or use "vm" or "numba"'
             )
-        return f"c-{self.name}-{digest(self.source, *command, _version(command), *_FLAGS)}"
+        return f"c-{self.name}-{digest(self.source, *command, compiler_version(command), *FLAGS)}"
 
     def is_cached(self) -> bool:
         """Return whether the compiled code is on disk, ready to be loaded."""
@@ -191,16 +197,10 @@ class Code:
     def _build(self, folder: Path) -> None:
         command = compiler()
         assert command is not None  # `_entry` has asked
-        source, library = folder / "kernel.c", folder / _LIBRARY
-        source.write_text(self.source, encoding="utf-8")
         headers = (f"-I{path}" for path in (sysconfig.get_path("include"), np.get_include()))
-        done = run([*command, *_FLAGS, *headers, *_LINKED, str(source), "-o", str(library), "-lm"])
-        if done.returncode != 0 or not library.exists():
-            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}, no library"]
-            raise ModelError(
-                f'target: "c" could not be compiled with {" ".join(command)}: {lines[0]}; use '
-                '"vm" or "numba", or set CC to another compiler'
-            )
+        advice = 'use "vm" or "numba", or set CC to another compiler'
+        flags, sources = [*FLAGS, *headers, *LINKED], {"kernel.c": self.source}
+        built(command, flags, sources, folder / _LIBRARY, 'target: "c"', advice)
 
     def bound(
         self, fixed: Mapping[str, Array], otherwise: Callable[..., Any], most: int = sys.maxsize

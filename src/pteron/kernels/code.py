@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pteron.kernels.exponential import exponential_function
 from pteron.kernels.graph import CONSTANT, INPUT, Graph, graph_of
 from pteron.kernels.kernel import Port
 from pteron.kernels.sincos import LIMIT, near
@@ -178,13 +179,8 @@ def module_values(
     body = statements(graph, rest, names, printed, form)
     body += [language.stored.format(row, names[k]) for row, (_, _, k) in enumerate(results)]
 
-    close = graph_of(near())
-    near_names = names_of(close, lambda i, j: "angle", c_constant)
-    return {
+    return arithmetic(language.near_form) | {
         "name": name,
-        "limit": LIMIT,
-        "near": statements(close, close.operations(), near_names, C, language.near_form),
-        "near_results": [near_names[places[0]] for places in close.outputs],
         "inputs": inputs,
         "outputs": outputs,
         "one": one,
@@ -195,6 +191,17 @@ def module_values(
         "runs": [(row, inputs[i], j, width) for row, i, j, width in _runs(used)],
         "results": [(row, port, j) for row, (port, j, _) in enumerate(results)],
     }
+
+
+def arithmetic(form: str = "const double {0} = {1};") -> dict[str, Any]:
+    """Return statements of sine, cosine and exponential; `form` is that of one."""
+    found: dict[str, Any] = {"limit": LIMIT}
+    for function in (near(), exponential_function()):
+        name, graph = function.name(), graph_of(function)
+        names = names_of(graph, lambda i, j: "argument", c_constant)
+        found[name] = statements(graph, graph.operations(), names, C, form)
+        found[f"{name}_results"] = [names[places[0]] for places in graph.outputs]
+    return found
 
 
 def _runs(used: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int, int]]:

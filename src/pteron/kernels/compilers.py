@@ -7,8 +7,11 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
+
+from pteron.errors import ModelError
 
 _RUNNING: set[subprocess.Popen[str]] = set()
 """Subprocesses that run now; guarded by `_CHANGES`."""
@@ -40,6 +43,31 @@ def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
         with _CHANGES:
             _RUNNING.discard(process)
     return subprocess.CompletedProcess(command, process.returncode, out, error)
+
+
+def built(
+    command: Sequence[str],
+    flags: Iterable[str],
+    sources: Mapping[str, str],
+    library: Path,
+    what: str,
+    advice: str,
+) -> None:
+    """Write sources beside a library, and compile the C files among them to it.
+
+    Raises
+    ------
+    ModelError
+        If that fails: `what` could not be compiled, and `advice` says what to do.
+    """
+    for name, text in sources.items():
+        (library.parent / name).write_text(text, encoding="utf-8")
+    files = [str(library.parent / name) for name in sources if name.endswith(".c")]
+    done = run([*command, *flags, *files, "-o", str(library), "-lm"])
+    if done.returncode != 0 or not library.exists():
+        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}, no library"]
+        told = f"{what} could not be compiled with {' '.join(command)}: {lines[0]}"
+        raise ModelError(f"{told}; {advice}")
 
 
 def end_all() -> None:

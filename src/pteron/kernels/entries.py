@@ -54,6 +54,8 @@ class Entry:
 
 POSE, RATE = ("pose",), ("pose", "velocity")
 MOTION = ("pose", "velocity", "acceleration")
+REACHED: tuple[Need, ...] = ("reach",)
+ROWS: tuple[Need, ...] = ("rows",)
 BENT: tuple[Need, ...] = ("reach", "type I")
 HELD: tuple[Need, ...] = ("reach", "type I", "type II")
 MOVED: tuple[Need, ...] = (*BENT, "angles")
@@ -62,14 +64,37 @@ TABLE: dict[str, Entry] = {}
 """All functions by name."""
 
 
-def entry(inputs: tuple[str, ...], needs: tuple[Need, ...] = ()) -> Callable[[_Build], _Build]:
-    """Put a function's equations into the table, by their name."""
+def row(
+    equation: Callable[..., Any],
+    inputs: tuple[str, ...],
+    outputs: str,
+    needs: tuple[Need, ...] = (),
+) -> Entry:
+    """Return the entry of an equation that takes the machine and the inputs, in order.
 
-    def put(build: _Build) -> _Build:
-        TABLE[build.__name__.removeprefix("_")] = Entry(inputs, build, needs)
-        return build
+    `outputs` are the names of its results, apart by blanks.
+    """
+    return _named(lambda m, v: equation(m, *(v[name] for name in inputs)), inputs, outputs, needs)
 
-    return put
+
+def of_state(
+    equation: Callable[[Any], Any],
+    inputs: tuple[str, ...],
+    outputs: str,
+    needs: tuple[Need, ...] = (),
+) -> Entry:
+    """Return the same of an equation that takes the state of the machine."""
+    return _named(lambda m, v: equation(state(m, v)), inputs, outputs, needs)
+
+
+def _named(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Need, ...]) -> Entry:
+    names = outputs.split()
+
+    def named(m: Machine, v: Symbols) -> Outputs:
+        found = build(m, v)
+        return dict(zip(names, found if len(names) > 1 else [found], strict=True))
+
+    return Entry(inputs, named, needs)
 
 
 def state(m: Machine, v: Symbols) -> Any:

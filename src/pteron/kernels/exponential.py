@@ -1,5 +1,7 @@
 """The exponential in straight-line arithmetic: the same bits on the targets `vm`, `c` and `numba`.
 
+With it come tanh, and what plain operations give as they are, sign and tan.
+
 A call of the C library's `exp` keeps a compiler from turning a loop into vector code, as one of its
 `sin` does (see `sincos`). Here a polynomial gives E(r) = exp(r) - 1 at r = x / 4096, and twelve
 doublings, E(2 r) = E(r) (2 + E(r)), lead back to x.
@@ -7,13 +9,14 @@ doublings, E(2 r) = E(r) (2 + E(r)), lead back to x.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import factorial
 
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.kernels.graph import Node, expression, function_like, graph_of
+from pteron.kernels.graph import rewritten
 
 _DOUBLINGS = 12
 """Doublings of the argument: 2^12 = 4096."""
@@ -37,21 +40,39 @@ def exponential(x: Expression) -> Expression:
     for k in range(_DEGREE - 1, 0, -1):
         total = 1.0 / factorial(k) + r * total
     minus_one = r * total
-    for _ in range(_DOUBLINGS):
+    for _ in range(_DOUBLINGS - 1):
         minus_one = minus_one * (2.0 + minus_one)
-    return 1.0 + minus_one
+    # The last as a square, of which CasADi takes no part away, as it would of 1 - (1 + E).
+    root = 1.0 + minus_one
+    return root * root
+
+
+@lru_cache(maxsize=1)
+def exponential_function() -> ca.Function:
+    """Return `exponential` as a function."""
+    x = ca.SX.sym("exponent")
+    return ca.Function("exponential", [x], [exponential(x)])
+
+
+def _tanh(x: Expression) -> Expression:
+    small = exponential(-2 * ca.fabs(x))
+    return _sign(x) * (1 - small) / (1 + small)
+
+
+def _sign(x: Expression) -> Expression:
+    return ca.if_else(x > 0, 1, 0) - ca.if_else(x < 0, 1, 0)
+
+
+_RULES: dict[str, Callable[..., Expression]] = {
+    "exp": exponential,
+    "tanh": _tanh,
+    "sign": _sign,
+    "tan": lambda x: ca.sin(x) / ca.cos(x),
+}
+"""Operations that are written by others."""
 
 
 @lru_cache(maxsize=256)
 def straight(function: ca.Function) -> ca.Function:
-    """Return a function whose exponentials are computed by `exponential`."""
-    graph = graph_of(function)
-    if not any(node.operation == "exp" for node in graph.nodes):
-        return function
-    entries = [symbol.nonzeros() for symbol in function.sx_in()]
-
-    def rule(node: Node, arguments: list[Expression]) -> Expression:
-        return exponential(*arguments) if node.operation == "exp" else expression(node, arguments)
-
-    values = graph.values(lambda i, j: entries[i][j], rule)
-    return function_like(function, graph.results(values))
+    """Return a function whose exponentials are computed by `exponential`, and tanh with it."""
+    return rewritten(function, _RULES)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import casadi as ca
 
@@ -21,6 +22,8 @@ from pteron.equations import (
     lagrangian,
     reactions,
     regressor,
+    sticking,
+    transmissions,
 )
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
@@ -34,6 +37,8 @@ from pteron.kernels.entries import (
     MOVED,
     POSE,
     RATE,
+    REACHED,
+    ROWS,
     TABLE as TABLE,
     TYPE_I as TYPE_I,
     TYPE_II as TYPE_II,
@@ -42,7 +47,8 @@ from pteron.kernels.entries import (
     Output as Output,
     Outputs,
     Symbols as Symbols,
-    entry,
+    of_state,
+    row,
     stacked,
     state,
 )
@@ -51,13 +57,11 @@ from pteron.kernels.pose_functions import platform_points
 _SAMPLE = (*MOTION, "joints", "joint_rates", "memory", "gains")
 
 
-@entry(RATE, HELD)
-def _passive_friction(m: Machine, v: Symbols) -> Outputs:
-    forces = passive_friction(m, state(m, v))
-    return {"forces": (forces, forces.shape)}
+def _shaped(matrix: Expression) -> tuple[Expression, tuple[int, ...]]:
+    """Return an expression as a matrix, also where it has one column."""
+    return matrix, matrix.shape
 
 
-@entry(("mass", "center", "inertia", "parameters"))
 def _set_payload(m: Machine, v: Symbols) -> Outputs:
     platform, given = m.robot.platform, v["parameters"]
     # What a platform that slides carries is on its axis.
@@ -68,55 +72,43 @@ def _set_payload(m: Machine, v: Symbols) -> Outputs:
     return {"loaded_parameters": ca.vertcat(given[:start], given[start:] + ca.vertcat(*load))}
 
 
-@entry((*MOTION, "parameters"), HELD)
-def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
+def _rigid(m: Machine, v: Symbols, at: Any) -> Expression:
+    """Return the actuator forces of the rigid bodies at a state."""
     carried = v.get("carried", True)
-    forces = inverse_dynamics(m, state(m, v), v["parameters"], v.get("wrench"), carried=carried)
-    return {"forces": forces}
+    return inverse_dynamics(m, at, v["parameters"], v.get("wrench"), carried=carried)
 
 
-@entry((*RATE, "forces", "parameters"), MOVED)
-def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
+def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
+    return {"forces": _rigid(m, v, state(m, v))}
+
+
+def _under_forces(m: Machine, v: Symbols) -> Any:
+    """Return pose, velocity, forces, parameters and wrench."""
     wrench = v.get("wrench", ca.SX.zeros(m.wrench_size))
-    acceleration = lagrangian.forward_dynamics(
-        m, v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
-    )
-    return {"acceleration": acceleration}
+    return v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
+
+
+def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
+    return {"acceleration": lagrangian.forward_dynamics(m, *_under_forces(m, v))}
 
 
 def _drive_forces(m: Machine, v: Symbols, *, smooth: bool) -> Outputs:
-    at = state(m, v)
-    carried = v.get("carried", True)
-    rigid = inverse_dynamics(m, at, v["parameters"], v.get("wrench"), carried=carried)
-    own = drives.Drives.of(v["drives"])
+    at, own = state(m, v), drives.Drives.of(v["drives"])
     moving = drives.joint_motion(at)
-    return {"forces": rigid + drives.drive_forces(own, *moving, smooth=smooth)}
+    return {"forces": _rigid(m, v, at) + drives.drive_forces(own, *moving, smooth=smooth)}
 
 
-for _name, _smooth in (("drive_forces", False), ("feed_forward", True)):
-    TABLE[_name] = Entry(
-        (*MOTION, "parameters", "drives"), partial(_drive_forces, smooth=_smooth), HELD
-    )
-
-
-@entry(("joints", "joint_rates", "joint_accelerations", "pose", "parameters", "drives"))
 def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
     moving = v["joint_rates"], v["joint_accelerations"]
     found, *_ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
     at = m.state(found, *kinematics.platform_rates(m, found, *moving))
-    rigid = inverse_dynamics(
-        m, at, v["parameters"], v.get("wrench"), carried=v.get("carried", True)
-    )
     own = drives.drive_forces(drives.Drives.of(v["drives"]), *moving, smooth=True)
-    return {"forces": rigid + own, "found": found}
+    return {"forces": _rigid(m, v, at) + own, "found": found}
 
 
-@entry((*RATE, "forces", "parameters", "drives"), MOVED)
 def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
-    wrench = v.get("wrench", ca.SX.zeros(m.wrench_size))
-    given = v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
-    acceleration = drives.drive_accelerations(m, *given, drives.Drives.of(v["drives"]))
-    return {"acceleration": acceleration}
+    own = drives.Drives.of(v["drives"])
+    return {"acceleration": drives.drive_accelerations(m, *(*_under_forces(m, v), own))}
 
 
 def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
@@ -143,62 +135,21 @@ def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
     return {"forces": forces, "next_memory": ca.vertcat(*(kept[name] for name in memory))}
 
 
-for _name in LAWS:
-    _known = () if "learnt" in control.MEMORY[_name] else ("parameters",)
-    TABLE[_name] = Entry((*_SAMPLE, *_known, "drives"), partial(_controlled, what=_name), HELD)
+def _law(name: str) -> Entry:
+    known = () if "learnt" in control.MEMORY[name] else ("parameters",)
+    return Entry((*_SAMPLE, *known, "drives"), partial(_controlled, what=name), HELD)
 
 
-@entry((*POSE, "parameters"), BENT)
-def _mass_matrix(m: Machine, v: Symbols) -> Outputs:
-    return {"mass": lagrangian.mass_matrix(m, v["pose"], v["parameters"])}
-
-
-@entry((*RATE, "parameters"), BENT)
-def _coriolis_matrix(m: Machine, v: Symbols) -> Outputs:
-    return {"coriolis": lagrangian.coriolis_matrix(m, v["pose"], v["velocity"], v["parameters"])}
-
-
-def _forces(m: Machine, v: Symbols) -> Expression:
+def _forces(m: Machine, v: Symbols, *, name: str) -> Outputs:
     """Return the forces of a state that lacks an acceleration, and perhaps a velocity."""
-    return generalized_forces(m, state(m, v), v["parameters"])
+    return {name: generalized_forces(m, state(m, v), v["parameters"])}
 
 
-@entry((*RATE, "parameters"), BENT)
-def _bias_forces(m: Machine, v: Symbols) -> Outputs:
-    return {"bias": _forces(m, v)}
-
-
-@entry((*POSE, "parameters"), BENT)
-def _gravity_forces(m: Machine, v: Symbols) -> Outputs:
-    return {"gravity": _forces(m, v)}
-
-
-@entry((*RATE, "parameters"), BENT)
-def _kinetic_energy(m: Machine, v: Symbols) -> Outputs:
-    return {"energy": lagrangian.kinetic_energy(m, v["pose"], v["velocity"], v["parameters"])}
-
-
-@entry((*POSE, "parameters"), ("reach",))
-def _potential_energy(m: Machine, v: Symbols) -> Outputs:
-    return {"energy": lagrangian.potential_energy(m, v["pose"], v["parameters"])}
-
-
-@entry(MOTION, HELD)
 def _regressor(m: Machine, v: Symbols) -> Outputs:
     selection = v.get("selection", ca.SX.eye(len(m.parameters)))
-    matrix = inverse_dynamics(m, state(m, v), selection)
-    return {"regressor": (matrix, matrix.shape)}
+    return {"regressor": _shaped(inverse_dynamics(m, state(m, v), selection))}
 
 
-TABLE["base_regressor"] = TABLE["regressor"]
-
-
-@entry(MOTION, HELD)
-def _paper_regressor(m: Machine, v: Symbols) -> Outputs:
-    return {"regressor": regressor.paper_regressor(m, state(m, v))}
-
-
-@entry(MOTION, BENT)
 def _paper_terms(m: Machine, v: Symbols) -> Outputs:
     parts = regressor.terms(m, state(m, v))
     return {
@@ -210,33 +161,68 @@ def _paper_terms(m: Machine, v: Symbols) -> Outputs:
     }
 
 
+_LOADED = (*MOTION, "parameters")
+_DRIVEN = (*_LOADED, "drives")
+_PUSHED = (*RATE, "forces", "parameters")
+_AT_REST, _MOVING = (*POSE, "parameters"), (*RATE, "parameters")
+_OF_JOINTS = ("joints", "joint_rates", "joint_accelerations", "pose", "parameters", "drives")
+
+TABLE |= {
+    "passive_friction": Entry(
+        RATE, lambda m, v: {"forces": _shaped(passive_friction(m, state(m, v)))}, HELD
+    ),
+    "set_payload": Entry(("mass", "center", "inertia", "parameters"), _set_payload),
+    "inverse_dynamics": Entry(_LOADED, _inverse_dynamics, HELD),
+    "forward_dynamics": Entry(_PUSHED, _forward_dynamics, MOVED),
+    "drive_forces": Entry(_DRIVEN, partial(_drive_forces, smooth=False), HELD),
+    "feed_forward": Entry(_DRIVEN, partial(_drive_forces, smooth=True), HELD),
+    "joint_feed_forward": Entry(_OF_JOINTS, _joint_feed_forward),
+    "drive_accelerations": Entry((*_PUSHED, "drives"), _drive_accelerations, MOVED),
+    **{name: _law(name) for name in LAWS},
+    "mass_matrix": row(lagrangian.mass_matrix, _AT_REST, "mass", BENT),
+    "coriolis_matrix": row(lagrangian.coriolis_matrix, _MOVING, "coriolis", BENT),
+    "bias_forces": Entry(_MOVING, partial(_forces, name="bias"), BENT),
+    "gravity_forces": Entry(_AT_REST, partial(_forces, name="gravity"), BENT),
+    "kinetic_energy": row(lagrangian.kinetic_energy, _MOVING, "energy", BENT),
+    "potential_energy": row(lagrangian.potential_energy, _AT_REST, "energy", REACHED),
+    **dict.fromkeys(("regressor", "base_regressor"), Entry(MOTION, _regressor, HELD)),
+    "paper_regressor": Entry(
+        MOTION, lambda m, v: {"regressor": regressor.paper_regressor(m, state(m, v))}, HELD
+    ),
+    "paper_terms": Entry(MOTION, _paper_terms, BENT),
+}
+
 FUNCTIONS = tuple(TABLE)
 """The functions that `compile` accepts, beside the indices and their ingredients."""
 
 
-_DEFINED = (
-    *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
-    *("force_least", "turning_moment", "pressure_angle", "output_pressure_angle"),
-)
-"""The indices of geometry that are defined at type-II singularities too, if only as infinite."""
+def _driven_motion(m: Machine, v: Symbols) -> Outputs:
+    kind: transmissions.DriveKind = v["kind"]
+    sides = sticking.Sides(v["side"], v["hold"], v["brake"]) if kind.dry else None
+    own = drives.Drives.of(v["drives"])
+    if not kind.stribeck:  # a sixth of the operations less
+        own = own._replace(stribeck=ca.SX.zeros(*own.stribeck.shape))
+    none = ca.SX.zeros(m.freedom)
+    states = {name: v.get(name, none) for name in ("motor", "motor_rate", "current", "bristle")}
+    numbers = transmissions.Actuators(kind, v["actuators"])
+    motors = sticking.Motors(kind, numbers, **states, pace=v.get("pace", ca.SX(0)))
+    given = v["pose"], v["velocity"], v["forces"], v["parameters"], v["wrench"]
+    return dict(sticking.moved(m, *given, own, motors, sides))
+
+
+def _sensed(at: Any) -> Any:
+    return control.coordinates(at), drives.joint_motion(at)[0]
 
 
 def _geometric_index(m: Machine, v: Symbols, *, what: str) -> Outputs:
     return {"value": indices.OF_GEOMETRY[what](m, state(m, v))}
 
 
-for _name in indices.OF_GEOMETRY:
-    _needed = BENT if _name in _DEFINED else HELD
-    TABLE[_name] = Entry(POSE, partial(_geometric_index, what=_name), _needed)
-
-
-@entry((*POSE, "parameters"), BENT)
 def _kappa(m: Machine, v: Symbols) -> Outputs:
     mass = lagrangian.mass_matrix(m, v["pose"], v["parameters"])
     return {"value": indices.kappa(m, state(m, v), mass)}
 
 
-@entry(POSE, ("rows",))
 def _homogeneous_jacobian(m: Machine, v: Symbols) -> Outputs:
     found = indices.homogeneous(m, state(m, v))
     return {"jacobian": found.matrix, "length": found.length}
@@ -248,7 +234,6 @@ def _padded(columns: Sequence[Expression], count: int) -> Expression:
     return ca.vertcat(rows, ca.SX.nan(count - rows.shape[0], rows.shape[1]))
 
 
-@entry((*MOTION, "parameters"), HELD)
 def _reactions(m: Machine, v: Symbols) -> Outputs:
     found = reactions.equilibrium(m, state(m, v), v["parameters"])
     wrenches = [[ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in found.legs]
@@ -257,31 +242,44 @@ def _reactions(m: Machine, v: Symbols) -> Outputs:
         for columns in ([leg.points for leg in found.legs], wrenches)
     )
     return {
-        "rows": (found.rows, found.rows.shape),
+        "rows": _shaped(found.rows),
         "right": found.right,
-        "presumed_rows": (found.presumed_rows, found.presumed_rows.shape),
+        "presumed_rows": _shaped(found.presumed_rows),
         "presumed_right": stacked(found.presumed_right),
-        "loads": (found.loads, found.loads.shape),
-        "driven_rows": (found.driven_rows, found.driven_rows.shape),
+        "loads": _shaped(found.loads),
+        "driven_rows": _shaped(found.driven_rows),
         "driven": found.driven,
-        "ends": platform_points(m, v)["points"],
+        "ends": platform_points(m, v["pose"]),
         "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
         "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
     }
 
 
-@entry(POSE, BENT)
 def _beams(m: Machine, v: Symbols) -> Outputs:
     found = reactions.beams(m, state(m, v))
     *links, couples = found._asdict().items()
-    rows = ca.horzcat(*couples[1]).T
-    return {**dict(links), "couples": (rows, rows.shape)}
+    return {**dict(links), "couples": _shaped(ca.horzcat(*couples[1]).T)}
 
 
-@entry(POSE)
-def _standing(m: Machine, v: Symbols) -> Outputs:
-    status, way = kinematics.standing(m, v["pose"])
-    return {"standing": status, "way": way}
+_DEFINED = (
+    *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
+    *("force_least", "turning_moment", "pressure_angle", "output_pressure_angle"),
+)
+"""The indices of geometry that are defined at type-II singularities too, if only as infinite."""
+
+TABLE |= {
+    "driven_motion": Entry((*_PUSHED, "drives"), _driven_motion, MOVED),
+    "sensed": of_state(_sensed, RATE, "joints rates", BENT),
+    **{
+        name: Entry(POSE, partial(_geometric_index, what=name), BENT if name in _DEFINED else HELD)
+        for name in indices.OF_GEOMETRY
+    },
+    "kappa": Entry(_AT_REST, _kappa, BENT),
+    "homogeneous_jacobian": Entry(POSE, _homogeneous_jacobian, ROWS),
+    "reactions": Entry(_LOADED, _reactions, HELD),
+    "beams": Entry(POSE, _beams, BENT),
+    "standing": row(kinematics.standing, POSE, "standing way"),
+}
 
 
 def needs_of(what: str) -> tuple[Need, ...]:

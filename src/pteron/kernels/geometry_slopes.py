@@ -15,7 +15,6 @@ from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
 from pteron.kernels.choice import Adaptive, adaptive
 from pteron.kernels.kept import Program, kept
-from pteron.kernels.kernel import Port
 from pteron.kernels.programs import bare
 from pteron.manipulator import Manipulator, RobotLike
 
@@ -87,13 +86,4 @@ def _built(layout: Manipulator) -> Program:
         pairs = zip(axes, turned, strict=True)
         found["shifts"] = ca.vertcat(moved, sum(ca.mtimes(ca.skew(a), da) for a, da in pairs) / 2)
     given = {"geometry": geometry, "pose": pose}
-    outputs = [ca.densify(value).T for value in found.values()]
-    function = ca.Function(
-        "geometry_slopes", list(given.values()), ca.cse(outputs), list(given), list(found)
-    )
-    inputs = Port("geometry", geometry.shape[:1], shared=True), Port("pose", pose.shape[:1])
-    ports = tuple(
-        Port(name, value.shape if value.shape[1] > 1 else value.shape[:1])
-        for name, value in found.items()
-    )
-    return Program("geometry_slopes", function, inputs, ports)
+    return Program.of_named("geometry_slopes", given, found, shared=("geometry",))

@@ -7,7 +7,7 @@ vectorises.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeVar
@@ -45,8 +45,11 @@ _CODES = {
     "and": ca.OP_AND,
     "or": ca.OP_OR,
     "select": ca.OP_IF_ELSE_ZERO,
+    "tanh": ca.OP_TANH,
+    "sign": ca.OP_SIGN,
+    "tan": ca.OP_TAN,
 }
-"""CasADi's codes of the operations that printers know by name."""
+"""CasADi's codes of operations by name; printers know all but the last row."""
 
 _NAMES = {code: name for name, code in _CODES.items()}
 
@@ -148,6 +151,21 @@ def expression(node: Node, arguments: Sequence[Expression]) -> Expression:
         return ca.SX(node.value)
     make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
     return make(_CODES.get(node.operation) or int(node.operation), *arguments)
+
+
+def rewritten(function: ca.Function, rules: Mapping[str, Callable[..., Expression]]) -> ca.Function:
+    """Return a function in which other expressions take the place of some operations."""
+    graph = graph_of(function)
+    if not any(node.operation in rules for node in graph.nodes):
+        return function
+    entries = [symbol.nonzeros() for symbol in function.sx_in()]
+
+    def rule(node: Node, arguments: list[Expression]) -> Expression:
+        own = rules.get(node.operation)
+        return own(*arguments) if own else expression(node, arguments)
+
+    values = graph.values(lambda i, j: entries[i][j], rule)
+    return function_like(function, graph.results(values))
 
 
 def function_like(

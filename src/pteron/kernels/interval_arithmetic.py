@@ -19,6 +19,7 @@ three are handed on to what is computed from it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -194,16 +195,6 @@ def _wave(a: Interval, function: Callable[[Bound], Bound], peak: float) -> Inter
     return Interval(np.maximum(low, -1.0), np.minimum(high, 1.0), *a[2:])
 
 
-def sine(a: Interval) -> Interval:
-    """Return sin(a)."""
-    return _wave(a, np.sin, 0.5 * np.pi)
-
-
-def cosine(a: Interval) -> Interval:
-    """Return cos(a)."""
-    return _wave(a, np.cos, 0.0)
-
-
 def exponential(a: Interval) -> Interval:
     """Return exp(a)."""
     low, high = _well_below(np.exp(a.low), _LIBM), _well_above(np.exp(a.high), _LIBM)
@@ -223,15 +214,9 @@ def angle(y: Interval, x: Interval) -> Interval:
     return Interval(low, high, maybe, never, either(jump, whole if whole.any() else None))
 
 
-def floor(a: Interval) -> Interval:
-    """Return the greatest whole number not above a."""
-    low, high = np.floor(a.low), np.floor(a.high)
-    return Interval(low, high, a.maybe, a.never, either(a.jump, _where(low != high)))
-
-
-def sign(a: Interval) -> Interval:
-    """Return -1, 0 or 1."""
-    low, high = np.sign(a.low), np.sign(a.high)
+def _stepwise(function: Callable[[Bound], Bound], a: Interval) -> Interval:
+    """Return a function that grows in steps, such as floor or sign, which jumps between them."""
+    low, high = function(a.low), function(a.high)
     return Interval(low, high, a.maybe, a.never, either(a.jump, _where(low != high)))
 
 
@@ -278,24 +263,14 @@ def inverted(a: Interval) -> Interval:
     return _truth((a.low == 0.0) & (a.high == 0.0), (a.low > 0.0) | (a.high < 0.0), a)
 
 
-def unequal(a: Interval, b: Interval) -> Interval:
-    """Return whether a and b differ."""
-    return inverted(equal(a, b))
-
-
-def both(a: Interval, b: Interval) -> Interval:
-    """Return whether two tests hold."""
-    return minimum(inverted(inverted(a)), inverted(inverted(b)))
-
-
-def one_of(a: Interval, b: Interval) -> Interval:
-    """Return whether one of two tests holds."""
-    return maximum(inverted(inverted(a)), inverted(inverted(b)))
+def holds(a: Interval) -> Interval:
+    """Return whether a is not zero, of a test."""
+    return inverted(inverted(a))
 
 
 def select(test: Interval, value: Interval) -> Interval:
     """Return the value where the test holds, else 0."""
-    truth = inverted(inverted(test))
+    truth = holds(test)
     on, off = np.atleast_1d(truth.low > 0.0), np.atleast_1d(truth.high < 1.0)
     # Where the value is defined nowhere, 0 is all that may be.
     zero = off if value.never is None else off | (value.never & ~on)
@@ -321,22 +296,22 @@ RULES: dict[str, Callable[..., Interval]] = {
     "div": divide,
     "neg": negate,
     "sqrt": root,
-    "sin": sine,
-    "cos": cosine,
+    "sin": lambda a: _wave(a, np.sin, 0.5 * np.pi),
+    "cos": lambda a: _wave(a, np.cos, 0.0),
     "exp": exponential,
     "atan2": angle,
     "fabs": absolute,
-    "floor": floor,
-    str(ca.OP_SIGN): sign,
+    "floor": partial(_stepwise, np.floor),
+    str(ca.OP_SIGN): partial(_stepwise, np.sign),
     "fmin": minimum,
     "fmax": maximum,
     "less": less,
     "less_equal": less_equal,
     "equal": equal,
-    "unequal": unequal,
+    "unequal": lambda a, b: inverted(equal(a, b)),
     "not": inverted,
-    "and": both,
-    "or": one_of,
+    "and": lambda a, b: minimum(holds(a), holds(b)),
+    "or": lambda a, b: maximum(holds(a), holds(b)),
     "select": select,
 }
 """The rule of each operation of a graph; a product of equal factors is a `square`."""

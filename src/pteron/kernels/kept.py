@@ -1,29 +1,35 @@
-"""Programs (CasADi functions of a machine) kept on disk, to be read instead of built again.
+"""Programs (CasADi functions of a machine) and results kept on disk, to be read next time.
 
-Reading takes 1 ms, building 100 ms or more. A program's name on disk is a digest of its machine, of
-the function and options asked for, and of the source of all that it depends on. A machine with a
-leg from outside this package, whose source is not known, has its programs built at each start.
+Reading takes 1 ms, building 100 ms or more. A name on disk is a digest of the machine, of what is
+asked for, and of the source of all that it depends on. Of a machine with a leg from outside this
+package, whose source is not known, nothing is kept.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, is_dataclass
+import pickle
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self, TypeVar
 
 import casadi as ca
 
+from pteron.bodies.motion import Expression
 from pteron.kernels import cache
 from pteron.kernels.kernel import Port
+from pteron.kernels.passes import optimised
 
 _PACKAGE = Path(__file__).parent.parent
 
 EQUATIONS = ("bodies", "closures", "equations", "kernels", "legs", "manipulator", "platforms")
 """The packages that a program depends on, to the last bit."""
+
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,43 @@ class Program:
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
 
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        symbols: Sequence[Expression],
+        inputs: Sequence[Port],
+        results: Sequence[Expression],
+        outputs: Sequence[Port],
+    ) -> Self:
+        """Return the program of expressions of its inputs' symbols; ports name and shape both."""
+        names = [port.name for port in inputs], [port.name for port in outputs]
+        return cls(name, ca.Function(name, symbols, results, *names), (*inputs,), (*outputs,))
+
+    @classmethod
+    def of_named(
+        cls,
+        name: str,
+        given: Mapping[str, Expression],
+        found: Mapping[str, Expression],
+        shared: Collection[str] = (),
+    ) -> Self:
+        """Return the same of expressions by name, a column as a vector, matrices by rows."""
+        inputs = [Port(key, value.shape[:1], key in shared) for key, value in given.items()]
+        outputs = [Port(key, shape_of(value)) for key, value in found.items()]
+        dense = ca.cse([ca.densify(value).T for value in found.values()])
+        return cls.of(name, list(given.values()), inputs, dense, outputs)
+
+    def optimised(self) -> Self:
+        """Return the program after the passes that save operations."""
+        return replace(self, function=optimised(self.function))
+
+
+def shape_of(value: Expression) -> tuple[int, ...]:
+    """Return the shape of an expression: a column is a vector, and of one element a number."""
+    rows, columns = value.shape
+    return (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
+
 
 def kept(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
     """Return the program of a key: the one on disk, or one that is built now, and then kept."""
@@ -45,6 +88,26 @@ def kept(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
         found = build()
         if name is not None:
             cache.keep_text(name, _written(found))
+    return found
+
+
+def kept_result(
+    key: tuple[Any, ...], packages: tuple[str, ...], find: Callable[[], _Result]
+) -> _Result:
+    """Return the result of a key: the one on disk, or one that is found now, and then kept.
+
+    It depends on the source of `packages` and of all equations. It is pickled: the cache is the
+    user's alone and holds code that is run.
+    """
+    name = name_of(*key, sources=(*EQUATIONS, *packages))
+    text = None if name is None else cache.find_text(name)
+    if text is not None:
+        with suppress(Exception):
+            found: _Result = pickle.loads(text.encode("latin-1"))
+            return found
+    found = find()
+    if name is not None:
+        cache.keep_text(name, pickle.dumps(found).decode("latin-1"))
     return found
 
 

@@ -12,14 +12,11 @@ from functools import lru_cache
 
 import casadi as ca
 
-from pteron.bodies.motion import Expression
 from pteron.equations.closing import held_spheres
 from pteron.equations.machine import Machine
 from pteron.equations.pose_paths import Closed, OnPath, numbers, rows, stepped
 from pteron.kernels.choice import Adaptive, adaptive
 from pteron.kernels.kept import Program
-from pteron.kernels.kernel import Port
-from pteron.kernels.passes import optimised
 from pteron.kernels.programs import bare
 from pteron.manipulator import Manipulator
 
@@ -48,7 +45,9 @@ def path_kernel(closed: Closed, start: Parts | None) -> Adaptive:
             given[name] = ca.SX.sym(name, count if real else 2 * count)
             ends.append(numbers(given[name][:count], None if real else given[name][count:]))
         after, left = stepped(closed, ends[0], ends[1], OnPath.of(at, closed))
-        return _program("path_step", given, {"after": after.vector(), "left": left})
+        return Program.of_named(
+            "path_step", given, {"after": after.vector(), "left": left}
+        ).optimised()
 
     return adaptive(("path_step", *closed, start), build)
 
@@ -60,9 +59,9 @@ def rows_kernel(closed: Closed) -> Adaptive:
     def build() -> Program:
         z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", closed.numbers)
         slopes, missed = rows(closed, numbers(machine), numbers(z))
-        return _program(
+        return Program.of_named(
             "path_rows", {"z": z, "machine": machine}, {"rows": slopes, "missed": missed}
-        )
+        ).optimised()
 
     return adaptive(("path_rows", *closed), build)
 
@@ -77,22 +76,8 @@ def _spheres(robot: Manipulator) -> Adaptive:
     def build() -> Program:
         joints = ca.SX.sym("joints", robot.joint_count)
         centers, squares = held_spheres(Machine.of(robot), joints)
-        return _program(
+        return Program.of_named(
             "held_spheres", {"joints": joints}, {"centers": centers, "squares": squares}
-        )
+        ).optimised()
 
     return adaptive(("held_spheres", robot), build)
-
-
-def _program(name: str, given: dict[str, Expression], found: dict[str, Expression]) -> Program:
-    dense = [ca.densify(value).T for value in found.values()]
-    function = ca.Function(name, list(given.values()), ca.cse(dense), list(given), list(found))
-    inputs = tuple(Port(key, (value.shape[0],)) for key, value in given.items())
-    outputs = tuple(
-        Port(
-            key,
-            value.shape if value.shape[1] > 1 else value.shape[:1] if value.shape[0] > 1 else (),
-        )
-        for key, value in found.items()
-    )
-    return Program(name, optimised(function), inputs, outputs)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import casadi as ca
 
-from pteron.equations import (
-    closing,
-    kinematics,
-)
+from pteron.bodies.motion import Expression
+from pteron.equations import closing, kinematics
 from pteron.equations.clearance import clearances, least_clearances
 from pteron.equations.constraints import constraint_measure
 from pteron.equations.edges import edges
@@ -21,33 +21,23 @@ from pteron.kernels.entries import (
     MOVED,
     POSE,
     RATE,
+    REACHED,
+    ROWS,
     TABLE,
     TYPE_II,
     Entry,
     Outputs,
     Symbols,
-    entry,
+    of_state,
+    row,
     stacked,
     state,
 )
 
 
-@entry(POSE, ("reach",))
-def _inverse_kinematics(m: Machine, v: Symbols) -> Outputs:
+def _inverse_kinematics(m: Machine, pose: Expression) -> Expression:
     # A slider's coordinate exists out of reach too; a machine that cannot be there has none.
-    beyond = kinematics.beyond_reach(m, v["pose"])
-    return {"joints": kinematics.inverse_position(m, v["pose"]) + beyond}
-
-
-@entry(POSE)
-def _joint_coordinates(m: Machine, v: Symbols) -> Outputs:
-    return {"joints": kinematics.inverse_position(m, v["pose"])}
-
-
-@entry(POSE, ("reach",))
-def _link_vectors(m: Machine, v: Symbols) -> Outputs:
-    l_u, l_l = kinematics.link_vectors(state(m, v))
-    return {"l_u": l_u, "l_l": l_l}
+    return kinematics.inverse_position(m, pose) + kinematics.beyond_reach(m, pose)
 
 
 def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
@@ -55,139 +45,56 @@ def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
     return {"poses": (poses, poses.shape)}
 
 
-TABLE["direct_kinematics"] = Entry(("joints",), partial(_poses, reached=True))
-TABLE["closure_poses"] = Entry(("joints",), partial(_poses, reached=False))
-
-
-@entry(("joints",))
 def _closure_rows(m: Machine, v: Symbols) -> Outputs:
     found = closing.closure_rows(m, v["joints"])
     rows = {name: (part, part.shape) for name, part in found._asdict().items()}
     return {**rows, "origin": found.origin, "size": found.size}
 
 
-@entry(("joints", "pose"))
-def _newton_step(m: Machine, v: Symbols) -> Outputs:
-    stepped, missed = closing.newton_step(m, v["joints"], v["pose"])
-    return {"stepped": stepped, "missed": missed}
+def _direct_step(m: Machine, joints: Expression, pose: Expression) -> Any:
+    return closing.direct_step(m, joints, pose, TYPE_II)
 
 
-@entry(("joints", "pose"))
-def _direct_step(m: Machine, v: Symbols) -> Outputs:
-    found, measure, bent = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
-    return {"found": found, "type_ii": measure, "bent": bent}
+def _followed_step(m: Machine, joints: Expression, pose: Expression) -> Any:
+    found = closing.followed_step(m, joints, pose, TYPE_II)
+    return found.pose, found.measure
 
 
-@entry(("joints", "pose"))
-def _followed_step(m: Machine, v: Symbols) -> Outputs:
-    found = closing.followed_step(m, v["joints"], v["pose"], TYPE_II)
-    return {"found": found.pose, "type_ii": found.measure}
+def _of_legs(value: Callable[[Any], Expression]) -> Callable[[Machine, Expression], Expression]:
+    """Return the equation of a value of each leg's reach at a pose."""
+    return lambda m, pose: ca.vertcat(*map(value, kinematics.reach(m, pose)))
 
 
-@entry(POSE)
-def _reach(m: Machine, v: Symbols) -> Outputs:
-    found = kinematics.reach(m, v["pose"])
-    return {
-        name: ca.vertcat(*(getattr(leg, name) for leg in found))
-        for name in ("margin", "type_i", "spread")
-    }
+def _reach(m: Machine, pose: Expression) -> Any:
+    found = kinematics.reach(m, pose)
+    names = ("margin", "type_i", "spread")
+    return [ca.vertcat(*(getattr(leg, name) for leg in found)) for name in names]
 
 
-@entry(POSE)
-def _passive_room(m: Machine, v: Symbols) -> Outputs:
-    shares, metres = kinematics.passive_margins(m, v["pose"])
-    return {"shares": shares, "metres": metres}
+def _room(m: Machine, pose: Expression) -> Expression:
+    return ca.vertcat(*(edge.value for edge in edges(m, pose)))
 
 
-@entry(POSE)
-def _room(m: Machine, v: Symbols) -> Outputs:
-    return {"room": ca.vertcat(*(edge.value for edge in edges(m, v["pose"])))}
+def _platform(m: Machine, pose: Expression) -> Any:
+    return m.platform.motion(pose, *[ca.SX.zeros(m.freedom)] * 2)
 
 
-@entry(POSE, ("reach",))
-def _joint_points(m: Machine, v: Symbols) -> Outputs:
-    return {"points": kinematics.chain_points(state(m, v))}
-
-
-@entry(POSE)
-def platform_points(m: Machine, v: Symbols) -> Outputs:
+def platform_points(m: Machine, pose: Expression) -> Expression:
     """Return the platform points in the base frame."""
-    points = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).points
-    return {"points": ca.vertcat(*(point.position.T for point in points))}
+    return ca.vertcat(*(point.position.T for point in _platform(m, pose).points))
 
 
-@entry(POSE)
-def _discriminants(m: Machine, v: Symbols) -> Outputs:
-    found = kinematics.reach(m, v["pose"])
-    return {"discriminants": ca.vertcat(*(leg.discriminant for leg in found))}
-
-
-@entry(POSE)
-def _squared_type_i(m: Machine, v: Symbols) -> Outputs:
-    # Finite and smooth out of reach too, where it is negative.
-    found = kinematics.reach(m, v["pose"])
-    return {"squares": ca.vertcat(*(leg.discriminant / leg.scale for leg in found))}
-
-
-@entry(POSE)
 def _type_ii(m: Machine, v: Symbols) -> Outputs:
     at = state(m, v)
     return {"type_ii": m.closure.measure(at.platform, at.legs)}
 
 
-@entry(POSE, BENT)
-def _type_ii_distances(m: Machine, v: Symbols) -> Outputs:
-    return dict(type_ii_distances(m, v["pose"]))
+def _twist(m: Machine, pose: Expression, velocity: Expression) -> Expression:
+    return ca.mtimes(_platform(m, pose).twist_rows, velocity)
 
 
-@entry(POSE, ("reach",))
-def _clearances(m: Machine, v: Symbols) -> Outputs:
-    return {"distances": stacked(clearances(m, v["pose"]))}
-
-
-@entry(POSE, ("reach",))
-def _least_clearances(m: Machine, v: Symbols) -> Outputs:
-    return {"distances": stacked(least_clearances(m, v["pose"]))}
-
-
-@entry(POSE, ("reach",))
-def _constraint(m: Machine, v: Symbols) -> Outputs:
-    return {"constraint": constraint_measure(m, state(m, v))}
-
-
-@entry(POSE, ("rows",))
-def _jacobian(m: Machine, v: Symbols) -> Outputs:
-    return {"jacobian": kinematics.jacobian(state(m, v))}
-
-
-@entry(POSE, ("rows",))
-def _twist_jacobian(m: Machine, v: Symbols) -> Outputs:
-    return {"rows": kinematics.twist_jacobian(state(m, v))}
-
-
-@entry(RATE)
-def _twist(m: Machine, v: Symbols) -> Outputs:
-    platform = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2)
-    return {"twist": ca.mtimes(platform.twist_rows, v["velocity"])}
-
-
-@entry((*POSE, "twist"), ("angles",))
-def _velocity_of_twist(m: Machine, v: Symbols) -> Outputs:
-    velocity, rest = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).velocity_of(
-        v["twist"]
-    )
-    return {"velocity": velocity, "rest": rest}
-
-
-@entry(POSE, BENT)
-def _link_jacobians(m: Machine, v: Symbols) -> Outputs:
-    upper, lower = kinematics.link_jacobians(state(m, v))
-    return {"upper": upper, "lower": lower}
-
-
-@entry(POSE, BENT)
-def _joint_screws(m: Machine, v: Symbols) -> Outputs:
-    return {"screws": [s.T for s in kinematics.joint_screws(state(m, v))]}
+def _velocity_of_twist(m: Machine, pose: Expression, twist: Expression) -> Any:
+    return _platform(m, pose).velocity_of(twist)
 
 
 def _joint_motion(m: Machine, v: Symbols) -> Outputs:
@@ -201,13 +108,45 @@ def _joint_motion(m: Machine, v: Symbols) -> Outputs:
     }
 
 
-TABLE["joint_rates"] = Entry(RATE, _joint_motion, BENT)
-TABLE["joint_accelerations"] = Entry(MOTION, _joint_motion, BENT)
+_STEP = ("joints", "pose")
+_OF_JOINTS = ("pose", "joint_rates", "joint_accelerations")
 
-
-@entry(("pose", "joint_rates", "joint_accelerations"), (*MOVED, "type II"))
-def _platform_motion(m: Machine, v: Symbols) -> Outputs:
-    velocity, acceleration = kinematics.platform_rates(
-        m, v["pose"], v["joint_rates"], v["joint_accelerations"]
-    )
-    return {"velocity": velocity, "acceleration": acceleration}
+TABLE |= {
+    "inverse_kinematics": row(_inverse_kinematics, POSE, "joints", REACHED),
+    "joint_coordinates": row(kinematics.inverse_position, POSE, "joints"),
+    "link_vectors": of_state(kinematics.link_vectors, POSE, "l_u l_l", REACHED),
+    "direct_kinematics": Entry(("joints",), partial(_poses, reached=True)),
+    "closure_poses": Entry(("joints",), partial(_poses, reached=False)),
+    "closure_rows": Entry(("joints",), _closure_rows),
+    "newton_step": row(closing.newton_step, _STEP, "stepped missed"),
+    "direct_step": row(_direct_step, _STEP, "found type_ii bent"),
+    "followed_step": row(_followed_step, _STEP, "found type_ii"),
+    "reach": row(_reach, POSE, "margin type_i spread"),
+    "passive_room": row(kinematics.passive_margins, POSE, "shares metres"),
+    "room": row(_room, POSE, "room"),
+    "joint_points": of_state(kinematics.chain_points, POSE, "points", REACHED),
+    "platform_points": row(platform_points, POSE, "points"),
+    "discriminants": row(_of_legs(lambda leg: leg.discriminant), POSE, "discriminants"),
+    # Finite and smooth out of reach too, where it is negative.
+    "squared_type_i": row(_of_legs(lambda leg: leg.discriminant / leg.scale), POSE, "squares"),
+    "type_ii": Entry(POSE, _type_ii),
+    "type_ii_distances": Entry(POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), BENT),
+    "clearances": row(lambda *at: stacked(clearances(*at)), POSE, "distances", REACHED),
+    "least_clearances": row(lambda *at: stacked(least_clearances(*at)), POSE, "distances", REACHED),
+    "constraint": Entry(
+        POSE, lambda m, v: {"constraint": constraint_measure(m, state(m, v))}, REACHED
+    ),
+    "jacobian": of_state(kinematics.jacobian, POSE, "jacobian", ROWS),
+    "twist_jacobian": of_state(kinematics.twist_jacobian, POSE, "rows", ROWS),
+    "twist": row(_twist, RATE, "twist"),
+    "velocity_of_twist": row(_velocity_of_twist, ("pose", "twist"), "velocity rest", ("angles",)),
+    "link_jacobians": of_state(kinematics.link_jacobians, POSE, "upper lower", BENT),
+    "joint_screws": of_state(
+        lambda at: [s.T for s in kinematics.joint_screws(at)], POSE, "screws", BENT
+    ),
+    "joint_rates": Entry(RATE, _joint_motion, BENT),
+    "joint_accelerations": Entry(MOTION, _joint_motion, BENT),
+    "platform_motion": row(
+        kinematics.platform_rates, _OF_JOINTS, "velocity acceleration", (*MOVED, "type II")
+    ),
+}

@@ -24,6 +24,7 @@ from pteron.bodies.motion import Expression
 from pteron.equations import control, kinematics
 from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
+from pteron.equations.transmissions import DriveKind, actuator_count
 from pteron.errors import ModelError
 from pteron.kernels.functions import (
     ANGLES,
@@ -35,7 +36,7 @@ from pteron.kernels.functions import (
     Output,
     Symbols,
 )
-from pteron.kernels.kept import Program, kept
+from pteron.kernels.kept import Program, kept, shape_of
 from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimised
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -64,7 +65,7 @@ _FORCES = ("inverse_dynamics", "drive_forces", "feed_forward")
 SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
 """Functions that take a choice of base parameters, but not their values."""
 
-_SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives")
+_SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives", "actuators")
 """Inputs of which one value serves a whole batch."""
 
 ALIKE: ContextVar[Manipulator | None] = ContextVar("alike", default=None)
@@ -150,17 +151,11 @@ def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Progr
         ca.SX(ca.DM(values[port.name])) if port.name in values else symbol
         for port, symbol in zip(given.inputs, symbols, strict=True)
     ]
-    left = [k for k, port in enumerate(given.inputs) if port.name not in values]
-    outputs = given.function.call(folded)
-    function = ca.Function(
-        given.name,
-        [symbols[k] for k in left],
-        ca.cse([ca.densify(output) for output in outputs]),
-        [given.inputs[k].name for k in left],
-        [port.name for port in given.outputs],
-    )
-    inputs = tuple(given.inputs[k] for k in left)
-    return Program(given.name, optimised(function), inputs, given.outputs)
+    pairs = zip(symbols, given.inputs, strict=True)
+    left = [(symbol, port) for symbol, port in pairs if port.name not in values]
+    results = ca.cse([ca.densify(output) for output in given.function.call(folded)])
+    symbols, inputs = [symbol for symbol, _ in left], [port for _, port in left]
+    return Program.of(given.name, symbols, inputs, results, given.outputs).optimised()
 
 
 def bare(robot: RobotLike) -> Manipulator:
@@ -228,6 +223,25 @@ def _built(
         for carried in (True, False)
     ]
     return min(forms, key=lambda form: count_operations(form.function))
+
+
+def motion_program(robot: Manipulator, kind: DriveKind) -> Program:
+    """Return the motion of a machine whose drives are of some kind: `equations.sticking.moved`."""
+    layout = bare(robot)
+    return kept(("motion", layout, kind), partial(_motion, layout, kind))
+
+
+def _motion(robot: Manipulator, kind: DriveKind) -> Program:
+    n = robot.joint_count
+    names = [*(("side", "hold") if kind.dry else ()), *(name for name, _ in kind.more)]
+    extra = {name: ca.SX.sym(name, n) for name in names}
+    extra |= {"brake": ca.SX.sym("brake")} if kind.dry else {}
+    extra |= {"pace": ca.SX.sym("pace")} if any(kind.lugre) else {}
+    extra["actuators"] = ca.SX.sym("actuators", actuator_count(kind))
+    machine, constants = Machine.of(robot), {"kind": kind}
+    return _program(
+        machine, "driven_motion", None, constants, extra=extra, wrench=True, guarded=True
+    )
 
 
 def general_program(robot: RobotLike, what: str) -> Program:
@@ -321,8 +335,7 @@ def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
         return output
     if isinstance(output, list):
         return ca.vertcat(*output), (len(output), *output[0].shape)
-    rows, columns = output.shape
-    return output, (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
+    return output, shape_of(output)
 
 
 def _statuses(

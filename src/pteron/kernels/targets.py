@@ -11,6 +11,7 @@ import numpy as np
 
 from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
+from pteron.equations.transmissions import actuator_numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
 from pteron.kernels.fields import Exact
@@ -41,6 +42,7 @@ Grade = Literal["specialised", "parametric", "general"]
 FIXED: dict[str, Callable[[Manipulator], Array]] = {
     "parameters": parameters,
     "drives": drive_numbers,
+    "actuators": actuator_numbers,
     "geometry": lambda robot: np.array(numbers(robot)),
 }
 """The inputs that have a machine's own values unless a call gives others."""
@@ -58,7 +60,7 @@ _DTYPES = {
 
 @runtime_checkable
 class Selects(Protocol):
-    """A choice of base parameters, such as `pteron.BaseParameters`."""
+    """A choice of base parameters, such as `pteron.reduction.BaseParameters`."""
 
     @property
     def robot(self) -> Manipulator:
@@ -99,7 +101,7 @@ def compile(
     base : BaseParameters, optional
         For `"inverse_dynamics"`, `"drive_forces"`, `"feed_forward"`, `"joint_feed_forward"`:
         compute from these base parameters alone, in the cheapest form that they allow (see
-        `pteron.cheapest_parameters`). For `"base_regressor"`: whose columns.
+        `pteron.reduction.cheapest_parameters`). For `"base_regressor"`: whose columns.
     wrench : bool
         For these, `"forward_dynamics"` and `"drive_accelerations"`: whether a wrench on the
         platform is an input too, after the state.
@@ -216,14 +218,11 @@ def _made(
 ) -> Kernel:
     # Fixed inputs come last, so that a call may append them to what it is given.
     order = sorted(range(len(built.inputs)), key=lambda k: built.inputs[k].name in fixed)
-    inputs = tuple(built.inputs[k] for k in order)
-    function = built.function
     if order != sorted(order):
-        symbols = function.sx_in()
-        given = [symbols[k] for k in order]
-        names = [port.name for port in inputs], [port.name for port in built.outputs]
-        function = ca.Function(built.name, given, function.call(symbols), *names)
-    return kind(built.name, function, inputs, built.outputs, fixed, dtype, threads)
+        symbols, inputs = built.function.sx_in(), [built.inputs[k] for k in order]
+        found, given = built.function.call(symbols), [symbols[k] for k in order]
+        built = Program.of(built.name, given, inputs, found, built.outputs)
+    return kind(built.name, built.function, built.inputs, built.outputs, fixed, dtype, threads)
 
 
 def same_layout(one: RobotLike, other: RobotLike) -> bool:

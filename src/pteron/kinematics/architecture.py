@@ -20,8 +20,7 @@ from pteron.kernels import Array, NoSquareRoot, PrimeField, evaluate, general_pr
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
-from pteron.kinematics.sampling import drawn_poses
-from pteron.kinematics.type_ii_sizes import type_ii_sizes
+from pteron.kinematics.sampling import drawn_poses, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -106,7 +105,7 @@ def architecture(robot: RobotLike) -> Architecture:
     Examples
     --------
     >>> import pteron
-    >>> found = pteron.architecture("quadrupteron")
+    >>> found = pteron.kinematics.architecture("quadrupteron")
     >>> found.singular, found.proof
     (False, 'one pose')
     """

@@ -32,6 +32,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import place
 from pteron.kinematics.tilting_assembly import tilting_poses
 from pteron.manipulator import Manipulator
+from pteron.platforms.coordinates import within_a_turn
 
 _BATCH = 4096
 """Rows of joint coordinates solved at a time."""
@@ -71,9 +72,6 @@ _APART, _LEAST = 6.0, 2e-16
 """Factor and floor of the miss that tells two modes apart. At the middle between two modes the
 closures are missed by about a quarter of the square of their distance: this must be so many times
 what both poses miss, and no less than rounding. It separates modes to some 1e-7 of the size."""
-
-_TURN_ROUNDING = 1e-14
-"""Rounding of an angle of half a turn, rad."""
 
 _ALIKE = 1e-9
 """Difference of coordinates, m or rad, that does not decide the order of two poses."""
@@ -296,9 +294,3 @@ def _ranks(values: Array) -> NDArray[np.int64]:
     ranks[..., 1:] = np.cumsum(steps, axis=-1)
     np.put_along_axis(ranks, order, ranks.copy(), axis=-1)
     return ranks
-
-
-def within_a_turn(phi: Array) -> Array:
-    """Return angles in (-pi, pi]; what is -pi but for rounding becomes pi."""
-    turned = phi - 2.0 * np.pi * np.ceil((phi - np.pi) / (2.0 * np.pi))
-    return np.where(turned <= -np.pi + _TURN_ROUNDING, np.pi, turned)

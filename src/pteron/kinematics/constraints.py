@@ -44,7 +44,7 @@ def constraint_measure(
     Examples
     --------
     >>> import pteron
-    >>> float(pteron.constraint_measure("tripteron", [0.0, 0.0, 0.0]).round(9))
+    >>> float(pteron.kinematics.constraint_measure("tripteron", [0.0, 0.0, 0.0]).round(9))
     1.0
     """
     robot = as_manipulator(robot)

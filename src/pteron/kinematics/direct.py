@@ -11,11 +11,12 @@ from pteron.equations.machine import closure_of
 from pteron.errors import UnreachablePose
 from pteron.kernels import Array
 from pteron.kinematics.architecture import expect_regular
-from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
+from pteron.kinematics.assembly import every_pose, in_order
 from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
 from pteron.kinematics.unlikely_values import unlikely_values, warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
+from pteron.platforms.coordinates import within_a_turn
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
 
 _SAME_JOINT = 1e-6
@@ -136,7 +137,7 @@ def assembly_mode(
     --------
     >>> import numpy as np, pteron
     >>> robot = pteron.load("quadrupteron")
-    >>> pteron.assembly_mode(robot, [[0.01, 0.02, 0.03, 0.0], [0.01, 0.02, 0.03, np.pi]])
+    >>> pteron.kinematics.assembly_mode(robot, [[0.01, 0.02, 0.03, 0.0], [0.01, 0.02, 0.03, np.pi]])
     array([0, 1])
     """
     robot = as_manipulator(robot)
@@ -171,7 +172,7 @@ def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArra
     >>> robot = pteron.load("delta")
     >>> joints = pteron.inverse_kinematics(robot, [0.0, 0.0, -0.9])
     >>> poses = pteron.direct_kinematics(robot, joints, all_branches=True)
-    >>> pteron.working_mode(robot, poses, joints)
+    >>> pteron.kinematics.working_mode(robot, poses, joints)
     array([[ 1,  1,  1],
            [-1, -1, -1]])
     """

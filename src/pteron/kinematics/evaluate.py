@@ -81,6 +81,8 @@ def checked(
     array = as_array(value, name, (len(columns),), columns=columns)
     good = np.isfinite(array)
     if good.all():
+        if type(value) in _TYPED and columns is names["pose"]:
+            warn_of_unlikely(robot, columns, array)
         return array
     if on_failure == "raise":
         raise _not_finite(name, array, tuple(int(i) for i in np.argwhere(~good)[0]))

@@ -34,6 +34,8 @@ def jacobian_at(robot: Manipulator, pose: Array) -> JacobianAtPose:
     matrix = jacobian(robot, pose)
     found: tuple[Array, Array] = evaluated(robot, "homogeneous_jacobian", "raise", pose)
     plain, length = found
-    turning = [leg.platform_point[:2] for leg in robot.legs if leg.reach_bound is not None]
-    radius = float(length) if robot.platform.angles and np.any(turning) else None
+    turning = robot.platform.angles and any(
+        any(leg.platform_point[:2]) and leg.reach_bound is not None for leg in robot.legs
+    )
+    radius = float(length) if turning else None
     return JacobianAtPose(matrix, radius, float(np.linalg.cond(plain)))

@@ -93,7 +93,7 @@ def joint_rates(
     --------
     >>> import pteron
     >>> robot = pteron.load("quadrupteron")
-    >>> pteron.joint_rates(robot, [0, 0, 0, 0], [0.1, 0, 0, 0]).actuated
+    >>> pteron.kinematics.joint_rates(robot, [0, 0, 0, 0], [0.1, 0, 0, 0]).actuated
     array([0. , 0. , 0.1, 0. ])
     """
     found: tuple[Array, ...] = evaluated(robot, "joint_rates", on_failure, pose, velocity)

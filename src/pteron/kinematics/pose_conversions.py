@@ -54,7 +54,7 @@ def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
     Examples
     --------
     >>> import pteron
-    >>> pteron.position_of("wrist", [0.1, 0.2, 0.3])
+    >>> pteron.kinematics.position_of("wrist", [0.1, 0.2, 0.3])
     array([0.  , 0.  , 0.12])
     """
     robot = as_manipulator(robot)
@@ -246,7 +246,7 @@ def velocity_of(
     Examples
     --------
     >>> import pteron
-    >>> pteron.velocity_of("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5]) + 0.0
+    >>> pteron.kinematics.velocity_of("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5]) + 0.0
     array([0.1, 0. , 0. , 0. , 0. , 0.5])
     """
     robot = as_manipulator(robot)
@@ -313,7 +313,7 @@ def twist_jacobian(
     Examples
     --------
     >>> import pteron
-    >>> pteron.twist_jacobian("tripteron", [0.0, 0.0, 0.0])
+    >>> pteron.kinematics.twist_jacobian("tripteron", [0.0, 0.0, 0.0])
     array([[1., 0., 0., 0., 0., 0.],
            [0., 1., 0., 0., 0., 0.],
            [0., 0., 1., 0., 0., 0.]])

@@ -1,7 +1,8 @@
 """Direct kinematics of tilting platforms by homotopy: all poses, followed from a known machine.
 
 `equations.pose_paths` has the method. The file `generic_machines.npz` beside this one has, for each
-kind of closures, a start machine in complex numbers with its poses; `generic_machines` makes it.
+kind of closures, a start machine in complex numbers with its poses;
+`benchmarks/generic_machines.py` makes it.
 """
 
 from __future__ import annotations

@@ -13,9 +13,9 @@ from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.legs.leg import Passive
 from pteron.manipulator import Manipulator
+from pteron.shapes import PoseLike
 
 _BATCH = 4096
 """Poses drawn at a time."""
@@ -224,3 +224,12 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
     # Guides that are parallel but for tolerances meet nowhere near the machine.
     center = np.linalg.lstsq(normal, right, rcond=_PARALLEL)[0]
     return np.asarray(center, dtype=float), 1.5 * reach
+
+
+def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
+    """Return the size (...) of the type-II measure of poses (..., m), 0 where it is not finite.
+
+    So a pose out of reach, or where a leg loses its force, passes no floor.
+    """
+    sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
+    return np.where(np.isfinite(sizes), sizes, 0.0)

@@ -8,14 +8,15 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
-from pteron.kernels import Array, as_array, numeric
+from pteron.kernels import Array, as_array, bare, numeric
+from pteron.kernels.kept import kept_result
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
-from pteron.kinematics.sampling import drawn_poses
-from pteron.kinematics.type_ii_sizes import type_ii_sizes
+from pteron.kinematics.sampling import drawn_poses, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -51,9 +52,11 @@ def best_type_ii(robot: Manipulator) -> float:
     It is the best of many random poses, the foremost of them improved by Nelder and Mead's method.
     Limits do not count: it is a measure of the geometry, which another limit leaves as it is.
     """
-    # Kinematics load without SciPy.
-    from scipy.optimize import minimize  # type: ignore[import-untyped]
+    key = "best_type_ii", bare(robot)
+    return kept_result(key, ("kinematics",), lambda: _best_type_ii(robot))
 
+
+def _best_type_ii(robot: Manipulator) -> float:
     def measure(poses: Array) -> Array:
         reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
         return np.where(reached, type_ii_sizes(robot, poses), 0.0)
@@ -63,7 +66,7 @@ def best_type_ii(robot: Manipulator) -> float:
     drawn = drawn_poses(robot, _DRAWN, np.random.default_rng(0), limits=False)
     sizes = measure(drawn)
     improved = [
-        -minimize(
+        -scipy.optimize.minimize(
             lambda pose: -float(measure(pose)),
             start,
             method="Nelder-Mead",
@@ -105,7 +108,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
     Examples
     --------
     >>> import numpy as np, pteron
-    >>> np.degrees(pteron.singular_orientations(pteron.load("quadrupteron")))
+    >>> np.degrees(pteron.kinematics.singular_orientations(pteron.load("quadrupteron")))
     array([-90.,  90.])
     """
     robot = as_manipulator(robot)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
 
-from pteron.errors import UnlikelyValue
+from pteron.errors import warn_unlikely
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import COORDINATES
@@ -60,7 +59,9 @@ def _turn(limits: tuple[float, float] | None, least: float) -> float:
     return max((least, *map(abs, limits or ())))
 
 
-def warn_of_unlikely(robot: Manipulator, columns: Sequence[str], values: Array) -> None:
+def warn_of_unlikely(
+    robot: Manipulator, columns: Sequence[str], values: Array, source: str = ""
+) -> None:
     """Issue a warning, `UnlikelyValue`, of what is likely in another unit."""
     for text in unlikely_values(robot, columns, values):
-        warnings.warn(text, UnlikelyValue, stacklevel=4)
+        warn_unlikely(f"{source}{text}")

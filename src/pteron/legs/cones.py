@@ -10,15 +10,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector, number, unit_vector
 from pteron.errors import ModelError
-from pteron.legs.keys import Key
 from pteron.legs.leg import Passive
-
-ELBOW_LIMITS = Key(
-    "limits",
-    "least and greatest angle between the links, rad: 0 where stretched, pi where folded",
-    default=None,
-    example=[0.3, 2.8],
-)
 
 
 @dataclass(frozen=True)
@@ -44,17 +36,6 @@ class Cone:
                 f"angle: {self.angle:g} rad given, one above 0 and up to pi expected; are these "
                 "degrees?"
             )
-
-
-def check_elbow(
-    limits: tuple[float, float] | None, least: float = 0.0, most: float = math.pi
-) -> None:
-    """Refuse an elbow's limits beyond the angles that it can have."""
-    if limits is not None and not least <= limits[0] < limits[1] <= most:
-        raise ModelError(
-            f"elbow_limits: {list(limits)} rad reaches beyond {least:.4g} to {most:.4g}, where the "
-            "angle always is; are these degrees?"
-        )
 
 
 def between(a: Expression, b: Expression) -> Expression:

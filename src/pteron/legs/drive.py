@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 from pteron.bodies.vectors import number
-from pteron.errors import ModelError
+from pteron.errors import ModelError, shown
 from pteron.toml import told
 
 
@@ -30,12 +31,106 @@ class Stribeck:
 
 
 @dataclass(frozen=True)
+class LuGre:
+    """Dry friction by bristles that bend before they slide: the LuGre model.
+
+    Bristles bent by z push with stiffness z + damping z', and z' = q' - stiffness |q'| z / f(q'),
+    where f is the drive's dry friction. At rest they yield, like a stiff spring; the stiffer they
+    are the nearer they come to friction that sticks fast. The damping is less where the joint is
+    fast, below 4 f / |q'|, so that they never bring energy.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        At the joint, N/m and N s/m, or N m/rad and N m s/rad.
+    """
+
+    stiffness: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, least=("damping",), above=("stiffness",))
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """A transmission that bends between motor and joint: k d + c d' of what it is bent, d.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k and c at the joint, N/m and N s/m, or N m/rad and N m s/rad.
+    backlash : float
+        Play between motor and joint in all, at the joint, m or rad. Where there is any, the teeth
+        push alone: they do not hold each other as they part.
+    encoder : {"motor", "joint", "both"}
+        Where the encoder is. With both, a controller of `pteron.controllers` is told the joint's
+        coordinate and the motor's rate, as drives with two encoders have it.
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    backlash: float = 0.0
+    encoder: str = "motor"
+
+    def __post_init__(self) -> None:
+        _check(self, least=("damping", "backlash"), above=("stiffness",))
+        if self.encoder not in ("motor", "joint", "both"):
+            text = f'encoder: {self.encoder!r} given, "motor", "joint" or "both" expected'
+            raise ModelError(text, faults=[text])
+
+
+@dataclass(frozen=True)
+class Winding:
+    """A motor's winding, whose voltage is limited: R i + k w is at most the supply's.
+
+    Parameters
+    ----------
+    resistance : float
+        R, ohm.
+    torque_constant : float
+        k, N m/A, which is V s/rad too.
+    voltage : float
+        Of the supply, V.
+    """
+
+    resistance: float
+    torque_constant: float
+    voltage: float
+
+    def __post_init__(self) -> None:
+        _check(self, above=("resistance", "torque_constant", "voltage"))
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A wave of a motor's torque: size sin(order angle + phase), by the motor's angle.
+
+    Parameters
+    ----------
+    order : float
+        Waves in a turn of the motor.
+    size : float
+        Share of the torque (ripple), or N m at the motor (cogging).
+    phase : float
+        rad.
+    """
+
+    order: float
+    size: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, free=("size", "phase"), above=("order",))
+
+
+@dataclass(frozen=True)
 class Drive:
     """The drive of an actuated joint; its values hold at the joint unless they name the motor.
 
     It must give ratio^2 rotor_inertia q'' + (coulomb + stribeck) s(q') + viscous q' + offset beside
-    the force of the rigid bodies. s is the sign where forces are compared with logs, and
-    tanh(q'/rest_speed) in simulation and on a controller.
+    the force of the rigid bodies. s is the sign where forces are compared with logs,
+    tanh(q'/rest_speed) on a controller, and in simulation what rest asks for where a joint sticks.
 
     Parameters
     ----------
@@ -51,12 +146,25 @@ class Drive:
         m/s or rad/s.
     stribeck : Stribeck, optional
         What dry friction has more at rest.
+    lugre : LuGre, optional
+        Bristles by which dry friction acts in simulation, in place of sticking fast.
     rated_torque : float, optional
         Of the motor, N m: what commands in per cent are of.
     counts_per_turn : float, optional
         Counts of the motor's encoder in a turn of the motor: what logs in counts are in.
     max_force, max_speed : float, optional
         What the drive can do, N and m/s, or N m and rad/s, at the joint.
+    elastic : Elastic, optional
+        A transmission that bends. The friction is then the motor's, before it.
+    current_time : float, optional
+        Time constant of the current loop, s.
+    curve : sequence of (speed, force), optional
+        Greatest force by speed, at the joint, straight between: the motor's curve. Beyond the last
+        speed there is the last force.
+    winding : Winding, optional
+        The motor's winding and its supply.
+    ripple, cogging : sequence of Wave
+        Waves of the motor's torque: as a share of it, and without current.
     """
 
     coulomb: float = 0.0
@@ -70,15 +178,82 @@ class Drive:
     max_force: float | None = None
     max_speed: float | None = None
     counts_per_turn: float | None = None
+    elastic: Elastic | None = None
+    current_time: float | None = None
+    curve: tuple[tuple[float, float], ...] = ()
+    winding: Winding | None = None
+    ripple: tuple[Wave, ...] = ()
+    cogging: tuple[Wave, ...] = ()
+    lugre: LuGre | None = None
 
     def __post_init__(self) -> None:
+        self._expect_parts()
         _check(
             self,
             free=("offset",),
             least=("coulomb", "viscous", "rotor_inertia"),
-            above=("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn"),
+            above=(
+                *("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn"),
+                "current_time",
+            ),
             nonzero=("ratio",),
         )
+        self._expect_sense()
+
+    def _expect_parts(self) -> None:
+        """Refuse what is none of the parts of a drive, and make its lists tuples."""
+        faults = []
+        parts = {"stribeck": Stribeck, "lugre": LuGre, "elastic": Elastic, "winding": Winding}
+        for name, kind in parts.items():
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, kind):
+                faults.append(f"{name}: {shown(given)} given, a {kind.__name__} expected")
+        for name in ("curve", "ripple", "cogging"):
+            given = getattr(self, name)
+            try:
+                found = tuple(given or ())
+                if name == "curve":
+                    found = tuple((float(speed), float(force)) for speed, force in found)
+                    good = all(isfinite(number) for pair in found for number in pair)
+                else:
+                    good = all(isinstance(wave, Wave) for wave in found)
+            except (TypeError, ValueError):
+                good = False
+            if good:
+                object.__setattr__(self, name, found)
+            else:
+                wanted = (
+                    "pairs of numbers, speed and force," if name == "curve" else "a list of Wave"
+                )
+                faults.append(f"{name}: {shown(given)} given, {wanted} expected")
+        if faults:
+            raise ModelError(told(faults), faults=faults)
+
+    def _expect_sense(self) -> None:
+        """Refuse what contradicts itself."""
+        faults = []
+        if self.elastic and not self.rotor_inertia:
+            faults.append(
+                "elastic: needs rotor_inertia, since the motor moves by itself; give it, kg m^2"
+            )
+        if self.lugre and not self.coulomb:
+            faults.append("lugre: needs coulomb, the friction at which its bristles slide; give it")
+        for name in ("winding", "ripple", "cogging"):
+            if getattr(self, name) and self.ratio is None:
+                faults.append(f"{name}: needs ratio, of the motor's angle; give it, 1 for none")
+        speeds = [speed for speed, _ in self.curve]
+        if self.curve and (speeds[0] < 0.0 or sorted({*speeds}) != speeds):
+            faults.append("curve: speeds from 0 up expected, in ascending order")
+        if any(force < 0.0 for _, force in self.curve):
+            faults.append("curve: forces of 0 or more expected")
+        most = max((force for _, force in self.curve), default=0.0)
+        if self.curve and self.max_force is not None and self.max_force > most:
+            faults.append(
+                f"max_force: {self.max_force:g} given, but the curve has {most:g} at most; leave "
+                "one of them out, or make them agree"
+            )
+        if faults:
+            raise ModelError(told(faults), faults=faults)
 
     @property
     def gear(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pteron.legs.drive import Drive, Stribeck
+from pteron.legs.drive import Drive, Elastic, Stribeck
 from pteron.legs.kind import LegKind
 
 _QUANTITIES = (
@@ -20,6 +20,9 @@ _QUANTITIES = (
     ("rated torque", "rated_torque", "N m"),
     ("greatest force", "max_force", "{force}"),
     ("greatest speed", "max_speed", "{rate}"),
+    ("transmission's stiffness", "elastic.stiffness", "{stiffness}"),
+    ("its backlash", "elastic.backlash", "{joint}"),
+    ("current's time constant", "current_time", "s"),
     ("encoder", "counts_per_turn", "counts a turn of the motor"),
 )
 """Names, where a `Drive` has them, and units."""
@@ -35,7 +38,7 @@ def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
     >>> import pteron
     >>> from dataclasses import replace
     >>> legs = pteron.load("five-bar").legs
-    >>> for row in drive_rows([replace(legs[0], drive=pteron.Drive(coulomb=3.0)), legs[1]]):
+    >>> for row in drive_rows([replace(legs[0], drive=pteron.legs.Drive(coulomb=3.0)), legs[1]]):
     ...     print(row)
     ('dry friction (N m)', ['3', '-'])
     ('smooth below (rad/s)', ['0.001', '-'])
@@ -58,7 +61,7 @@ def _value(drive: Drive | None, place: str) -> float | None:
     """Return a number of a drive, by where it has it."""
     if drive is None or (place == "rest_speed" and not (drive.coulomb or drive.stribeck)):
         return None
-    found: Drive | Stribeck | float | None = drive
+    found: Drive | Stribeck | Elastic | float | None = drive
     for name in place.split("."):
         found = getattr(found, name, None)
     return found if isinstance(found, float) else None
@@ -71,5 +74,6 @@ def _units(leg: LegKind) -> dict[str, str]:
         "force": leg.joint.force_unit,
         "rate": f"{leg.joint.unit}/s",
         "damping": "N s/m" if slides else "N m s",
+        "stiffness": "N/m" if slides else "N m/rad",
         "inertia": "kg" if slides else "kg m^2",
     }

@@ -30,6 +30,10 @@ KINDS: dict[str, type[LegKind]] = {
 """The kinds of legs that are loaded, by their key `type`; add another here."""
 
 
+Leg = PRRR
+"""The kind of leg that a file means where it does not say `type`."""
+
+
 def kind_names() -> tuple[str, ...]:
     """Return the names of all kinds that files may name."""
     return (*KINDS, *sorted(entry.name for entry in _others() if entry.name not in KINDS))

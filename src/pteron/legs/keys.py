@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from textwrap import fill
 from typing import Any, Literal, NamedTuple
@@ -172,3 +173,22 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
     if role == "reading" and not isinstance(value, Reading):
         raise ModelError(f"{name}: {type(value).__name__} given, a Reading expected")
     return value
+
+
+ELBOW_LIMITS = Key(
+    "limits",
+    "least and greatest angle between the links, rad: 0 where stretched, pi where folded",
+    default=None,
+    example=[0.3, 2.8],
+)
+
+
+def check_elbow(
+    limits: tuple[float, float] | None, least: float = 0.0, most: float = math.pi
+) -> None:
+    """Refuse an elbow's limits beyond the angles that it can have."""
+    if limits is not None and not least <= limits[0] < limits[1] <= most:
+        raise ModelError(
+            f"elbow_limits: {list(limits)} rad reaches beyond {least:.4g} to {most:.4g}, where the "
+            "angle always is; are these degrees?"
+        )

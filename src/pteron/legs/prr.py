@@ -22,8 +22,8 @@ from pteron.bodies.motion import (
 )
 from pteron.bodies.vectors import Vector, cross, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
-from pteron.legs.cones import check_elbow, within
-from pteron.legs.keys import Condition, Key
+from pteron.legs.cones import within
+from pteron.legs.keys import Condition, Key, check_elbow
 from pteron.legs.kind import Quantity
 from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body

@@ -34,10 +34,10 @@ from pteron.legs.circles import (
     random_triangle,
     squared_reach,
 )
-from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
+from pteron.legs.cones import between, within
 from pteron.legs.crank import ELBOW
 from pteron.legs.drive import Drive
-from pteron.legs.keys import Condition, Key
+from pteron.legs.keys import ELBOW_LIMITS, Condition, Key, check_elbow
 from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import (
     Joint,

@@ -14,9 +14,9 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_triangle
-from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
+from pteron.legs.cones import between, within
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
-from pteron.legs.keys import Condition, Key
+from pteron.legs.keys import ELBOW_LIMITS, Condition, Key, check_elbow
 from pteron.legs.leg import Circle, Joint, LegMotion, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
 

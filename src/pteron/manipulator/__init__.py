@@ -1,23 +1,27 @@
 """A robot as a value: legs, platform and gravity, its TOML files, and the catalog."""
 
-from pteron.manipulator.dimensions import with_dimensions as with_dimensions
-from pteron.manipulator.files import catalog as catalog, load as load
-from pteron.manipulator.given import RobotLike as RobotLike, as_manipulator as as_manipulator
-from pteron.manipulator.manipulator import (
-    STANDARD_GRAVITY as STANDARD_GRAVITY,
-    Manipulator as Manipulator,
-)
-from pteron.manipulator.parameters import (
-    parameter_data as parameter_data,
-    parameter_names as parameter_names,
-    parameter_units as parameter_units,
-    parameters as parameters,
-    with_parameters as with_parameters,
-)
-from pteron.manipulator.radii import Radii as Radii
-from pteron.manipulator.saving import save as save
-from pteron.manipulator.tool import Tool as Tool
-from pteron.manipulator.variants import turned as turned, working_modes as working_modes
+from typing import TYPE_CHECKING
+
 from pteron.public import publish as _publish
 
-_publish(__name__, checked=True, classes=("Manipulator", "Tool"))
+if TYPE_CHECKING:
+    from pteron.manipulator.dimensions import with_dimensions as with_dimensions
+    from pteron.manipulator.files import catalog as catalog, load as load
+    from pteron.manipulator.given import RobotLike as RobotLike, as_manipulator as as_manipulator
+    from pteron.manipulator.manipulator import (
+        STANDARD_GRAVITY as STANDARD_GRAVITY,
+        Manipulator as Manipulator,
+    )
+    from pteron.manipulator.parameters import (
+        parameter_data as parameter_data,
+        parameter_names as parameter_names,
+        parameter_units as parameter_units,
+        parameters as parameters,
+        with_parameters as with_parameters,
+    )
+    from pteron.manipulator.radii import Radii as Radii
+    from pteron.manipulator.saving import save as save
+    from pteron.manipulator.tool import Tool as Tool
+    from pteron.manipulator.variants import turned as turned, working_modes as working_modes
+
+_publish(__name__, checked=True)

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pteron.bodies.vectors import unit_vector, vector
-from pteron.errors import ModelError, shown
+from pteron.errors import ModelError, shown, warn_unlikely
 from pteron.legs import LegKind
 from pteron.legs.circles import perpendicular_to
 from pteron.legs.installed import kind_named, kind_names
+from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
 from pteron.manipulator.tool import Tool
@@ -59,19 +60,32 @@ def load(name_or_path: str | Path) -> Manipulator:
         If there is no such name or file, or if the file is not TOML, lacks keys, has unknown ones,
         or describes a machine that cannot be; the message names every fault, by its key.
 
+    Warns
+    -----
+    UnlikelyValue
+        For each value of a file that is possible but unlikely, most often in another unit, as
+        ``pteron check`` does. Masses and inertias are left out in files with first moments, which
+        Pteron itself writes.
+
     Examples
     --------
     >>> import pteron
     >>> pteron.load("tripteron").coordinates
     ('x', 'y', 'z')
     """
-    return _loaded(*_contents(name_or_path), str(name_or_path))
+    robot, unlikely = _loaded(*_contents(name_or_path), str(name_or_path))
+    for text in unlikely:
+        warn_unlikely(f"{name_or_path}: {text}")
+    return robot
 
 
 @lru_cache(maxsize=64)
-def _loaded(data: bytes, source: str, given: str) -> Manipulator:
-    """Return the machine of a file's contents: what was read once is not read again."""
-    return _machine(parsed_toml(data, source, ModelError), given)
+def _loaded(data: bytes, source: str, given: str) -> tuple[Manipulator, tuple[str, ...]]:
+    """Return the machine of a file's contents, and warnings; what was read once is kept."""
+    robot = _machine(parsed_toml(data, source, ModelError), given)
+    # Pteron writes first moments, persons centres of mass: what identification finds for a body
+    # alone is one of many equivalent values, and need not be likely.
+    return robot, machine_warnings(robot, bodies=b"first_moment" not in data)
 
 
 def document(name_or_path: str | Path) -> dict[str, Any]:
@@ -140,7 +154,7 @@ class _Reading:
         """Return what of a table has the right shape, None for the rest and for what is missing."""
         from pydantic import ValidationError
 
-        from pteron.manipulator.tables import part_of
+        from pteron.manipulator.leg_tables import part_of
 
         part, kept = part_of(model), given if isinstance(given, dict) else {}
         try:
@@ -198,7 +212,7 @@ class _Reading:
 
     def leg(self, i: int, given: object) -> LegKind | None:
         """Return leg i, from 1, or None; one with faults serves to check the machine."""
-        from pteron.manipulator.tables import FORMER, leg_of, leg_table
+        from pteron.manipulator.leg_tables import FORMER, leg_of, leg_table
 
         prefix = f"leg {i}: "
         if not isinstance(given, dict):

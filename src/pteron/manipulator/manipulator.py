@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import checked_arguments
 from pteron.bodies.vectors import PARALLEL_TOLERANCE, Vector, complement, dot, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
@@ -35,6 +36,7 @@ STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 """Acceleration of gravity where a file does not say it, m/s^2."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Manipulator:
     """A parallel manipulator whose legs carry points of the platform.

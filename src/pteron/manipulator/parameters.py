@@ -37,7 +37,7 @@ def parameter_data(
     Examples
     --------
     >>> import pteron
-    >>> p = pteron.parameter_data(pteron.load("quadrupteron"))[5]
+    >>> p = pteron.manipulator.parameter_data(pteron.load("quadrupteron"))[5]
     >>> p.kind, p.body, p.legs, p.unit, p.name
     ('mgx', 'u', (1,), 'kg m', 'mgx_u1')
     """

@@ -43,7 +43,7 @@ def text_of(robot: Manipulator) -> str:
 
 def document_of(robot: Manipulator) -> dict[str, Any]:
     """Return the contents of a manipulator's file."""
-    from pteron.manipulator.tables import leg_items
+    from pteron.manipulator.leg_tables import leg_items
 
     own = robot.platform
     platform: dict[str, Any] = {"motion": own.motion, "axis": own.axis}

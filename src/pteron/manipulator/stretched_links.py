@@ -30,7 +30,7 @@ def stretched(body: Any, factor: float) -> Any:
 
     Examples
     --------
-    >>> from pteron import RodInertia
+    >>> from pteron.bodies import RodInertia
     >>> stretched(RodInertia.of_body(1.0, [-0.5], 1.0 / 3.0), 2.0).values
     (2.0, -2.0, 2.6666666666666665)
     """

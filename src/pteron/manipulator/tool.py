@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from pteron.arguments import checked_arguments
 from pteron.bodies.inertia import inertia_count
 from pteron.bodies.vectors import Vector, number, numbers, vector
 from pteron.errors import ModelError
@@ -16,6 +17,7 @@ _SPATIAL = 6
 """Numbers of a tensor: Ixx, Ixy, Ixz, Iyy, Iyz, Izz."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Tool:
     """A tool: a body that the platform carries where it is mounted, and its centre point.

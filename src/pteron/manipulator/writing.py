@@ -11,7 +11,8 @@ from pydantic.fields import FieldInfo
 
 from pteron.bodies.tables import PlanarBody, Table
 from pteron.legs import KINDS
-from pteron.manipulator.tables import MachineTable, leg_table, platform_table
+from pteron.manipulator.leg_tables import leg_table
+from pteron.manipulator.tables import MachineTable, platform_table
 
 _WIDTH = 110
 """Width of comments that have lines of their own."""

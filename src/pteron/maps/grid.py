@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from pteron.arguments import checked_arguments
 from pteron.errors import DataError, ModelError, shown
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
@@ -94,6 +95,7 @@ class Axis:
         return coordinate(self.name).unit
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Grid:
     """Poses of which some coordinates vary and the others are held.

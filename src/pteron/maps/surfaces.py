@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, map_coordinates  # type: ignore[import-untyped]
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, ModelError
@@ -95,14 +95,16 @@ def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tu
         shares = () if name == MARGIN.name else _SHARES
         levels = np.unique(np.quantile(values[known], shares)).tolist()
     # Undetermined poses have their nearest neighbour's value, so that interpolation stays finite.
-    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    nearest = scipy.ndimage.distance_transform_edt(
+        ~known, return_distances=False, return_indices=True
+    )
     whole = values[tuple(nearest)]
     found = []
     if MARGIN.name in given.values:
         closed = np.pad(given.values[MARGIN.name], 1, constant_values=-_BEYOND)
         corners, triangles, *_ = measure(closed, 0.0)
         corners = np.clip(corners - 1.0, 0.0, np.array(values.shape) - 1.0)
-        own = map_coordinates(whole, corners.T, order=1)
+        own = scipy.ndimage.map_coordinates(whole, corners.T, order=1)
         found.append(_surface(given, None, corners, triangles, own))
     for level in levels:
         if whole.min() < level < whole.max():

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import signal  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
+from pteron.arguments import checked_arguments
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
@@ -47,6 +48,7 @@ _TRIES = 30
 refused."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Washout:
     """The filters of a washout.
@@ -190,7 +192,7 @@ def _shown(time: Array, value: Array, above: Sequence[float], below: Any) -> Arr
     """Return a filter's output and two derivatives (3, T), of a value that was 0 before."""
     return np.array(
         [
-            signal.lsim((np.polymul(above, [1.0] + [0.0] * order), below), value, time)[1]
+            scipy.signal.lsim((np.polymul(above, [1.0] + [0.0] * order), below), value, time)[1]
             for order in range(3)
         ]
     )

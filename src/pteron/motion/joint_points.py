@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull  # type: ignore[import-untyped]
 
 from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics
@@ -50,7 +50,7 @@ class Part(NamedTuple):
         away = corners - corners[:1]
         if len(away) < 4 or np.linalg.matrix_rank(away, _FLAT * np.abs(away).max()) < 3:
             return None
-        hull = ConvexHull(away)
+        hull = scipy.spatial.ConvexHull(away)
         a, b, c = np.moveaxis(away[hull.simplices], 1, 0)
         inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
         return np.asarray(np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices))

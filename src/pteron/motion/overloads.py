@@ -32,7 +32,7 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     >>> from dataclasses import replace
     >>> from pteron.motion import overloads
     >>> robot = pteron.load("tripteron")
-    >>> legs = [replace(leg, drive=pteron.Drive(max_force=20.0)) for leg in robot.legs]
+    >>> legs = [replace(leg, drive=pteron.legs.Drive(max_force=20.0)) for leg in robot.legs]
     >>> overloads(replace(robot, legs=legs), [[3.0, -25.0, 8.0]], [[0.1, 0.2, 0.3]])
     ('leg 2: the motion takes up to 25 N, but its drive gives 20 N (max_force)',)
     """

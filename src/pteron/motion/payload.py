@@ -10,7 +10,7 @@ import numpy as np
 
 from pteron.bodies.inertia import carried_values, inertia_count
 from pteron.bodies.vectors import numbers, vector
-from pteron.errors import DataError, ModelError
+from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _HEAVY = 20.0
@@ -72,7 +72,7 @@ def with_tool(robot: RobotLike, name: str) -> Manipulator:
     tool = found[name]
     bare = replace(robot, platform=replace(robot.platform, tool=tool.point), tools=())
     try:
-        return with_payload(bare, tool.mass, tool.center, tool.central_inertia)
+        return carrying(bare, tool.mass, tool.center, tool.central_inertia)
     except (DataError, ModelError) as error:
         raise ModelError(f"tool {name}: {error.message}", subject=robot.name) from None
 
@@ -113,6 +113,11 @@ def with_payload(
         If no body has this inertia; if the platform slides, as that of an I4, and the payload is
         off the axis: what turns there has a first moment that the model of the platform has not.
 
+    Warns
+    -----
+    UnlikelyValue
+        If the mass is likely in grams.
+
     Examples
     --------
     >>> import numpy as np, pteron
@@ -121,7 +126,20 @@ def with_payload(
     >>> with_payload(robot, 0.5).platform.inertia.mass
     1.3
     """
-    robot = as_manipulator(robot)
+    machine = as_manipulator(robot)
+    loaded = carrying(machine, mass, center, inertia)
+    if warning := payload_warning(machine, float(mass)):
+        warn_unlikely(warning)
+    return loaded
+
+
+def carrying(
+    robot: Manipulator,
+    mass: float,
+    center: Sequence[float] | None = None,
+    inertia: float | Sequence[float] = 0.0,
+) -> Manipulator:
+    """Return the machine with a body as `with_payload`, without a warning of its mass."""
     try:
         carried = float(mass)
     except (TypeError, ValueError):

@@ -12,7 +12,7 @@ import numpy as np
 
 from pteron.bodies.agreement import TIME, differing, rate_of
 from pteron.bodies.motion import Expression
-from pteron.platforms import Platform, equations_class
+from pteron.platforms import Platform
 from pteron.platforms.coordinates import COORDINATES
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
@@ -33,7 +33,7 @@ def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
     >>> faults(pteron.load("quadrupteron").platform)
     ()
     """
-    kind = equations_class(platform)
+    kind = platform.kind
     unknown = [name for name in kind.coordinates if name not in COORDINATES]
     if unknown:
         return (f"coordinates: {', '.join(unknown)}: none of `platforms.coordinates`",)

@@ -14,6 +14,9 @@ Unit = Literal["m", "rad"]
 SHOWN: dict[str, tuple[str, float]] = {"m": ("mm", 1e3), "rad": ("°", 180.0 / math.pi)}
 """The unit in which people read lengths and angles, by their SI unit, and how many make one."""
 
+_TURN_ROUNDING = 1e-14
+"""Rounding of an angle of half a turn, rad."""
+
 
 class Coordinate(NamedTuple):
     """A coordinate of a pose.
@@ -68,3 +71,9 @@ def coordinate(name: str) -> Coordinate:
 def are_angles(names: Iterable[str]) -> NDArray[np.bool_]:
     """Return, for each of the names of coordinates, whether it is an angle."""
     return np.array([coordinate(name).unit == "rad" for name in names], dtype=bool)
+
+
+def within_a_turn(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return angles in (-pi, pi]; what is -pi but for rounding becomes pi."""
+    turned = phi - 2.0 * np.pi * np.ceil((phi - np.pi) / (2.0 * np.pi))
+    return np.where(turned <= -np.pi + _TURN_ROUNDING, np.pi, turned)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.platforms.kinds import equations_class
 from pteron.platforms.platform import Platform
 
 Array = NDArray[np.float64]
@@ -30,7 +29,7 @@ def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
 
     A tripod's chain has x, y and yaw too, which follow from its pose.
     """
-    kind = equations_class(platform)
+    kind = platform.kind
     x0, y0, k = (np.array(axis) for axis in platform.frame)
     axes = {"x": x0, "y": y0, "z": k, "phi": k, "roll": x0, "pitch": y0, "yaw": k}
     axes |= {"rx": x0, "ry": y0, "rz": k, "alpha": np.array(platform.axis)}

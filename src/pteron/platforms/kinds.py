@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from functools import cache
+from typing import Literal
 
 from pteron.platforms.motion import PlatformEquations
 from pteron.platforms.sliding import Sliding
@@ -42,25 +43,10 @@ XYZ: dict[str, type[PlatformEquations]] = {"3T3R": TurnsXYZ, "3R": CentredXYZ}
 """Those whose angles are rx, ry and rz."""
 
 
-class Described(Protocol):
-    """The properties of a platform that tell its kind of equations."""
-
-    @property
-    def motion(self) -> str:
-        """Its freedom."""
-
-    @property
-    def angle_order(self) -> str:
-        """The angles that it has, if it tilts."""
-
-    @property
-    def slides(self) -> bool:
-        """Whether its halves slide."""
-
-
-def equations_class(platform: Described) -> type[PlatformEquations]:
-    """Return the kind of equations of a platform."""
-    if platform.slides:
+@cache
+def equations_class(motion: str, angle_order: str, slides: bool) -> type[PlatformEquations]:
+    """Return the kind of equations of a platform with such a freedom, angles and halves."""
+    if slides:
         return Sliding
-    turns = XYZ if platform.angle_order == "xyz" else _EQUATIONS
-    return turns.get(platform.motion) or _EQUATIONS[platform.motion]
+    turns = XYZ if angle_order == "xyz" else _EQUATIONS
+    return turns.get(motion) or _EQUATIONS[motion]

@@ -24,7 +24,7 @@ from pteron.errors import ModelError
 from pteron.platforms.checked_fields import BASE_Z, checked_fields
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
 from pteron.platforms.kinds import TILTING, AngleOrder, Motion, equations_class
-from pteron.platforms.motion import PlatformMotion
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
 from pteron.platforms.parts import Bar, Geared, HeldPoint
 from pteron.toml import told
 
@@ -126,9 +126,14 @@ class Platform:
         return self.motion in TILTING
 
     @property
+    def kind(self) -> type[PlatformEquations]:
+        """The kind of its equations."""
+        return equations_class(self.motion, self.angle_order, self.slides)
+
+    @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the pose's coordinates, in order; see `platforms.coordinates`."""
-        return equations_class(self).coordinates
+        return self.kind.coordinates
 
     @property
     def units(self) -> tuple[Unit, ...]:
@@ -161,7 +166,7 @@ class Platform:
     @property
     def wrench_columns(self) -> tuple[str, ...]:
         """Names of a wrench at P: a force and moments along its coordinates, all where it tilts."""
-        own = equations_class(self).wrench_columns
+        own = self.kind.wrench_columns
         return own or tuple(COORDINATES[name].wrench for name in self.coordinates)
 
     @property
@@ -346,8 +351,7 @@ def _at_rest(platform: Platform, pose: ca.SX) -> PlatformMotion:
     points = [_column(held.platform_point) for held in platform.planes]
     frame = [_column(axis) for axis in platform.frame]
     still, rest = [ca.SX(3, 1)] * len(points), ca.SX.zeros(len(platform.coordinates))
-    kind = equations_class(platform)
-    return kind(frame, points, still, platform.expressions()).motion(pose, rest, rest)
+    return platform.kind(frame, points, still, platform.expressions()).motion(pose, rest, rest)
 
 
 def _column(values: Sequence[float]) -> ca.SX:

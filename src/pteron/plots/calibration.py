@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
@@ -182,7 +183,8 @@ def row_residuals_figure(
                     rows[here], 1e3 * residuals[here, column], "o", markersize=size
                 )
                 marks.set(markerfacecolor=face, markeredgecolor=edge)
-        axes.set_xlim(0.0, len(rows) + 1.0)
+        axes.set_xlim(0.5, len(rows) + 0.5)
+        axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     return figure
 
 

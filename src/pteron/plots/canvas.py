@@ -1,32 +1,28 @@
-"""Empty figures and axes in the style of all pictures, their colours, and figures as SVG text.
+"""Empty figures and axes in the style of all pictures, with their colours, scales and legends.
 
-The legs' four colours are Okabe and Ito's, which the colour-blind can tell apart. `svg` writes each
-colour as a CSS variable with this value as its default, so that one picture serves a light and a
-dark page.
+The legs' first four colours are Okabe and Ito's, which the colour-blind can tell apart.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Hashable, Iterable, Sequence
-from html import escape
-from io import BytesIO, StringIO
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
 
-import matplotlib as mpl
 import numpy as np
-from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import AutoLocator, FixedLocator, FuncFormatter, NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
 from pteron.platforms.coordinates import SHOWN, coordinate
 from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
+from pteron.short_numbers import power_of_ten
 
 Kind = TypeVar("Kind", bound=Hashable)
 
@@ -61,17 +57,6 @@ REACH = "#3d6b8f"
 WARNING = "#b3261e"
 """Limits and faults."""
 
-_VARIABLES = {
-    INK: "--ink",
-    MUTED: "--muted",
-    GRID: "--grid",
-    PAPER: "--paper",
-    REACH: "--reach",
-    WARNING: "--warning",
-    **{color: f"--leg{i + 1}" for i, color in enumerate(LEG_COLORS)},
-}
-"""CSS variables of the colours."""
-
 FONT_SIZE = 9.0
 """Points. Figures are about as wide as a phone's screen, so that text stays legible there."""
 
@@ -83,6 +68,12 @@ NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 TEXT: Any = {"svg.fonttype": "none", "svg.hashsalt": "pteron", "pdf.fonttype": 42}
 """Settings with which text stays text, and files are the same in each run."""
+
+_SAME = 0.004
+"""Greatest distance of curves that coincide, over the range of all: less than a line is thick."""
+
+_DASH = 4.0
+"""Length of the dashes of curves that coincide, in widths of the line."""
 
 _NOTEBOOK_DPI = 144
 """Dots an inch of a picture in a notebook, which shows it at 96."""
@@ -152,9 +143,77 @@ def plain_axes(figure: Figure, xlabel: str, ylabel: str, place: Any = None) -> A
     for side, spine in axes.spines.items():
         spine.set_visible(side in ("left", "bottom"))
         spine.set(color=MUTED, linewidth=0.7)
+    for scale in (axes.xaxis, axes.yaxis):
+        scale.set_major_locator(_Ticks())
+        scale.set_major_formatter(_Numbers())
     axes.grid(color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     return axes
+
+
+class _Ticks(AutoLocator):
+    """Ticks of a scale that no rounding of constant values stretches."""
+
+    def nonsingular(self, v0: float, v1: float) -> tuple[float, float]:
+        """Return limits whose distance is seen beside their size."""
+        size = max(abs(v0), abs(v1))
+        room = 0.05 * size if abs(v1 - v0) < 1e-6 * size else 0.0
+        low, high = super().nonsingular(min(v0, v1) - room, max(v0, v1) + room)
+        return float(low), float(high)
+
+
+class _Numbers(ScalarFormatter):
+    """Short numbers of a scale: a power of ten that they share stands in the scale's label."""
+
+    def __init__(self) -> None:
+        super().__init__(useOffset=False)
+        self.set_powerlimits((-3, 5))
+        self._plain = self._written = ""
+
+    def set_locs(self, locs: Any) -> None:
+        """Take the ticks' places, and write their power of ten into the label."""
+        super().set_locs(locs)
+        axis: Any = self.axis
+        label = axis.label
+        if label.get_text() != self._written:
+            self._plain = label.get_text()
+        power = super().get_offset().replace("\u2212", "-").partition("e")[2]
+        self._written = _with_power(self._plain, int(power or 0))
+        label.set_text(self._written)
+
+    def get_offset(self) -> str:
+        """Return nothing: the label has it."""
+        return ""
+
+
+def _with_power(label: str, power: int) -> str:
+    """Return a label whose unit has a power of ten, if there is one."""
+    if not power:
+        return label
+    before, bracket, unit = label.rpartition("(")
+    ten = power_of_ten(power)
+    return f"{before}({ten} {unit}" if bracket else f"{label} ({ten})".lstrip()
+
+
+def log_scale(axes: Axes, low: float, high: float) -> None:
+    """Make the scale along x logarithmic, with seven numbers at most, none on another."""
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    first, last = np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9)
+    powers = np.arange(first, last + 1, max(np.ceil((last - first + 1) / 7), 1.0))
+    ticks = 10.0**powers
+    if len(ticks) < 3:
+        fine = np.outer(10.0 ** np.arange(first - 1, last + 1), (1.0, 2.0, 5.0)).ravel()
+        ticks = fine[(fine >= low) & (fine <= high)]
+    axes.xaxis.set_major_locator(FixedLocator(ticks.tolist()))
+    axes.xaxis.set_minor_locator(NullLocator())
+    far = len(ticks) and (ticks[0] < 1e-3 or ticks[-1] > 1e4)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _decade(value, bool(far))))
+
+
+def _decade(value: float, as_power: bool) -> str:
+    power = round(float(np.log10(value)))
+    return power_of_ten(power) if as_power and np.isclose(value, 10.0**power) else f"{value:g}"
 
 
 def stack(
@@ -221,18 +280,45 @@ def leg_curves(
     values: Array,
     columns: Iterable[int],
     width: float,
-    labels: Sequence[str] = (),
+    names: Sequence[str] = (),
+    noun: str = "",
 ) -> None:
-    """Draw columns of values (T, n), each in its leg's style, over all of the time (T,)."""
-    for i in columns:
-        label = labels[i] if labels else None
-        axes.plot(time, values[:, i], label=label, **leg_style(i, width))
-    axes.set_xlim(float(time[0]), float(time[-1]))
+    """Draw columns of values (T, n), each in its leg's style, over all of the time (T,).
+
+    A curve's label is its noun and name. Curves that coincide are dashes of one line in turn; the
+    last one's label says so.
+    """
+    chosen = list(columns)
+    shown = values[:, chosen]
+    near = _SAME * float(np.ptp(shown[np.isfinite(shown)])) if np.isfinite(shown).any() else 0.0
+    for i in chosen:
+        apart = np.abs(shown - values[:, [i]])
+        known = np.atleast_1d(np.isfinite(apart).any(axis=0))
+        alike = [
+            j
+            for j, off, seen in zip(chosen, apart.T, known, strict=True)
+            if seen and not (off > near).any()
+        ]
+        style, label = leg_style(i, width), f"{noun} {names[i]}".lstrip() if names else None
+        if len(alike) > 1:
+            turn, gap = alike.index(i), len(alike) - 1
+            style |= {"linestyle": (-_DASH * turn, (_DASH, _DASH * gap)), "dash_capstyle": "butt"}
+            if label and i == alike[-1]:
+                label += f" (on {', '.join(names[j] for j in alike[:-1])})"
+        axes.plot(time, values[:, i], label=label, **style)
+    all_of_time(axes, time)
 
 
-def leg_labels(count: int) -> list[str]:
-    """Return the names of legs in a legend."""
-    return [f"leg {i}" for i in range(1, count + 1)]
+def all_of_time(axes: Axes, time: Array) -> None:
+    """Make the scale along x that of all of the time (T,); one instant has a second about it."""
+    first, last = float(time[0]), float(time[-1])
+    room = 0.0 if last > first else 0.5
+    axes.set_xlim(first - room, last + room)
+
+
+def numbered(count: int) -> list[str]:
+    """Return the names of legs in a legend, behind the noun "leg"."""
+    return [str(i) for i in range(1, count + 1)]
 
 
 def zero_line(axes: Axes) -> None:
@@ -276,47 +362,3 @@ def remark(axes: Axes, text: str, x: float, y: float, color: str, rise: float = 
         fontsize=FONT_SIZE,
         color=color,
     )
-
-
-def svg(figure: Figure, *, name: str, title: str) -> Markup:
-    """Return a figure as one `<svg>` element for an HTML page, without a background.
-
-    It holds no date, no random identifier and no address, and its colours are CSS variables with
-    the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
-    digits, is put before every identifier, which must be unique in a page; the title says what the
-    picture shows to those who cannot see it.
-    """
-    text = _drawn(figure, facecolor="none")
-    text = text[text.index("<svg") :].rstrip()
-    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r'\sid="', f' id="{name}-', text)
-    text = re.sub(r'href="#', f'href="#{name}-', text)
-    text = re.sub(r"url\(#", f"url(#{name}-", text)
-    # The generic families that end matplotlib's list are the page's affair too.
-    text = re.sub(r"font: ([^'\";]*?)'[^;\"]*", r"font: \1var(--font, sans-serif)", text)
-    # A hundredth of a point is enough; only tags hold coordinates, the rest is text to read.
-    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(?<=\.\d\d)\d+", "", tag[0]), text)
-    for color, variable in _VARIABLES.items():
-        text = text.replace(color, f"var({variable}, {color})")
-    box = re.search(r'viewBox="([^"]+)"', text)
-    assert box is not None  # matplotlib always writes it
-    _, _, width, height = box[1].split()
-    head = (
-        f'<svg class="plot" role="img" aria-label="{escape(title)}" viewBox="{box[1]}" '
-        f'style="--width: {width}px; aspect-ratio: {width} / {height}">'
-        f"<title>{escape(title)}</title>"
-    )
-    return Markup(head + text[text.index(">") + 1 :])
-
-
-def svg_file(figure: Figure) -> str:
-    """Return a figure as the text of an SVG file that stands alone, on white, without a date."""
-    return _drawn(figure)
-
-
-def _drawn(figure: Figure, **look: Any) -> str:
-    buffer = StringIO()
-    with mpl.rc_context(TEXT):
-        figure.savefig(buffer, format="svg", metadata=NO_METADATA, **look)
-    return buffer.getvalue()

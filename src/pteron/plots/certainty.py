@@ -28,6 +28,7 @@ from pteron.plots.canvas import (
     blank,
     leg_style,
     legend,
+    log_scale,
     plain_axes,
     spot,
     zero_line,
@@ -119,11 +120,8 @@ def certainty_figure(
         marker = "o" if k < inertial else "s"
         spot(axes, ratio, y, color, PAPER, 5.5, marker=marker, markeredgewidth=0.6)
     axes.axvline(_CERTAIN, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
-    axes.set_xscale("log")
-    axes.set(xlim=(0.1, high), ylim=(-0.8, p - 0.2))
-    ticks = 10.0 ** np.arange(-1, int(np.log10(high)) + 1)
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.minorticks_off()
+    axes.set_ylim(-0.8, p - 0.2)
+    log_scale(axes, 0.1, high)
     return figure
 
 

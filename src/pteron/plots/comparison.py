@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
@@ -21,15 +20,14 @@ from pteron.plots.canvas import (
     LEG_COLORS,
     MUTED,
     PAPER,
+    all_of_time,
     blank,
+    log_scale,
     plain_axes,
     spot,
     stack,
     zero_line,
 )
-
-_TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
-"""Values that the scale of errors may name."""
 
 _COLUMNS = 360
 """Points of the curve over a whole recording, each the envelope of its samples."""
@@ -78,7 +76,7 @@ def comparison_figure(
     for start, stop in np.minimum(edges, len(time) - 1).tolist():
         for axes in (forces, rest):
             axes.axvspan(time[start], time[stop], color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
-    rest.set_xlim(float(time[0]), float(time[-1]))
+    all_of_time(rest, time)
     figure.align_ylabels([forces, rest])
     return figure
 
@@ -104,11 +102,7 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
         spot(axes, without_friction[i], y, PAPER, color, 7.0, markeredgewidth=1.6)
         spot(axes, errors[i], y, color, PAPER, 8.0)
         axes.plot([least], [y], marker="|", markersize=15.0, color=INK, markeredgewidth=1.8)
-    axes.set_xscale("log")
-    axes.set_xlim(low, high)
-    axes.xaxis.set_major_locator(FixedLocator([t for t in _TICKS if low <= t <= high]))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    log_scale(axes, low, high)
     axes.set_ylim(-0.6, n - 0.4)
     axes.set_yticks(range(n), [f"actuator {n - y}" for y in range(n)], fontsize=FONT_SIZE)
     return figure
@@ -126,7 +120,7 @@ def residual_time_figure(
     `used` (T, n) do not count: they are grey, and may lie outside.
     """
     n = residuals.shape[1]
-    figure = blank(4.8, 0.5 + 0.8 * n)
+    figure = blank(3.8, 0.5 + 1.05 * n)
     units = [joint.force_unit for joint in joints or [SLIDER] * n]
     panels = stack(figure, "time (s)", [f"{i}  ({unit})" for i, unit in enumerate(units, start=1)])
     edges = np.unique(np.linspace(0, len(time), min(_COLUMNS, len(time)) + 1).astype(int))
@@ -140,7 +134,7 @@ def residual_time_figure(
             axes.fill_between(middle, low, high, facecolor=color, edgecolor=color, linewidth=0.6)
         size = float(np.nanmax(np.abs(counted), initial=0.0)) or 1.0
         axes.set_ylim(-1.15 * size, 1.15 * size)
-    panels[-1].set_xlim(float(time[0]), float(time[-1]))
+    all_of_time(panels[-1], time)
     figure.align_ylabels(panels)
     return figure
 

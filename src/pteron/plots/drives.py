@@ -21,9 +21,9 @@ from pteron.plots.canvas import (
     blank,
     groups_of,
     leg_curves,
-    leg_labels,
     leg_style,
     legend,
+    numbered,
     plain_axes,
     remark,
     spot,
@@ -135,6 +135,6 @@ def power_figure(time: ArrayLike, power: ArrayLike) -> Figure:
     zero_line(axes)
     axes.plot(time, power.sum(axis=1), label="all", color=INK, linewidth=2.0)
     count = power.shape[1]
-    leg_curves(axes, time, power, range(count), 1.4, leg_labels(count))
+    leg_curves(axes, time, power, range(count), 1.4, numbered(count), "leg")
     legend(figure, count + 1)
     return figure

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,20 +31,10 @@ _GIF_PIXELS = 6e8
 """Most pixels of a GIF's frames, all of which are held in memory."""
 
 
-class Writer(Protocol):
-    """A film that is being written."""
-
-    def add(self, picture: Pixels) -> None:
-        """Write one more frame."""
-
-    def close(self) -> None:
-        """Finish the file."""
-
-
 class Encoder(NamedTuple):
     """The encoder of one kind of file."""
 
-    writer: Callable[[Path, tuple[int, int], float], Writer]
+    writer: type[Mp4 | Gif]
     """Takes its path, width and height in pixels, and frames a second."""
     rate: Callable[[float], float]
     """Returns the frames a second nearest to a number that the file can tell."""

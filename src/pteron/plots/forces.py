@@ -20,8 +20,8 @@ from pteron.plots.canvas import (
     blank,
     groups_of,
     leg_curves,
-    leg_labels,
     legend,
+    numbered,
     plain_axes,
     remark,
     spot,
@@ -56,7 +56,7 @@ def forces_figure(
     found = stack(figure, "time (s)", list(groups))
     for axes, own in zip(found, groups.values(), strict=True):
         zero_line(axes)
-        leg_curves(axes, time, forces, own, 1.8, leg_labels(len(joints)))
+        leg_curves(axes, time, forces, own, 1.8, numbered(len(joints)), "leg")
         if turning_point is not None:
             axes.axvline(turning_point, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     if turning_point is not None:

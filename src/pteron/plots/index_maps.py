@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
-from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -115,7 +115,7 @@ def _planes(given: Map) -> list[Map]:
             f"{', '.join(axis.name for axis in axes)} vary: a picture shows three coordinates; "
             "hold the others"
         )
-    depth = distance_transform_edt(np.pad(given.reachable, 1))[1:-1, 1:-1, 1:-1]
+    depth = scipy.ndimage.distance_transform_edt(np.pad(given.reachable, 1))[1:-1, 1:-1, 1:-1]
     middle = np.unravel_index(int(depth.argmax()), depth.shape)
     places = [axis.values[i] for axis, i in zip(axes, middle, strict=True)]
     return [

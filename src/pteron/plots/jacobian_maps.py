@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
@@ -148,7 +148,7 @@ def singularities_figure(
 
 def _middle(region: NDArray[np.bool_]) -> tuple[int, int]:
     """Return the row and column in a region (B, A) that is farthest from its rim."""
-    depth = distance_transform_edt(np.pad(region, 1))[1:-1, 1:-1]
+    depth = scipy.ndimage.distance_transform_edt(np.pad(region, 1))[1:-1, 1:-1]
     row, column = np.unravel_index(int(depth.argmax()), region.shape)
     return int(row), int(column)
 

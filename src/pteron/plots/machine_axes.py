@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from pteron.kernels import Array
 from pteron.plots.canvas import FONT_SIZE, PAPER, SMALL
@@ -22,6 +23,8 @@ Style = str | tuple[float, tuple[float, ...]]
 
 class MachineAxes(ABC):
     """Axes of a figure, and the `things` drawn on them, in their order."""
+
+    _line: ClassVar[Any] = Line2D
 
     def __init__(self, axes: Any, *, small: bool) -> None:
         """Begin with nothing; `small` axes have thinner lines and smaller letters."""
@@ -76,7 +79,7 @@ class MachineAxes(ABC):
         p = self._placed(points)
         look: dict[str, Any] = {"color": color, "linewidth": self._weight * width}
         look |= {"linestyle": style, "solid_capstyle": "round"}
-        self.things += self.axes.plot(*p.T, zorder=self._order(p) + raised, **look)
+        self._add_line(p, zorder=self._order(p) + raised, **look)
 
     def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
         """Draw a ring at a point."""
@@ -84,7 +87,11 @@ class MachineAxes(ABC):
         look: dict[str, Any] = {"marker": "o", "markersize": self._weight * size}
         look |= {"markeredgewidth": 1.4 * self._weight, "linestyle": "none"}
         look |= {"markerfacecolor": face, "markeredgecolor": edge}
-        self.things += self.axes.plot(*p.T, zorder=self._order(p) + raised, **look)
+        self._add_line(p, zorder=self._order(p) + raised, **look)
+
+    def _add_line(self, p: Array, **look: Any) -> None:
+        # `plot` would scale the axes, each time, which `fill` does once.
+        self.things.append(self.axes.add_artist(self._line(*p.T, **look)))
 
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
         """Draw polygons, all in one place of the order."""

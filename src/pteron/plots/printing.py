@@ -1,13 +1,16 @@
-"""Figures for print: as wide as a column, and in files with text that stays text."""
+"""Figures for print and pages: as wide as a column, with text that stays text."""
 
 from __future__ import annotations
 
-from io import BytesIO
+import re
+from html import escape
+from io import BytesIO, StringIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
 import matplotlib as mpl
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -15,7 +18,19 @@ from matplotlib.ticker import MultipleLocator
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError, shown
-from pteron.plots.canvas import FONT_SIZE, NO_METADATA, TEXT, legend
+from pteron.plots.canvas import (
+    FONT_SIZE,
+    GRID,
+    INK,
+    LEG_COLORS,
+    MUTED,
+    NO_METADATA,
+    PAPER,
+    REACH,
+    TEXT,
+    WARNING,
+    legend,
+)
 from pteron.plots.fonts import no_word_of_glyphs, take_fonts
 
 Width = Literal["column", "page"]
@@ -29,6 +44,20 @@ _GAP = 3.0
 
 _PRINTED = 8.0
 """Size of letters in print, points."""
+
+_VARIABLES = {
+    INK: "--ink",
+    MUTED: "--muted",
+    GRID: "--grid",
+    PAPER: "--paper",
+    REACH: "--reach",
+    WARNING: "--warning",
+    **{color: f"--leg{i + 1}" for i, color in enumerate(LEG_COLORS)},
+}
+"""CSS variables of the colours, so that one picture serves a light and a dark page."""
+
+_ON_PAGE = 3.8
+"""Greatest width of a figure in a page, inches; more would make its letters smaller than text."""
 
 _NARROWEST, _WIDEST = 1.5, 40.0
 """Least and greatest width, inches."""
@@ -76,16 +105,21 @@ def resized(figure: Figure, width: Width | float) -> Figure:
         raise DataError(
             f"width: {shown(width)} given; {names} or {_NARROWEST:g} to {_WIDEST:g} inches expected"
         )
-    wide, tall = (float(side) for side in figure.get_size_inches())
-    shaped = any(axes.name == "3d" or axes.get_aspect() != "auto" for axes in figure.axes)
-    ratio = inches / wide
-    figure.set_size_inches(inches, tall * (ratio if shaped else ratio**0.5))
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         text.set_fontsize(float(text.get_fontsize()) * _PRINTED / FONT_SIZE)
     for scale in (scale for axes in figure.axes for scale in (axes.xaxis, axes.yaxis)):
         for label in scale.get_ticklabels()[:1]:
             scale.set_tick_params(labelsize=label.get_fontsize())  # also of those to come
+    return _narrowed(figure, inches)
+
+
+def _narrowed(figure: Figure, inches: float) -> Figure:
+    """Change a figure's width; its legend and the numbers along x find room."""
+    wide, tall = (float(side) for side in figure.get_size_inches())
+    shaped = any(axes.name == "3d" or axes.get_aspect() != "auto" for axes in figure.axes)
+    ratio = inches / wide
+    figure.set_size_inches(inches, tall * (ratio if shaped else ratio**0.5))
     take_fonts(figure)
     with no_word_of_glyphs():
         _fit_legend(figure, inches)
@@ -167,3 +201,50 @@ def save_figure(
     with mpl.rc_context(TEXT):
         figure.savefig(buffer, format=ending[1:], dpi=dpi, metadata=_METADATA[ending])
     return write_bytes(target, buffer.getvalue())
+
+
+def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> Markup:
+    """Return a figure as one `<svg>` element for an HTML page, without a background.
+
+    It holds no date, no random identifier and no address, and its colours are CSS variables with
+    the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
+    digits, is put before every identifier, which must be unique in a page; the title says what the
+    picture shows to those who cannot see it. A wider figure is made as narrow as is said (inches),
+    its letters as they are, so that they can be read in a column and on a phone.
+    """
+    if figure.get_size_inches()[0] > widest:
+        _narrowed(figure, widest)
+    text = _drawn(figure, facecolor="none")
+    text = text[text.index("<svg") :].rstrip()
+    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'\sid="', f' id="{name}-', text)
+    text = re.sub(r'href="#', f'href="#{name}-', text)
+    text = re.sub(r"url\(#", f"url(#{name}-", text)
+    # The generic families that end matplotlib's list are the page's affair too.
+    text = re.sub(r"font: ([^'\";]*?)'[^;\"]*", r"font: \1var(--font, sans-serif)", text)
+    # A hundredth of a point is enough; only tags hold coordinates, the rest is text to read.
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(?<=\.\d\d)\d+", "", tag[0]), text)
+    for color, variable in _VARIABLES.items():
+        text = text.replace(color, f"var({variable}, {color})")
+    box = re.search(r'viewBox="([^"]+)"', text)
+    assert box is not None  # matplotlib always writes it
+    _, _, width, height = box[1].split()
+    head = (
+        f'<svg class="plot" role="img" aria-label="{escape(title)}" viewBox="{box[1]}" '
+        f'style="--width: {width}px; aspect-ratio: {width} / {height}">'
+        f"<title>{escape(title)}</title>"
+    )
+    return Markup(head + text[text.index(">") + 1 :])
+
+
+def svg_file(figure: Figure) -> str:
+    """Return a figure as the text of an SVG file that stands alone, on white, without a date."""
+    return _drawn(figure)
+
+
+def _drawn(figure: Figure, **look: Any) -> str:
+    buffer = StringIO()
+    with mpl.rc_context(TEXT):
+        figure.savefig(buffer, format="svg", metadata=NO_METADATA, **look)
+    return buffer.getvalue()

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
-from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 from pteron.platforms.coordinates import coordinate
@@ -83,7 +83,7 @@ def measure_figure(
     """
     figure, axes, first, second = _sheet(cut, lowest=0.0)
     # Drawn beyond the edge of the reach and cut off there, so that the edge is smooth.
-    nearest = distance_transform_edt(np.isnan(measure), return_indices=True)[1]
+    nearest = scipy.ndimage.distance_transform_edt(np.isnan(measure), return_indices=True)[1]
     whole = measure[tuple(nearest)]
     inside = np.ma.masked_where(cut.status != REACHABLE, whole)
     drawn = [
@@ -112,38 +112,30 @@ def measure_figure(
 
 
 def _sheet(cut: ReachSlice, lowest: float = 1.8) -> tuple[Figure, Axes, Array, Array]:
-    """Return a figure, its axes, and both coordinates in the units that people read."""
+    """Return a figure, its axes with their scales, and both coordinates as people read them."""
     names = [coordinate(name) for name in cut.plane]
-    first, second = (
-        name.shown_factor * values
-        for name, values in zip(names, (cut.first, cut.second), strict=True)
-    )
-    shape = float(np.ptp(second) / np.ptp(first)) if names[0].unit == names[1].unit else 1.0
+    first, second = names[0].shown_factor * cut.first, names[1].shown_factor * cut.second
+    spans, same = np.array([np.ptp(first), np.ptp(second)]), names[0].unit == names[1].unit
+    shape = float(spans[1] / spans[0]) if same else 1.0
     figure = blank(3.9, min(max(0.6 + 3.3 * shape, lowest), 5.6) if lowest else 0.6 + 3.3 * shape)
     axes = plain_axes(figure, *(f"{name.symbol} ({name.shown_unit})" for name in names))
     axes.grid(visible=False)
+    axes.set_aspect("equal" if same else "auto")
+    axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
+    wide = [spans.max()] * 2 if same else spans
+    for scale, span in zip((axes.xaxis, axes.yaxis), wide, strict=True):
+        scale.set_major_locator(MultipleLocator(nice_step(float(span) / 6.0)))
     return figure, axes, first, second
 
 
 def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
-    """Draw a motion's path and the slice's centre, and set the scales."""
-    i, j = cut.places
-    names = [coordinate(name) for name in cut.plane]
-    a, b = (name.shown_factor for name in names)
+    """Draw a motion's path and the slice's centre."""
+    (i, j), (a, b) = cut.places, (coordinate(name).shown_factor for name in cut.plane)
     if path is not None:
         for color, width in ((PAPER, 3.2), (INK, 1.4)):
             (line,) = axes.plot(a * path[:, i], b * path[:, j], color=color, linewidth=width)
             line.set_solid_capstyle("round")
     spot(axes, a * cut.center[i], b * cut.center[j], INK, PAPER, 6.0, zorder=5)
-    first, second = a * cut.first, b * cut.second
-    same = names[0].unit == names[1].unit
-    axes.set_aspect("equal" if same else "auto")
-    axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
-    spans = np.array([first[-1] - first[0], second[-1] - second[0]])
-    for scale, span in zip(
-        (axes.xaxis, axes.yaxis), [spans.max()] * 2 if same else spans, strict=True
-    ):
-        scale.set_major_locator(MultipleLocator(nice_step(float(span) / 6.0)))
 
 
 def _territories(legs: Array) -> Iterator[tuple[Array, str]]:

@@ -12,11 +12,13 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import JOINED, OWN
 from pteron.equations.machine import Machine, State
 from pteron.equations.virtual_work import inverse_dynamics
-from pteron.kernels import Array, Port, count_operations, program
+from pteron.kernels import Array, Port, bare, count_operations, program
 from pteron.kernels.graph import graph_of
 from pteron.kernels.hoisting import hoisted
+from pteron.kernels.kept import kept_result
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data
 from pteron.reduction.find import base_parameters
+from pteron.reduction.numerical import independent
 from pteron.reduction.result import BaseParameters
 
 _NONZERO = 1e-9
@@ -52,7 +54,7 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
     --------
     >>> import pteron
     >>> robot = pteron.load("quadrupteron")
-    >>> base = pteron.cheapest_parameters(robot)
+    >>> base = pteron.reduction.cheapest_parameters(robot)
     >>> base.rank, pteron.compile(robot, "inverse_dynamics", base=base).operations
     (26, 323)
     """
@@ -61,6 +63,13 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
 
 @lru_cache(maxsize=32)
 def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
+    columns = parameter_data(robot)
+    key, packages = ("cheapest", bare(robot)), ("kinematics", "reduction")
+    best = kept_result(key, packages, lambda: _cheapest_columns(robot))
+    return base_parameters(robot, keep=[columns[k].name for k in best])
+
+
+def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
     columns = parameter_data(robot)
     base = base_parameters(robot)
     grouping = _without_units(robot, base)
@@ -71,12 +80,11 @@ def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
     model = _Model(robot)
     found = {base.kept}
     for order in (others, others[::-1]):
-        start = _independent(grouping, [*own, *order, *joined])
+        start = tuple(sorted(independent(grouping, [*own, *order, *joined], least=_NONZERO)[0]))
         # The columns of a platform that tilts are too many to exchange one by one.
         tilts = robot.platform.tilts
         found.add(start if tilts else _improved(model, grouping, start, [*own, *others]))
-    best = min(found, key=lambda kept: (_final_cost(robot, kept), kept))
-    return base_parameters(robot, keep=[columns[k].name for k in best])
+    return min(found, key=lambda kept: (_final_cost(robot, kept), kept))
 
 
 def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
@@ -84,21 +92,6 @@ def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
     length = max(leg.size for leg in robot.legs)
     powers = length ** np.array([float(p.length_power) for p in base.parameters])
     return np.asarray(base.grouping * powers / powers[list(base.kept), None])
-
-
-def _independent(grouping: Array, order: Sequence[int]) -> tuple[int, ...]:
-    """Return the first columns, in this order, that do not depend on those before them."""
-    basis = np.empty((len(grouping), 0))
-    kept = []
-    for column in order:
-        vector = grouping[:, column]
-        for _ in range(2):  # what once leaves of a small vector is not yet across the basis
-            vector = vector - basis @ (basis.T @ vector)
-        size = np.linalg.norm(vector)
-        if size > _NONZERO:
-            kept.append(column)
-            basis = np.column_stack([basis, vector / size])
-    return tuple(sorted(kept))
 
 
 def _improved(

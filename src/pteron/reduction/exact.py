@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from functools import reduce
 from operator import add
@@ -22,7 +23,7 @@ from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, PrimeField, bare
 from pteron.kinematics import is_singular_everywhere
 from pteron.manipulator import Manipulator
-from pteron.reduction.certificate import ExactCertificate, NumericalRank
+from pteron.reduction.certificate import ExactCertificate
 from pteron.reduction.elimination import dependencies, reconstruct, remainder
 from pteron.reduction.exact_geometry import ExactGeometry, exact_geometry
 from pteron.reduction.exact_regressor import (
@@ -79,7 +80,7 @@ def exact_grouping(
     if is_singular_everywhere(robot):
         raise _without_dynamics(robot)
     geometry = exact_geometry(robot)
-    topology, n = bare(robot), robot.freedom
+    topology, n, exact_values = bare(robot), robot.freedom, algebraic_values(geometry)
     rng = random.Random(seed)
     primes = primes_of(geometry, rng)
     states = -(-len(order) // n) + _SPARE_STATES
@@ -107,7 +108,11 @@ def exact_grouping(
 
     if shares is None and not extra and not geometry.radicands:
         # Fractions of more digits than the primes hold.
-        shares = _fractions(columns, kept, mass_transfers, geometry)
+        known = symbolic_shares(columns, sorted(kept), mass_transfers, [], exact_values)
+        shares = {
+            column: {k: Fraction(int(share.p), int(share.q)) for k, share in terms.items()}
+            for column, terms in known.items()
+        }
 
     fresh = next(primes)
     rational_checks = 0
@@ -134,9 +139,7 @@ def exact_grouping(
             given = fitted_shares(robot, sharing, kept, dropped, seed)
         else:
             coefficients = "algebraic"
-            given = symbolic_shares(
-                columns, sorted(kept), mass_transfers, [], algebraic_values(geometry)
-            )
+            given = symbolic_shares(columns, sorted(kept), mass_transfers, [], exact_values)
     rows = _shared_rows(modular_rows(topology, geometry, fresh, _MODULAR_CHECKS, rng), sharing)
     vectors = [{-1: _modular(transfer, geometry, columns, fresh)} for transfer in mass_transfers]
     assert all(_annihilate(each, rows, fresh) for each in (residues, *vectors))
@@ -145,6 +148,10 @@ def exact_grouping(
     # A pose is drawn among the 1 in 2^n whose n radicands are squares, and the 2^n choices of their
     # roots multiply the degree.
     odds = min(1.0, degree * 4.0 ** roots(topology) / fresh) ** _MODULAR_CHECKS
+    numerical = None
+    if geometry.approximated or geometry.recognised or geometry.nearly:
+        with suppress(ModelError):  # no states are found
+            numerical = numerical_rank(robot, sharing, seed)
     certificate = ExactCertificate(
         method="exact",
         rank=len(kept),
@@ -163,7 +170,7 @@ def exact_grouping(
         approximated=geometry.approximated,
         lost=geometry.lost,
         nearly=geometry.nearly,
-        numerical=_numerical_rank(robot, geometry, sharing, seed),
+        numerical=numerical,
     )
     return Grouping(tuple(sorted(kept)), given, certificate)
 
@@ -177,18 +184,6 @@ def _without_dynamics(robot: Manipulator) -> SingularPose:
         index=(),
         subject=robot.name,
     )
-
-
-def _numerical_rank(
-    robot: Manipulator, geometry: ExactGeometry, sharing: Array, seed: int
-) -> NumericalRank | None:
-    """Return the rank in floating point where it can tell something, and states can be found."""
-    if not (geometry.approximated or geometry.recognised or geometry.nearly):
-        return None
-    try:
-        return numerical_rank(robot, sharing, seed)
-    except ModelError:
-        return None
 
 
 def _modular(
@@ -254,20 +249,6 @@ def _lifted(
             if share:
                 lifted[column][k] = share
     return lifted
-
-
-def _fractions(
-    columns: Sequence[Parameter],
-    kept: Sequence[int],
-    mass_transfers: Sequence[Transfer],
-    geometry: ExactGeometry,
-) -> dict[int, dict[int, Fraction]]:
-    """Return the shares from the mass transfers of a geometry without roots."""
-    found = symbolic_shares(columns, sorted(kept), mass_transfers, [], algebraic_values(geometry))
-    return {
-        column: {k: Fraction(int(share.p), int(share.q)) for k, share in terms.items()}
-        for column, terms in found.items()
-    }
 
 
 def _annihilate(

@@ -148,19 +148,6 @@ class ExactGeometry:
         rest = (*self.axes, *self.platform.values(), self.gravity)
         return numbers + [number.within(field) for vector in rest for number in vector]
 
-    @property
-    def places(self) -> list[dict[str, slice]]:
-        """For each leg, the slices of that vector that its quantities take, by name."""
-        found: list[dict[str, slice]] = []
-        start = 0
-        for leg in self.legs:
-            found.append({})
-            for name, value in leg.values.items():
-                found[-1][name] = slice(start, start + (len(value) or 3))
-                start = found[-1][name].stop
-            start += 6  # platform point and fixed offset
-        return found
-
 
 @lru_cache(maxsize=6)
 def _plane_axis(i: int, sign: int) -> ca.Function:
@@ -197,18 +184,10 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     own |= {n: (Surd(Fraction(v[0])),) for n, v in platform.quantities.items() if len(v) == 1}
     # The whole machine but its platform's frame turns with a joint that has axes of its own.
     axes = _rational_rotation(frame) if "second_axis" in platform.quantities else UNIT
-    return ExactGeometry(
-        legs,
-        gravity,
-        {name: (own | exact)[name] for name in platform.quantities},
-        axes,
-        platform.tilts,
-        frame,
-        tuple(notes.recognised),
-        tuple(notes.approximated),
-        tuple(lost_right_angles(distinct, exact)),
-        tuple(near_relations(distinct)),
-    )
+    quantities = {name: (own | exact)[name] for name in platform.quantities}
+    missed = lost_right_angles(distinct, exact), near_relations(distinct)
+    told = map(tuple[str, ...], (notes.recognised, notes.approximated, *missed))
+    return ExactGeometry(legs, gravity, quantities, axes, platform.tilts, frame, *told)
 
 
 def _exact_leg(

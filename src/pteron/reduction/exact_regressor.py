@@ -12,6 +12,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
+from pteron.equations.machine import number_places
 from pteron.kernels import NoSquareRoot, PrimeField, RationalField, evaluate, general_program
 from pteron.kernels.graph import graph_of
 from pteron.legs.circles import random_fraction
@@ -71,20 +72,22 @@ def rational_rows(
     vector = geometry.within(field)
     points = general_program(topology, "platform_points").function
     program = general_program(topology, "regressor").function
-    places = geometry.places
+    places = number_places(topology)
     rows: list[list[Fraction]] = []
     while len(rows) < states * topology.freedom:
         pose = [random_fraction(rng) for _ in range(topology.freedom)]
         flat = evaluate(points, field, [vector, pose])[0]
         placed = list(vector)
-        for i, leg in enumerate(topology.legs):
-            closed = leg.closing({name: vector[part] for name, part in places[i].items()}, rng)
+        for i, (leg, at) in enumerate(zip(topology.legs, places, strict=False)):
+            sizes = {q.name: len(q.value) for q in leg.quantities}
+            own = {name: vector[at[name] : at[name] + size] for name, size in sizes.items()}
+            closed = leg.closing(own, rng)
             if closed is None:
                 return []
             w, sigma = closed
-            c = flat[3 * i : 3 * i + 3]
-            placed[places[i]["guide_point"]] = [a - b for a, b in zip(c, w, strict=True)]
-            placed[places[i]["elbow"]] = [Fraction(sigma)]
+            for k, c in enumerate(flat[3 * i : 3 * i + 3]):
+                placed[at["guide_point"] + k] = c - w[k]
+            placed[at["elbow"]] = Fraction(sigma)
         motion = [[random_fraction(rng) for _ in range(topology.freedom)] for _ in range(2)]
         try:
             values = evaluate(program, field, [placed, pose, *motion])[0]

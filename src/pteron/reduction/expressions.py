@@ -114,20 +114,23 @@ def as_sympy(names: Sequence[str], terms: Terms) -> Any:
 
 
 def _latex_name(parameter: Parameter) -> str:
-    body = parameter.body + parameter.suffix
+    letter, body, axis = _parts(parameter)
     if parameter.length_power == 1:
-        return rf"m_{{{body}}}\gamma_{{{body},{parameter.kind[-1]}}}"
-    index = ",".join(part for part in (parameter.kind[1:], body) if part)
-    return f"{parameter.kind[0]}_{{{index}}}"
+        return rf"m_{{{body}}}\gamma_{{{body},{axis}}}"
+    return f"{letter}_{{{','.join(filter(None, (axis, body)))}}}"
 
 
 def html_name(parameter: Parameter) -> str:
     """Return a parameter's name in HTML, as the paper writes it."""
-    body = parameter.body + parameter.suffix
-    if parameter.length_power == 1:
-        return f"<i>m\u03b3</i><sub>{parameter.kind[-1]},{body}</sub>"
-    index = ",".join(part for part in (parameter.kind[1:], body) if part)
-    return f"<i>{parameter.kind[0]}</i><sub>{index}</sub>"
+    letter, body, axis = _parts(parameter)
+    first = "m\u03b3" if parameter.length_power == 1 else letter
+    return f"<i>{first}</i><sub>{','.join(filter(None, (axis, body)))}</sub>"
+
+
+def _parts(parameter: Parameter) -> tuple[str, str, str]:
+    """Return a parameter's letter, its body, and the axis or axes that it is of."""
+    body, kind = parameter.body + parameter.suffix, parameter.kind
+    return kind[0], body, kind[-1] if parameter.length_power == 1 else kind[1:]
 
 
 def html_symbol(name: str) -> str:

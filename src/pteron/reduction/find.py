@@ -1,4 +1,7 @@
-"""`base_parameters`: finds the sums of inertial parameters that alone act on the drives' forces."""
+"""`base_parameters`: finds the sums of inertial parameters that alone act on the drives' forces.
+
+`base_regressor` is the matrix whose product with them is the forces.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,14 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Literal, get_args
 
+import sympy
+
+from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
-from pteron.kernels import bare
+from pteron.kernels import OTHER_LAYOUT, bare, same_layout
+from pteron.kernels.kept import kept_result
+from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction.exact import exact_grouping
 from pteron.reduction.grouping import Grouping
@@ -17,7 +25,7 @@ from pteron.reduction.numerical import qr_grouping, svd_grouping
 from pteron.reduction.result import BaseParameters
 from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
 from pteron.reduction.transfers import transfers
-from pteron.shapes import Seed
+from pteron.shapes import OnFailure, PoseLike, Regressors, Seed
 
 Method = Literal["exact", "svd", "qr"]
 
@@ -84,8 +92,7 @@ def base_parameters(
     'm_p1 + m_u1 + (1/ll1^2) I_l1'
     """
     robot = as_manipulator(robot)
-    if method not in get_args(Method):
-        raise ModelError(f"method: {method!r} is not one of {', '.join(get_args(Method))}")
+    expect_one_of(get_args(Method), ModelError, method=method)
     groups = tuple(leg_groups(robot, shared))
     columns, sharing = share(robot, groups)
     order = _order(columns, keep)
@@ -108,11 +115,16 @@ def _grouping(
     layout: Manipulator, method: Method, order: tuple[int, ...], groups: Groups, seed: int
 ) -> Grouping:
     """Return the grouping of a machine's columns, in an order of preference."""
-    columns, sharing = share(layout, groups)
-    if method == "exact":
-        by_mass = transfers(layout, columns)
-        return exact_grouping(layout, columns, order, sharing, by_mass, seed)
-    return _NUMERICAL[method](layout, order, sharing, seed)
+
+    def found() -> Grouping:
+        columns, sharing = share(layout, groups)
+        if method == "exact":
+            by_mass = transfers(layout, columns)
+            return exact_grouping(layout, columns, order, sharing, by_mass, seed)
+        return _NUMERICAL[method](layout, order, sharing, seed)
+
+    key = "grouping", layout, method, order, groups, seed, sympy.__version__
+    return kept_result(key, ("kinematics", "reduction"), found)
 
 
 def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int]:
@@ -129,3 +141,58 @@ def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int
         )
     first = [names.index(name) for name in dict.fromkeys(keep)]
     return first + [column for column in default if column not in first]
+
+
+def base_regressor(
+    robot: RobotLike,
+    base: BaseParameters,
+    pose: PoseLike,
+    velocity: PoseLike,
+    acceleration: PoseLike,
+    *,
+    on_failure: OnFailure = "raise",
+) -> Regressors:
+    """Return the reduced dynamic matrix: base_regressor @ base.values(robot) = inverse_dynamics.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    base : BaseParameters
+        Its base parameters, from `base_parameters`.
+    pose, velocity, acceleration : array, shape (..., m)
+        The platform's motion; m, rad and s. Leading axes broadcast.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., n, rank)
+        N or N m per unit of each base parameter.
+
+    Raises
+    ------
+    ModelError
+        If `base` belongs to a machine of another layout, or with other gravity.
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> robot = pteron.load("quadrupteron")
+    >>> base = pteron.base_parameters(robot)
+    >>> state = [0.01, 0.02, 0.03, 0.1], [0.1, 0.0, 0.2, 1.0], [1.0, 2.0, 0.0, 3.0]
+    >>> forces = pteron.base_regressor(robot, base, *state) @ base.values(robot)
+    >>> np.allclose(forces, pteron.inverse_dynamics(robot, *state))
+    True
+    """
+    robot = as_manipulator(robot)
+    if base.robot is not robot and not same_layout(base.robot, robot):
+        raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
+    motion = pose, velocity, acceleration
+    matrices: Regressors = evaluated(robot, "base_regressor", on_failure, *motion, base=base)
+    return matrices

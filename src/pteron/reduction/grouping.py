@@ -9,9 +9,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
-
-from pteron.kernels import Array
 from pteron.reduction.certificate import Certificate
 
 Share = Fraction | float | Any
@@ -28,14 +25,3 @@ class Grouping:
     kept: tuple[int, ...]
     given: Shares
     certificate: Certificate
-
-    def matrix(self, columns: int) -> Array:
-        """Return the matrix (rank, columns) that takes column parameters to base parameters."""
-        matrix = np.zeros((len(self.kept), columns))
-        for row, column in enumerate(self.kept):
-            matrix[row, column] = 1.0
-        place = {column: row for row, column in enumerate(self.kept)}
-        for column, shares in self.given.items():
-            for k, share in shares.items():
-                matrix[place[k], column] = float(share)
-        return matrix

@@ -36,7 +36,7 @@ def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed:
     values = np.pad(values, (0, matrix.shape[1] - len(values)))
     rank = int((values > _TOLERANCE * values[0]).sum())
     null = vectors[rank:].T
-    dropped = _independent(null.T, list(reversed(order)), len(order) - rank)[0]
+    dropped = independent(null.T, list(reversed(order)), len(order) - rank)[0]
     kept = sorted(set(order) - set(dropped))
     shares = -np.linalg.solve(null[dropped].T, null[kept].T).T if dropped else np.empty((rank, 0))
     gap = values[rank - 1] / values[0], np.max(values[rank:], initial=0.0) / values[0]
@@ -46,7 +46,7 @@ def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed:
 def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
     """Return the grouping from a QR decomposition with the columns in the order of preference."""
     matrix, scale, states = _scaled_regressor(robot, sharing, seed)
-    kept, norms = _independent(matrix, order, len(order))
+    kept, norms = independent(matrix, order)
     kept = sorted(kept)
     dropped = [column for column in order if column not in kept]
     shares = _least_squares(matrix, kept, dropped)
@@ -102,12 +102,13 @@ def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Ar
     return stacked / scale, scale, states
 
 
-def _independent(
-    matrix: Array, order: Sequence[int], most: int
+def independent(
+    matrix: Array, order: Sequence[int], most: int | None = None, least: float = _TOLERANCE
 ) -> tuple[list[int], dict[int, float]]:
-    """Return the first `most` columns that those taken before do not give, and all remainders.
+    """Return the first columns, `most` at most, that those before do not give, and all remainders.
 
-    Gram and Schmidt, twice over, which is as good as Householder.
+    Gram and Schmidt, twice over, which is as good as Householder: a remainder of more than `least`
+    is a column's own.
     """
     basis = np.empty((matrix.shape[0], 0))
     taken: list[int] = []
@@ -117,7 +118,7 @@ def _independent(
         for _ in range(2):
             rest = rest - basis @ (basis.T @ rest)
         norms[column] = float(np.linalg.norm(rest))
-        if norms[column] > _TOLERANCE and len(taken) < most:
+        if norms[column] > least and len(taken) != most:
             taken.append(column)
             basis = np.column_stack([basis, rest / norms[column]])
     return taken, norms

@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from markupsafe import Markup
 
+from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.html_table import Column, html_table
@@ -79,7 +80,7 @@ class BaseParameters:
             robot=robot,
             parameters=columns,
             kept=grouping.kept,
-            grouping=grouping.matrix(len(columns)) @ mean,
+            grouping=_matrix(grouping, len(columns)) @ mean,
             selection=sharing[:, list(grouping.kept)],
             transfers=transfers,
             certificate=grouping.certificate,
@@ -202,8 +203,7 @@ class BaseParameters:
         ModelError
             If the form is not known, or symbols are not known to the method.
         """
-        if form not in get_args(Form):
-            raise ModelError(f"form: {form!r} is not one of {', '.join(get_args(Form))}")
+        expect_one_of(get_args(Form), ModelError, form=form)
         if symbols not in (False, True, "leg"):
             raise ModelError(f'symbols: {symbols!r} is not True, False or "leg"')
         shares = self._by_leg if symbols == "leg" else self._symbolic if symbols else self.shares
@@ -264,3 +264,15 @@ class BaseParameters:
     def to_json(self) -> str:
         """Return `as_dict` as JSON."""
         return json.dumps(self.as_dict(), indent=2)
+
+
+def _matrix(grouping: Grouping, columns: int) -> Array:
+    """Return the matrix (rank, columns) that takes column parameters to base parameters."""
+    matrix = np.zeros((len(grouping.kept), columns))
+    for row, column in enumerate(grouping.kept):
+        matrix[row, column] = 1.0
+    place = {column: row for row, column in enumerate(grouping.kept)}
+    for column, shares in grouping.given.items():
+        for k, share in shares.items():
+            matrix[place[k], column] = float(share)
+    return matrix

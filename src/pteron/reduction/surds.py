@@ -79,13 +79,7 @@ def direction_cosine(value: float) -> Surd | None:
 
     Simple: itself or its square a fraction with a denominator up to 300, within 1e-9.
     """
-    plain = Fraction(value).limit_denominator(_COSINE_DENOMINATOR)
-    if abs(plain - Fraction(value)) <= _COSINE_TOLERANCE:
-        return Surd(plain)
-    square = Fraction(value * value).limit_denominator(_COSINE_DENOMINATOR)
-    if square > 0 and abs(square - Fraction(value * value)) <= _COSINE_TOLERANCE:
-        return Surd.root(square, value)
-    return None
+    return _simple(value, _COSINE_DENOMINATOR, _COSINE_TOLERANCE, _COSINE_TOLERANCE)
 
 
 def length(value: float) -> Surd | None:
@@ -93,10 +87,16 @@ def length(value: float) -> Surd | None:
 
     Simple: a decimal to the micrometre, or the root of a fraction with a denominator up to 10^6.
     """
-    plain = Fraction(value).limit_denominator(_LENGTH_DENOMINATOR)
-    if abs(plain - Fraction(value)) <= _LENGTH_TOLERANCE:
+    least = abs(value) * _LENGTH_TOLERANCE
+    return _simple(value, _LENGTH_DENOMINATOR, _LENGTH_TOLERANCE, least)
+
+
+def _simple(value: float, most: int, near: float, near_square: float) -> Surd | None:
+    """Return a fraction of at most this denominator near a number, or the root of one."""
+    plain = Fraction(value).limit_denominator(most)
+    if abs(plain - Fraction(value)) <= near:
         return Surd(plain)
-    square = Fraction(value * value).limit_denominator(_LENGTH_DENOMINATOR)
-    if square > 0 and abs(square - Fraction(value * value)) <= abs(value) * _LENGTH_TOLERANCE:
+    square = Fraction(value * value).limit_denominator(most)
+    if square > 0 and abs(square - Fraction(value * value)) <= near_square:
         return Surd.root(square, value)
     return None

@@ -59,7 +59,15 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer
                 found.append(Transfer(transfer.reason.format(suffix), entries))
         platform = {p.kind: p for p in columns if p.body == PLATFORM}
         for letter in legs[0].equations_class.rides:
-            found.append(_platform_point(robot, group, place["m", letter], platform))
+            mass = place["m", letter]
+            shares: dict[Parameter, Any] = {mass: Integer(1)}
+            for leg in group:
+                given = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
+                point = [Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in given]
+                for kind, share in robot.platform.inertia.shares_of_point(*point).items():
+                    shares[platform[kind]] = shares.get(platform[kind], Integer(0)) - share
+            name = f"{legs[0].names[letter]}{mass.suffix}"
+            found.append(Transfer(f"{name} and platform carry the platform point", shares))
     if robot.platform.center is not None:
         found.append(
             Transfer("the platform turns about a fixed point", {platform["m"]: Integer(1)})
@@ -69,19 +77,3 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer
         turning = (p for p in columns if p.body == PLATFORM and p.kind != "m")
         found += [Transfer(reason, {p: Integer(1)}) for p in turning]
     return found
-
-
-def _platform_point(
-    robot: Manipulator,
-    group: tuple[int, ...],
-    mass: Parameter,
-    platform: Mapping[str, Parameter],
-) -> Transfer:
-    name = robot.legs[group[0] - 1].names[mass.body]
-    entries: dict[Parameter, Any] = {mass: Integer(1)}
-    for leg in group:
-        given = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
-        point = [Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in given]
-        for kind, share in robot.platform.inertia.shares_of_point(*point).items():
-            entries[platform[kind]] = entries.get(platform[kind], Integer(0)) - share
-    return Transfer(f"{name}{mass.suffix} and platform carry the platform point", entries)

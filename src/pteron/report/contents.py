@@ -15,20 +15,16 @@ from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
+from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.motion import (
-    Guide,
-    JointPoints,
     Motion,
     PickAndPlace,
     Sizing,
-    joint_guides,
-    joint_points,
     least_margin,
     pick_and_place,
     size,
 )
 from pteron.playback import Playback
-from pteron.plots import grid_step
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
 from pteron.report.motion_frames import Frames, frames
@@ -46,8 +42,7 @@ from pteron.workspace import (
     reach_slice,
     reach_volume,
 )
-from pteron.workspace.drive_warnings import load_warnings
-from pteron.workspace.machine_warnings import machine_warnings
+from pteron.workspace.load_warnings import load_warnings
 from pteron.workspace.reach_slices import Plane, reached, slice_planes
 from pteron.workspace.screw_lengths import screw_warnings
 from pteron.workspace.tilts import largest_tilt
@@ -109,9 +104,8 @@ class Report:
     The slices go through the home pose; those of lengths are all of one width. `volume` is None
     where the pose has fewer lengths than two, `tilt` (rad, to every side at the home pose's place,
     proved) where the platform does not tilt from the level. Of `orientations` and `measures`
-    there is what the type-II measure depends on; neither where J is constant. The squares of the
-    machine's pictures have sides of `grid`, m. `passive` has the passive joints that have limits,
-    at home.
+    there is what the type-II measure depends on; neither where J is constant. `passive` has the
+    passive joints that have limits, at home.
     """
 
     robot: Manipulator
@@ -122,9 +116,6 @@ class Report:
     cycle: Motion
     source: str
     shown: Frames
-    home_points: JointPoints
-    guides: tuple[Guide, ...]
-    grid: float
     sizing: Sizing
     joints: JointRanges
     passive: tuple[LimitedJoint, ...]
@@ -180,8 +171,6 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     sizing = size(robot, cycle)
     volume = reach_volume(robot, home) if len(robot.platform.lengths) > 1 else None
     base = base_parameters(robot)
-    shown = frames(robot, cycle, sizing.forces[::2])
-    home_points, guides = joint_points(robot, home), joint_guides(robot, shown.pose)
     return Report(
         robot=robot,
         doubts=(*machine_warnings(robot), *load_warnings(robot, home), *screw_warnings(robot)),
@@ -190,10 +179,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         least=least_margin(robot, home),
         cycle=cycle,
         source="" if motion is None else motion.source,
-        shown=shown,
-        home_points=home_points,
-        guides=guides,
-        grid=grid_step(home_points, guides),
+        shown=frames(robot, cycle, sizing.forces[::2], home),
         sizing=sizing,
         joints=joint_ranges(robot, cycle.pose),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pteron.kernels.kept import kept_result
 from pteron.reduction import FORMS, BaseParameters, model_forms
 
 _NAMES = {
@@ -32,7 +33,11 @@ class Cost:
 def costs(base: BaseParameters) -> tuple[Cost, ...]:
     """Return the cost of every form, the complete one before the reduced one."""
     every = range(base.selection.shape[0])
-    counts = {key: kernel.operations for key, kernel in model_forms(base).items()}
+    counts = kept_result(
+        ("costs", base.robot, base.parameters, base.kept),
+        ("kinematics", "reduction"),
+        lambda: {key: kernel.operations for key, kernel in model_forms(base).items()},
+    )
     counts["dense", "complete"] = dense_operations(base, every)
     counts["dense", "reduced"] = dense_operations(base, base.kept)
     found = []

@@ -1,9 +1,9 @@
-"""A machine, and its motion as animation frames, as plain data that `view.js` draws on a page."""
+"""A machine, and its motion as animation frames, as plain data that `picture.js` draws."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 from pteron.dynamics import drive_forces
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion import Guide, JointPoints, Motion, joint_points
+from pteron.motion import Guide, JointPoints, Motion, joint_guides, joint_points
 from pteron.platforms.coordinates import SHOWN
-from pteron.plots.machine_drawing import APART, base_outline
+from pteron.plots.machine_drawing import APART, base_outline, grid_step
 from pteron.report.quantities import coordinate
 
 _A_SECOND = 60.0
@@ -54,6 +54,10 @@ class Frames:
         Of the motion, s.
     closed : bool
         Whether it ends as it begins; then its last moment is its first, and is left out.
+    still : JointPoints
+        Where the joints are in the picture that does not move, (...).
+    guides : tuple of Guide
+        What the legs' first joints move along in the motion.
     """
 
     time: Array
@@ -62,9 +66,13 @@ class Frames:
     forces: Array
     duration: float
     closed: bool
+    still: JointPoints
+    guides: tuple[Guide, ...]
 
 
-def frames(robot: Manipulator, motion: Motion, forces: Array | None = None) -> Frames:
+def frames(
+    robot: Manipulator, motion: Motion, forces: Array | None = None, still: Array | None = None
+) -> Frames:
     """Return a motion as the moments that are drawn: about sixty a second, but not too many.
 
     Parameters
@@ -75,6 +83,8 @@ def frames(robot: Manipulator, motion: Motion, forces: Array | None = None) -> F
         One that it can do, with T samples.
     forces : array, shape (T, n), optional
         N or N m; those that the drives must give, with smooth friction, where they are left out.
+    still : array, shape (m,), optional
+        The pose of the picture that does not move; where the motion begins if it is left out.
 
     Returns
     -------
@@ -98,9 +108,9 @@ def frames(robot: Manipulator, motion: Motion, forces: Array | None = None) -> F
         pose, velocity, acceleration = motion.at(time)
     if given is None:
         given = drive_forces(robot, pose, velocity, acceleration, smooth=True)
-    start = motion.time[0]
-    points = joint_points(robot, pose)
-    return Frames(time - start, pose, points, given, motion.duration, closed)
+    held = joint_points(robot, motion.pose[0] if still is None else still)
+    found = time - motion.time[0], pose, joint_points(robot, pose), given
+    return Frames(*found, motion.duration, closed, held, joint_guides(robot, pose))
 
 
 def is_closed(motion: Motion) -> bool:
@@ -122,61 +132,87 @@ def _between(time: Array, values: Array, at: Array) -> Array:
     return np.column_stack([np.interp(at, time, column) for column in values.T])
 
 
-def scene(
-    robot: Manipulator, shown: Frames, guides: Sequence[Guide], home: JointPoints, grid: float
-) -> dict[str, Any]:
+def scene(robot: Manipulator, shown: Frames) -> dict[str, Any]:
     """Return the machine and the frames of its motion as plain lists.
 
-    Everything is in m, rad, s, N and N m, in the base frame; of a planar machine along its pose's x
-    and y and the plane's normal, in the plane. A leg's `chains` in a frame are the points of its
-    line, a `guide` the way of its slider or of its crank's end, its `bars` what leads from the line
-    to each of parallel rods, over the machine's size. `home` are the joints of one pose, from which
-    the base of cranks and rams is known, and `grid` is the side of the squares.
+    Everything is in m, rad, s, N and N m; points are seen as `still` says.
     """
-    planar, points = robot.platform.planar, shown.points
-    turn = np.array(robot.platform.frame) if planar else np.eye(3)
-
-    def seen(array: Array) -> Any:
-        return _plain(array @ turn.T * ([1.0, 1.0, 0.0] if planar else 1.0))
-
-    gravity = np.array(robot.gravity)
-    strength = float(np.linalg.norm(gravity)) or 1.0
-    up = -gravity / strength if gravity.any() else np.array(robot.platform.frame[2])
-    lines = [seen(line) for line in points.links]
     quantity = coordinate([leg.joint for leg in robot.legs])
     return {
-        "planar": planar,
-        "up": [0.0, 0.0, 1.0] if planar else _plain(up),
-        "gravity": seen(gravity / strength),
-        "grid": grid,
+        **still(robot, shown.guides, shown.still),
+        **moving(robot, shown.points),
         "duration": round(shown.duration, _DECIMALS),
         "closed": shown.closed,
-        "guides": [seen(guide.path) for guide in guides],
-        "slides": [guide.slides for guide in guides],
-        "directions": _plain(np.array([guide.axis for guide in guides]) @ turn.T),
-        "bars": [None if bar is None else seen(APART * bar) for bar in points.bars],
-        "rams": points.rams,
-        "base": seen(base_outline(home, guides)),
-        "parts": [
-            {
-                "hub": seen(part.hub),
-                "corners": seen(part.corners),
-                "triangles": None if part.triangles is None else part.triangles.tolist(),
-            }
-            for part in points.parts
-        ],
-        "position": seen(points.reference),
-        "tool": seen(points.tool) if any(robot.platform.tool) else None,
         "time": _plain(shown.time),
         "pose": _plain(shown.pose),
         "scales": [SHOWN[unit][1] for unit in robot.units],
-        "axes": _plain(points.axes @ turn.T),
-        "chains": [list(legs) for legs in zip(*lines, strict=True)],
-        "coordinates": _plain(points.coordinates),
+        "coordinates": _plain(shown.points.coordinates),
         "factors": quantity.factors,
         "forces": _plain(shown.forces),
         "units": [leg.joint.force_unit for leg in robot.legs],
     }
+
+
+def still(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) -> dict[str, Any]:
+    """Return what does not move in pictures of a machine, as plain lists.
+
+    Points are in the base frame, m; of a planar machine along its pose's x and y and the plane's
+    normal, in the plane. A `guide` is the path of a slider or of a crank's end, `bars` are what
+    leads from a leg's line to each of parallel rods, over the machine's size, and `radii` those of
+    the bodies where the file has them. `home` are the joints of one pose, from which the base of
+    cranks and rams is known, and `grid` is the side of the squares, m.
+    """
+    planar, gravity = robot.platform.planar, np.array(robot.gravity)
+    strength = float(np.linalg.norm(gravity)) or 1.0
+    up = -gravity / strength if gravity.any() else np.array(robot.platform.frame[2])
+    return {
+        "planar": planar,
+        "up": [0.0, 0.0, 1.0] if planar else _plain(up),
+        "gravity": seen(robot, gravity / strength),
+        "grid": grid_step(home, guides),
+        "guides": [seen(robot, guide.path) for guide in guides],
+        "slides": [guide.slides for guide in guides],
+        "directions": _plain(np.array([guide.axis for guide in guides]) @ view_frame(robot).T),
+        "bars": [None if bar is None else seen(robot, APART * bar) for bar in home.bars],
+        "rams": home.rams,
+        "base": seen(robot, base_outline(home, guides)),
+        "radii": None if robot.radii is None else asdict(robot.radii),
+    }
+
+
+def moving(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
+    """Return what moves in pictures of a machine in F poses, or one, as plain lists; see `still`.
+
+    A leg's `chains` in a frame are the points of its line.
+    """
+    lines = [seen(robot, line) for line in points.links]
+    return {
+        "parts": [
+            {
+                "hub": seen(robot, part.hub),
+                "corners": seen(robot, part.corners),
+                "triangles": None if part.triangles is None else part.triangles.tolist(),
+            }
+            for part in points.parts
+        ],
+        "position": seen(robot, points.reference),
+        "tool": seen(robot, points.tool) if any(robot.platform.tool) else None,
+        "axes": _plain(points.axes @ view_frame(robot).T),
+        "chains": [list(legs) for legs in zip(*lines, strict=True)]
+        if points.reference.ndim > 1
+        else lines,
+    }
+
+
+def seen(robot: Manipulator, points: Array) -> Any:
+    """Return points (..., 3) of the base frame as pictures have them, as plain lists."""
+    flat = [1.0, 1.0, 0.0] if robot.platform.planar else 1.0
+    return _plain(points @ view_frame(robot).T * flat)
+
+
+def view_frame(robot: Manipulator) -> Array:
+    """Return the axes (3, 3), one a row, along which pictures of a machine count points."""
+    return np.array(robot.platform.frame) if robot.platform.planar else np.eye(3)
 
 
 def _plain(array: Array) -> Any:

@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-import pteron
 from pteron.dynamics import drive_forces
 from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.manipulator import Manipulator
-from pteron.motion import Guide, JointPoints, joint_guides, joint_points, overloads
+from pteron.motion import overloads
 from pteron.motion.trajectories.tool import tool_path
 from pteron.playback import Playback
-from pteron.plots import forces_figure, grid_step, power_figure, robot_figure, svg
+from pteron.plots import forces_figure, power_figure, robot_figure, svg
+from pteron.plots.machine_figures import gravity_of
 from pteron.report.motion_frames import Frames, few, frames
 from pteron.report.moving_picture import stage
 from pteron.report.quantities import JointQuantity, angles_text, coordinate, force, nouns, speed
-from pteron.report.typeset import resource, template
+from pteron.report.typeset import template
 from pteron.workspace import JointRanges, joint_ranges
 
 
@@ -34,9 +34,6 @@ class ShownMotion:
     robot: Manipulator
     playback: Playback
     frames: Frames
-    start: JointPoints
-    guides: tuple[Guide, ...]
-    grid: float
     forces: Array
     rates: Array
     tool_speed: Array
@@ -63,15 +60,10 @@ def shown(robot: Manipulator, recorded: Playback) -> ShownMotion:
         forces = drive_forces(robot, *state, smooth=True)
     rates = joint_rates(robot, motion.pose, motion.velocity).actuated
     tool = tool_path(robot.platform, motion.pose, motion.velocity, motion.acceleration)[1]
-    moments = frames(robot, motion, forces)
-    start, guides = joint_points(robot, motion.pose[0]), joint_guides(robot, moments.pose)
     return ShownMotion(
         robot=robot,
         playback=recorded,
-        frames=moments,
-        start=start,
-        guides=guides,
-        grid=grid_step(start, guides),
+        frames=frames(robot, motion, forces),
         forces=forces,
         rates=rates,
         tool_speed=np.linalg.norm(tool, axis=-1),
@@ -92,9 +84,6 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
         **stage(
             robot,
             found.frames,
-            found.guides,
-            found.start,
-            found.grid,
             doing=f"in the motion{name}",
             still="Where the motion begins, with its way.",
             force_title=f"{whose} {force(joints).name}",
@@ -113,8 +102,6 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
             "power": (found.forces * found.rates).sum(axis=1).max(initial=0.0),
             "rms": np.sqrt(np.trapezoid(found.forces**2, time, axis=0) / recorded.motion.duration),
         },
-        version=pteron.__version__,
-        style=resource("page.css"),
     )
 
 
@@ -132,11 +119,10 @@ def _forces_told(found: ShownMotion) -> tuple[str, str]:
 def _figures(found: ShownMotion) -> dict[str, Any]:
     """Return the pictures as SVG, by their names in the template."""
     robot, motion, at = found.robot, found.playback.motion, found.frames
-    gravity = np.array(robot.gravity)
     machine = robot_figure(
-        found.start,
-        found.guides,
-        gravity=gravity if gravity.any() else None,
+        at.still,
+        at.guides,
+        gravity=gravity_of(robot),
         path=at.points.tool,
         angle=angles_text(robot, motion.pose[0]),
     )

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from pteron.manipulator import Manipulator
-from pteron.motion import Guide, JointPoints
 from pteron.report.motion_frames import Frames, scene
 from pteron.report.quantities import coordinate, force
 from pteron.report.typeset import embedded, resource
@@ -29,33 +27,26 @@ _ROUNDING = 1e-9
 """Distance of two points, m, up to which they are one."""
 
 
-def stage(
-    robot: Manipulator,
-    shown: Frames,
-    guides: Sequence[Guide],
-    home: JointPoints,
-    grid: float,
-    **words: str,
-) -> dict[str, Any]:
+def stage(robot: Manipulator, shown: Frames, **words: str) -> dict[str, Any]:
     """Return the variables of `moving_picture.html.j2`, but for its pictures.
 
     The words are what the machine is `doing`, what the `still` picture shows, and the
     `force_title` over the forces of the moment.
     """
-    joints = [leg.joint for leg in robot.legs]
+    joints, drawn = [leg.joint for leg in robot.legs], scene(robot, shown)
     return {
         "robot": robot,
         "shown": shown,
         "legs": range(len(robot.legs)),
-        "grid": grid,
+        "grid": drawn["grid"],
         "force": force(joints),
         "coordinate": coordinate(joints),
         "gravity": gravity_words(robot),
         "paired": any(leg.bar for leg in robot.legs),
         "paces": [(pace, text) for least, pace, text in _PACES if shown.duration >= least],
         "pace": 0.4 if shown.duration < _SHORT else 1.0,
-        "script": resource("view.js"),
-        "scene": embedded(scene(robot, shown, guides, home, grid)),
+        "script": resource("picture.js") + resource("play.js"),
+        "scene": embedded(drawn),
         **words,
     }
 

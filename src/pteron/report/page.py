@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
-import pteron
 from pteron.bodies.inertia import Inertia, with_center
 from pteron.errors import ModelError
+from pteron.kernels import Array
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
 from pteron.manipulator import Manipulator
@@ -26,6 +26,7 @@ from pteron.plots import (
     robot_figure,
     svg,
 )
+from pteron.plots.machine_figures import gravity_of
 from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
@@ -33,7 +34,7 @@ from pteron.report.drive_figures import force_speed, power
 from pteron.report.motion_frames import few
 from pteron.report.moving_picture import stage
 from pteron.report.quantities import SYMBOLS, angles_text, force, nouns, readable, speed
-from pteron.report.typeset import compact, fixed, resource, template, triple
+from pteron.report.typeset import compact, fixed, template, triple
 
 _LONGEST = 200
 """Most characters of a sum that is shown; those of an oblique Quadrupteron have thousands."""
@@ -49,7 +50,6 @@ def page(report: Report) -> str:
         lettered=lettered,
         readable=readable,
         signed=lambda text: re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", text),
-        triple=triple,
         typeset=lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
         zip=zip,
     )
@@ -59,9 +59,6 @@ def page(report: Report) -> str:
         **stage(
             robot,
             report.shown,
-            report.guides,
-            report.home_points,
-            report.grid,
             doing="on its pick-and-place cycle" if standard else "in motion",
             still=f"The home pose, with the way of {point} on the {way}.",
             force_title=f"{'Drive' if report.driven else 'Actuator'} {force(joints).name}",
@@ -89,11 +86,9 @@ def page(report: Report) -> str:
         motors=report.sizing.table().to_dicts(),
         total=report.sizing.power.sum(axis=1),
         units=[report.base.parameters[k].unit for k in report.base.kept],
-        values=report.base.values(),
+        values=_without_rounding(report.base),
         sums=[Markup(line) for line in report.base.expressions("html")],
         symbols=in_symbols(report.base),
-        version=pteron.__version__,
-        style=resource("page.css"),
     )
 
 
@@ -216,14 +211,14 @@ def _followers(robot: Manipulator) -> list[int]:
 def _figures(report: Report) -> dict[str, Any]:
     """Return the pictures as SVG, by their names in the template."""
     robot, cycle, at = report.robot, report.cycle, report.orientations
-    gravity, shown, standard = np.array(robot.gravity), report.shown, report.standard
+    shown, standard = report.shown, report.standard
     # The cycle returns on its own path.
     out = slice(len(shown.time) // 2 + 1 if standard else None)
     path = shown.pose[out]
     machine = robot_figure(
-        report.home_points,
-        report.guides,
-        gravity=gravity if gravity.any() else None,
+        shown.still,
+        shown.guides,
+        gravity=gravity_of(robot),
         path=shown.points.tool[out],
         angle=angles_text(robot, report.home),
     )
@@ -266,6 +261,14 @@ def _figures(report: Report) -> dict[str, Any]:
             for name, measure in (("I", report.measures.type_i), ("II", report.measures.type_ii))
         ]
     return made
+
+
+def _without_rounding(base: BaseParameters) -> Array:
+    """Return the base parameters' values, with zero for what rounding alone has left of them."""
+    values = base.values()
+    units = np.array([base.parameters[k].unit for k in base.kept])
+    largest = [np.abs(values[units == unit]).max() for unit in units]
+    return np.where(np.abs(values) > 1e-12 * np.array(largest), values, 0.0)
 
 
 def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:

@@ -12,19 +12,30 @@ from typing import Any
 from jinja2 import Template
 from markupsafe import Markup, escape
 
+import pteron
 from pteron.platforms.coordinates import coordinate
+from pteron.short_numbers import power_of_ten
 from pteron.templates import template as any_template
 
-_TINY = 1e-9
-"""Size below which leading zeros are no longer counted."""
+_TINY, _HUGE = 1e-6, 1e7
+"""Sizes below and from which zeros are no longer counted: numbers have a power of ten."""
+
+_LEAST = 1e-3
+"""Percentage below which no digits are shown."""
+
+_DIGITS = 8
+"""Most significant digits of a value, however narrow its interval."""
 
 _MINUS = "\u2212"
 """The minus sign."""
 
+_SPACE = "\u00a0"
+"""The space within a number."""
+
 _NARROW = "\u202f"
 """The narrow space within a unit."""
 
-_COMMAND = r"pteron [a-z]+ ROBOT(?: --[a-z-]+ [\w.]*\w)+"
+_COMMAND = r"pteron [a-z]+ (?:ROBOT|\S+\.toml)(?: --[a-z-]+ [\w.]*\w)*"
 """Pattern of a command of `pteron` in a text."""
 
 _CODE = r"<code>\g<0></code>"
@@ -32,12 +43,12 @@ _CODE = r"<code>\g<0></code>"
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Return a number with so many significant digits; an exponent has what is below 1e-9.
+    r"""Return a number with so many significant digits, tiny and huge ones with a power of ten.
 
     Examples
     --------
     >>> significant(0.0123456), significant(1234.6), significant(-2.0, 2), significant(-6e-14, 2)
-    ('0.0123', '1235', '−2.0', '−6.0e−14')
+    ('0.0123', '1235', '−2.0', '−6.0\xa0×\xa010⁻¹⁴')
     """
     if not isfinite(value):
         return "∞" if value > 0 else "\u2013"
@@ -46,9 +57,23 @@ def significant(value: float, digits: int = 3) -> str:
     # 999.6 is 1000 in three digits: the size counts after rounding.
     text = f"{value:.{digits - 1}e}"
     rounded = float(text)
-    if abs(rounded) < _TINY:
-        return text.replace("-", _MINUS)
+    if not _TINY <= abs(rounded) < _HUGE:
+        mantissa, _, power = text.partition("e")
+        return f"{mantissa.replace('-', _MINUS)}{_SPACE}\u00d7{_SPACE}{power_of_ten(int(power))}"
     return fixed(value, max(digits - 1 - floor(log10(abs(rounded))), 0))
+
+
+def percent(value: float, digits: int = 3) -> str:
+    r"""Return a percentage; one that is nothing to speak of has no digits.
+
+    Examples
+    --------
+    >>> percent(12.345), percent(3.1e-10)
+    ('12.3\xa0%', '<\xa00.001\xa0%')
+    """
+    if 0.0 <= value < _LEAST:
+        return f"<\u00a0{_LEAST:g}\u00a0%"
+    return f"{significant(value, digits)}\u00a0%"
 
 
 def fixed(value: float, places: int = 1) -> str:
@@ -66,15 +91,16 @@ def fixed(value: float, places: int = 1) -> str:
 
 
 def measured(value: float, half: float) -> tuple[str, str]:
-    """Return a value and half its interval, to the second digit of the latter.
+    """Return a value and half its interval, to the second digit of the latter, but not to a ninth.
 
     Examples
     --------
     >>> measured(1.2361326, 0.012752), measured(-0.004113744, 4.4e-05)
     (('1.236', '0.013'), ('−0.004114', '0.000044'))
     """
-    if not isfinite(half) or half <= 0.0:
-        return significant(value, 6), significant(half, 2)
+    if not isfinite(half) or half <= abs(value) * 10.0 ** (1 - _DIGITS):
+        digits = _DIGITS if 0.0 < half < abs(value) else 6
+        return significant(value, digits), significant(half, 2)
     # 0.0996 is 0.10 in two digits: the size counts after rounding.
     places = max(1 - floor(log10(float(f"{half:.1e}"))), 0)
     return fixed(value, places), fixed(half, places)
@@ -95,15 +121,16 @@ def triple(values: Iterable[float], factor: float = 1.0, digits: int = 4) -> str
 
 
 def prose(text: str) -> Markup:
-    """Return a message with true minus signs; commands and options are code, in one piece."""
+    """Return a message with true signs; commands and options are code, in one piece."""
     signed = re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", str(escape(text)))
+    signed = re.sub(r"(?<=\d) x (?=\w)", " \u00d7 ", signed).replace("^2", "²")
     commands = re.sub(_COMMAND, lambda found: re.sub(r"\S+", _CODE, found[0]), signed)
     return Markup(re.sub(r"(?<!<code>)--[a-z][a-z-]*(?: each)?", _CODE, commands))
 
 
-def resource(name: str) -> Markup:
+def resource(name: str, folder: str = "report") -> Markup:
     """Return the text of one of the report's files, to stand in a page as it is."""
-    return Markup((files("pteron.report") / name).read_text(encoding="utf-8"))
+    return Markup((files("pteron") / folder / name).read_text(encoding="utf-8"))
 
 
 def embedded(data: Any) -> Markup:
@@ -113,14 +140,18 @@ def embedded(data: Any) -> Markup:
 
 
 def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:
-    """Return a page's template, with the filters of all pages and some of its own."""
+    """Return a page's template, with the style and filters of all pages and some of its own."""
     shared: dict[str, Callable[..., Any]] = {
         "compact": compact,
         "fixed": fixed,
         "mm": _millimetres,
+        "percent": percent,
         "prose": prose,
         "significant": significant,
+        "triple": triple,
         "symbol": lambda name: coordinate(name).symbol,
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),
     }
-    return any_template(folder, name, **shared | filters)
+    made = any_template(folder, name, **shared | filters)
+    made.globals.update(style=resource("page.css"), version=pteron.__version__)
+    return made

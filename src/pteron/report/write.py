@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.atomic import checked_file, write_text, write_texts
 from pteron.errors import OutputError, shown
-from pteron.json_values import picked
+from pteron.json_values import json_text, picked
 from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
@@ -66,8 +65,8 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
 
     target = checked_folder(folder)
     report = contents(robot, None if motion is None else playback(robot, motion))
-    data = json.dumps(numbers(report), indent=1, allow_nan=False)
-    return write_texts(target, {"report.html": page(report), "report.json": data + "\n"})[0]
+    data = json_text(numbers(report))
+    return write_texts(target, {"report.html": page(report), "report.json": data})[0]
 
 
 def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path:

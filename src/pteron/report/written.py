@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pteron.atomic import write_texts
+from pteron.json_values import json_text
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,5 @@ def write_found(
     folder: Path, stem: str, page: str, numbers: dict[str, Any], model: dict[str, str]
 ) -> Written:
     """Write a page, numbers and perhaps a machine's file by its name: all of them, or none."""
-    data = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
-    paths = write_texts(folder, {f"{stem}.html": page, f"{stem}.json": data, **model})
+    paths = write_texts(folder, {f"{stem}.html": page, f"{stem}.json": json_text(numbers), **model})
     return Written(paths[0], paths[1], paths[2] if model else None)

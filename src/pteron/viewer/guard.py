@@ -7,22 +7,8 @@ headers `Origin` and `Host`.
 
 from __future__ import annotations
 
-import http
 import ipaddress
 import socket
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from websockets.asyncio.server import ServerConnection
-    from websockets.http11 import Request, Response
-
-    _Answer = Callable[[ServerConnection, Request], Response | None]
-
-_SERVES = threading.Lock()
-"""Held while a server starts under the guard: one at a time."""
 
 
 def is_here(host: str) -> bool:
@@ -51,39 +37,6 @@ def refusal(host: str, here: bool, hosts: list[str], origins: list[str]) -> str 
     if any(origin.lower() not in (f"http://{asked}", f"https://{asked}") for origin in origins):
         return "the page of another server asked for it"
     return None
-
-
-@contextmanager
-def guarded(host: str) -> Iterator[list[str]]:
-    """Let no server that viser starts within answer a request that is refused.
-
-    viser hands no hook on to the server of websockets that it starts, so that
-    `websockets.asyncio.server.serve` is another function as long. The list that is yielded holds
-    the hosts that were guarded: it is empty if viser went another way.
-    """
-    from websockets.asyncio import server
-
-    guards: list[str] = []
-    here = is_here(host)
-
-    def serve(*arguments: Any, process_request: _Answer, **options: Any) -> Any:
-        def answer(connection: ServerConnection, request: Request) -> Response | None:
-            hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
-            reason = refusal(host, here, hosts, origins)
-            if reason is not None:
-                return connection.respond(http.HTTPStatus.FORBIDDEN, f"Refused: {reason}.\n")
-            return process_request(connection, request)
-
-        guards.append(host)
-        return plain(*arguments, process_request=answer, **options)
-
-    with _SERVES:
-        plain = server.serve
-        server.serve = serve  # type: ignore[misc,assignment]
-        try:
-            yield guards
-        finally:
-            server.serve = plain  # type: ignore[misc]
 
 
 def _name(asked: str) -> str:

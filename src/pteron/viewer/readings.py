@@ -10,6 +10,7 @@ import numpy as np
 from pteron.dynamics import drive_forces
 from pteron.errors import PteronError
 from pteron.kernels import Array
+from pteron.kinematics import joint_rates
 from pteron.kinematics.jacobian_at import jacobian_at
 from pteron.viewer.state import ViewerState
 from pteron.workspace import pose_margins
@@ -35,6 +36,8 @@ class Readings:
     forces : array, shape (n,)
         Forces of the drives, at rest or as the machine moves, N or N m; NaN where they are not
         determined.
+    power : array, shape (n,)
+        That the drives give, W.
     shares : array, shape (n,)
         Their sizes over what the drives can do; NaN where the file does not say it.
     condition : float
@@ -51,6 +54,7 @@ class Readings:
 
     joints: Array
     forces: Array
+    power: Array
     shares: Array
     condition: float
     type_i: Array
@@ -59,14 +63,22 @@ class Readings:
     fault: str = ""
 
 
-def readings(state: ViewerState) -> Readings:
-    """Return the numbers of a state, each as the library has it."""
+def readings(state: ViewerState, forces: Array | None = None) -> Readings:
+    """Return the numbers of a state, each as the library has it.
+
+    Forces (n,) that are given are those of drives which somebody pushes against.
+    """
     robot, fault = state.robot, ""
-    unknown = np.full(robot.joint_count, np.nan)
+    if forces is None:
+        try:
+            moves = state.velocity, state.acceleration
+            forces = drive_forces(state.loaded, state.pose, *moves)
+        except PteronError as error:
+            forces, fault = np.full(robot.joint_count, np.nan), str(error)
     try:
-        forces: Array = drive_forces(state.loaded, state.pose, state.velocity, state.acceleration)
-    except PteronError as error:
-        forces, fault = unknown, str(error)
+        rates = joint_rates(robot, state.pose, state.velocity).actuated
+    except PteronError:
+        rates = np.full(robot.joint_count, np.nan)
     try:
         condition = jacobian_at(robot, state.pose).condition
     except PteronError:
@@ -75,7 +87,15 @@ def readings(state: ViewerState) -> Readings:
     shares = np.abs(forces) / np.array([np.nan if force is None else force for force in most])
     at = pose_margins(robot, state.pose)
     return Readings(
-        state.joints, forces, shares, condition, at.type_i, float(at.type_ii), at.joints, fault
+        joints=state.joints,
+        forces=forces,
+        power=forces * rates,
+        shares=shares,
+        condition=condition,
+        type_i=at.type_i,
+        type_ii=float(at.type_ii),
+        clearances=at.joints,
+        fault=fault,
     )
 
 

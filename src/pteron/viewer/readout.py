@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -25,16 +24,6 @@ _COLORS: dict[Level, tuple[str, str]] = {
 
 PLACES = 2
 """Decimal places of a force."""
-
-
-def status(message: str, *, empty: str) -> str:
-    """Return the message of the last action; the text `empty` where there is none."""
-    background, ink = _COLORS["near" if message else "far"]
-    return (
-        '<div role="status" style="font-size:12px;line-height:1.4;margin:.2em .8em;'
-        f'padding:.35em .6em;border-radius:.4em;background:{background};color:{ink}">'
-        f"{escape(message or empty)}</div>"
-    )
 
 
 def readout(state: ViewerState, found: Readings) -> str:

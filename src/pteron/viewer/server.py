@@ -1,25 +1,25 @@
-"""The viewer's server: viser, on the first free port from the one asked for.
+"""The viewer's server: pages and their sockets, on the first free port from the one asked for.
 
-It is closed to foreign pages, and opens no public tunnel.
+It answers no page of another server; see `guard`.
 """
 
 from __future__ import annotations
 
 import errno
-import io
+import http
 import logging
 import os
 import socket
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
-from typing import TYPE_CHECKING, Any
+import threading
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
 
-from pteron.errors import DataError, ModelError, shown
-from pteron.extras import of_extra
-from pteron.viewer.guard import guarded
+from pteron.errors import DataError, shown
+from pteron.viewer.guard import is_here, refusal
 
 if TYPE_CHECKING:
-    import viser
+    from websockets.http11 import Request, Response
+    from websockets.sync.server import ServerConnection
 
 _PORTS_TRIED = 100
 """Most ports that are tried in turn before the server is refused."""
@@ -30,35 +30,142 @@ _LAST_PORT = 65535
 _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 """Error numbers for an address that is none of this machine's."""
 
+_LARGEST = (100 << 20) + (1 << 16)
+"""Largest message, bytes: a file with a motion."""
 
-def serve(host: str, port: int, label: str) -> viser.ViserServer:
-    """Return a running server.
+_GONE = 2.0
+"""Time after which a tab that does not answer is left at the end, s."""
 
-    `port` is the first that is tried, and 0 takes any that is free; `label` is the page's title.
-    """
-    package = of_extra("viewer", "viser", "the viewer needs viser")
-    free = free_port(host, port)
-    logging.getLogger("websockets.server").addFilter(_worth_telling)
-    with _quiet(), guarded(host) as guards:
-        server: viser.ViserServer = package.ViserServer(
-            host=host, port=free, label=label, verbose=False
+
+class Room(Protocol):
+    """A page with a socket, through which messages go both ways."""
+
+    def page(self) -> str:
+        """Return the page, HTML."""
+
+    def entered(self, tab: Tab) -> None:
+        """Send a tab what it is to show."""
+
+    def left(self, tab: Tab) -> None:
+        """Send a tab no more."""
+
+    def told(self, tab: Tab, message: str | bytes) -> None:
+        """Take a message of a tab."""
+
+
+class Tab:
+    """One connected page: of messages of one kind that it has not taken, only the last is sent."""
+
+    def __init__(self, connection: ServerConnection) -> None:
+        self._connection = connection
+        self._messages: dict[str, str] = {}
+        self._wake = threading.Condition()
+        self._over = False
+        self._thread = threading.Thread(target=self._run, name="pteron tab", daemon=True)
+        self._thread.start()
+
+    def send(self, kind: str, message: str) -> None:
+        """Send a message soon."""
+        with self._wake:
+            self._messages[kind] = message
+            self._wake.notify()
+
+    def close(self) -> None:
+        """Send nothing more."""
+        with self._wake:
+            self._over = True
+            self._wake.notify()
+
+    def _run(self) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        while True:
+            with self._wake:
+                while not self._messages and not self._over:
+                    self._wake.wait()
+                if self._over:
+                    return
+                messages, self._messages = self._messages, {}
+            try:
+                for message in messages.values():
+                    self._connection.send(message)
+            except ConnectionClosed:
+                return
+
+
+class Server:
+    """A running server of pages by their paths; `port` is where it is."""
+
+    def __init__(self, host: str, port: int, rooms: Mapping[str, Room | Callable[[], str]]) -> None:
+        """Serve; `port` is the first that is tried, and 0 takes any that is free."""
+        from websockets.sync.server import serve
+
+        self._rooms, self._host, self._here = rooms, host, is_here(host)
+        logger = logging.getLogger("pteron.viewer.server")
+        logger.addFilter(_worth_telling)
+        free = free_port(host, port)
+        family = socket.getaddrinfo(host or None, free, type=socket.SOCK_STREAM)[0][0]
+        self._server = serve(
+            self._handle,
+            sock=socket.create_server((host, free), family=family),
+            process_request=self._answer,
+            compression=None,
+            max_size=_LARGEST,
+            close_timeout=_GONE,
+            logger=logger,
+            server_header=None,
         )
-    if not guards:
-        stop(server)
-        raise ModelError(
-            f"viser {package.__version__} gives no hold to keep foreign pages out, so the viewer "
-            'is not opened; pip install "viser==1.1.1"'
+        self.port = int(self._server.socket.getsockname()[1])
+        self._tabs = set[Any]()
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, name="pteron server", daemon=True
         )
-    # Any page that a browser shows could ask for a tunnel to the world; there is to be none.
-    refused: Any = server
-    refused.request_share_url = _no_tunnel
-    return server
+        self._thread.start()
 
+    def stop(self) -> None:
+        """Close all connections, and serve no more."""
+        self._server.shutdown()
+        for connection in list(self._tabs):
+            connection.close(1001)
+        self._thread.join()
 
-def stop(server: viser.ViserServer) -> None:
-    """Stop a server."""
-    with _quiet():
-        server.stop()
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        reason = refusal(self._host, self._here, hosts, origins)
+        if reason is not None:
+            return connection.respond(http.HTTPStatus.FORBIDDEN, f"Refused: {reason}.\n")
+        path = request.path.partition("?")[0]
+        room = self._rooms.get(path)
+        if room is None:
+            told = f"No page here; try {next(iter(self._rooms))}\n"
+            return connection.respond(http.HTTPStatus.NOT_FOUND, told)
+        if "Upgrade" in request.headers:
+            return None
+        found = connection.respond(http.HTTPStatus.OK, room() if callable(room) else room.page())
+        del found.headers["Content-Type"]
+        found.headers["Content-Type"] = "text/html; charset=utf-8"
+        found.headers["Cache-Control"] = "no-store"
+        return found
+
+    def _handle(self, connection: ServerConnection) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        assert connection.request is not None
+        room = self._rooms[connection.request.path.partition("?")[0]]
+        if callable(room):
+            return
+        self._tabs.add(connection)
+        tab = Tab(connection)
+        room.entered(tab)
+        try:
+            for message in connection:
+                room.told(tab, message)
+        except ConnectionClosed:
+            pass
+        finally:
+            room.left(tab)
+            tab.close()
+            self._tabs.discard(connection)
 
 
 def free_port(host: str, port: int) -> int:
@@ -104,15 +211,4 @@ def _is_free(family: int, address: Any, port: int) -> bool:
 
 def _worth_telling(record: logging.LogRecord) -> bool:
     """Say whether a line of the server's log is: browsers open connections that they do not use."""
-    return record.getMessage() != "opening handshake failed"
-
-
-def _no_tunnel(verbose: bool = True) -> None:
-    """Refuse to publish the page."""
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep to itself what viser prints: standard output is for results."""
-    with redirect_stdout(io.StringIO()):
-        yield
+    return record.levelno >= logging.ERROR and record.getMessage() != "opening handshake failed"

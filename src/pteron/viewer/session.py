@@ -5,8 +5,9 @@ It knows nothing of a browser, and runs in one thread.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,8 +18,13 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, working_modes
 from pteron.motion import Motion, pick_and_place
 from pteron.motion.trajectories.checks import check_motion
+from pteron.platforms.nearest_pose import pose_nearest_frame
+from pteron.viewer.boundary import allowed, followed
 from pteron.viewer.motion_files import motion_of_file
+from pteron.viewer.pushing import DRIVES, Push
+from pteron.viewer.slices import NONE
 from pteron.viewer.state import (
+    ViewerState,
     along,
     assembled,
     assembly_poses,
@@ -49,6 +55,15 @@ _MARGIN = 0.08
 _RIM = 0.05
 """The same for joints."""
 
+_KEPT = 200
+"""Most states that can be undone."""
+
+_ALONG = 241
+"""Poses along each coordinate at which the platform is asked whether it may go there."""
+
+_FRAME = 1.0 / 60.0
+"""Time of a step of a motion, s."""
+
 
 class Session:
     """A machine, what it does, and what people do to it.
@@ -64,6 +79,10 @@ class Session:
     playing : bool
     speed : float
         Seconds of the motion in one second.
+    push : Push or None
+        The machine's own motion, while somebody may pull at it.
+    screws : bool
+        Whether joint axes are shown, and `plane`, the name of the slice that is.
     """
 
     def __init__(self, robot: Manipulator, payload: float = 0.0) -> None:
@@ -76,6 +95,9 @@ class Session:
         self.motion: Motion | None = None
         self.title = ""
         self.time, self.playing, self.speed = 0.0, False, 1.0
+        self.push: Push | None = None
+        self.screws, self.plane = False, NONE
+        self._before = list[ViewerState]()
         self._set_ranges()
 
     def _set_ranges(self) -> None:
@@ -115,6 +137,23 @@ class Session:
 
     # What people do.
 
+    def remember(self) -> None:
+        """Keep the state as it is, for `undo`."""
+        if not self.playing and self.push is None:
+            self._before = [*self._before[-_KEPT:], self.state]
+
+    def undo(self) -> None:
+        """Go back to the state before the last action."""
+        if not self._before:
+            self.state = stopped(self.state, "There is nothing to undo.")
+            return
+        self._rest()
+        was = self._before.pop()
+        if was.robot != self.state.robot:
+            self.state = at_home(was)
+            self._set_ranges()
+        self.state = stopped(was)
+
     def set_coordinate(self, i: int, value: float) -> None:
         """Move the platform along one of its pose's coordinates, from 0, to a value in m or rad."""
         target = self.state.pose.copy()
@@ -123,8 +162,24 @@ class Session:
 
     def set_pose(self, target: Array) -> None:
         """Move the platform to a pose (m,), or as near to it as it goes."""
-        self.playing = False
+        self._rest()
         self.state = moved(self.state, target)
+
+    def drag(self, axis: int | None, point: Array) -> None:
+        """Move P to a point (3,), m, or turn the platform so that one of its axes leads there."""
+        platform, target = self.state.robot.platform, self.state.pose.copy()
+        if axis is None:
+            target[~platform.angular] = platform.directions @ point
+        elif platform.angles:
+            place, axes = platform.at(target)
+            turned = axes @ _rotation(axes[axis], point - place).T
+            if platform.tilts:
+                target = pose_nearest_frame(platform, target, turned)
+            else:
+                x, y, _ = np.array(platform.frame) @ turned[0]
+                angle = float(np.arctan2(y, x)) - target[platform.angular]
+                target[platform.angular] += (angle + np.pi) % (2.0 * np.pi) - np.pi
+        self.set_pose(target)
 
     def type_pose(self, text: str) -> None:
         """Move the platform to a pose that is typed in mm or degrees, as its coordinates are."""
@@ -132,7 +187,7 @@ class Session:
 
     def set_joint(self, i: int, value: float) -> None:
         """Move one joint, from 0, to a value in m or rad."""
-        self.playing = False
+        self._rest()
         self.state = joint_moved(self.state, i, value)
 
     def set_payload(self, text: str) -> None:
@@ -141,7 +196,7 @@ class Session:
 
     def go_home(self) -> None:
         """Move the platform to its home pose."""
-        self.playing = False
+        self._rest()
         self.state = at_home(self.state)
 
     def modes(self) -> list[tuple[int, ...]]:
@@ -151,7 +206,7 @@ class Session:
     def set_working_mode(self, elbows: Sequence[int]) -> bool:
         """Put the elbows on given sides; say whether the machine is another one now."""
         before = self.state.robot
-        self.playing = False
+        self._rest()
         self.state = in_working_mode(self.state, elbows)
         if self.state.robot == before:
             return False
@@ -174,10 +229,30 @@ class Session:
 
     def set_assembly(self, pose: Array) -> None:
         """Take another of the poses that the joints have."""
-        self.playing = False
+        self._rest()
         self.state = assembled(self.state, pose)
 
-    # What plays.
+    def _rest(self) -> None:
+        """End what plays, and what is pushed."""
+        self.playing, self.push = False, None
+
+    # What moves by itself.
+
+    def prepare_push(self, drives: str) -> Push:
+        """Return the machine as a spring may pull at it; the first time takes some seconds."""
+        if drives not in DRIVES:
+            raise DataError(f"drives: {drives!r} given, one of {', '.join(DRIVES)} expected")
+        return Push(self.state.loaded, self.state.pose, drives)
+
+    def begin_push(self, drives: str) -> None:
+        """Let the machine move by itself from where it is."""
+        self.playing, self.push = False, self.prepare_push(drives)
+        self.state = stopped(self.state)
+
+    def end_push(self) -> None:
+        """Bring the machine to rest where it is."""
+        self.push = None
+        self.state = stopped(self.state)
 
     def load(self, name: str, data: bytes) -> None:
         """Take a motion from a file's name and content; it plays from its beginning."""
@@ -191,6 +266,7 @@ class Session:
     def take(self, motion: Motion, title: str) -> None:
         """Take a motion, after a check that the machine can do it."""
         check_motion(self.state.robot, motion)
+        self.push = None
         self.motion, self.title = motion, title
         self.playing = True
         self.seek(0.0)
@@ -200,9 +276,12 @@ class Session:
         if self.motion is None:
             self.state = stopped(self.state, "There is no motion to play: load one first.")
             return
-        self.playing = on
-        if not on:
-            self.state = stopped(self.state)
+        self.push, self.playing = None, on
+
+    def step(self, count: int) -> None:
+        """Go on, or back, by so many sixtieths of a second of the motion."""
+        self.playing = False
+        self.seek(self.time + count * _FRAME)
 
     def seek(self, time: float) -> None:
         """Go to a time of the motion, s."""
@@ -211,11 +290,41 @@ class Session:
             self.state = along(self.state, self.motion, self.time)
 
     def advance(self, elapsed: float) -> None:
-        """Let the motion go on for so many seconds of the clock; it begins again at its end."""
-        if self.motion is not None and self.playing:
+        """Let time go on for so many seconds of the clock; a motion begins again at its end."""
+        if self.push is not None:
+            self.push.go(self.speed * elapsed)
+            message = f"{self.push.stops}." if self.push.stops else ""
+            pose, velocity = self.push.pose, self.push.velocity
+            self.state = replace(self.state, pose=pose, velocity=velocity, message=message)
+        elif self.motion is not None and self.playing:
             self.seek((self.time + self.speed * elapsed) % (self.motion.duration or 1.0))
 
     # What is shown.
+
+    def spans(self, busy: Callable[[], bool] = lambda: False) -> tuple[Array, Array] | None:
+        """Return how far each coordinate, and each joint, may go from here: (2, m), (2, n).
+
+        None if somebody acts meanwhile, as `busy` tells.
+        """
+        robot, pose = self.state.robot, self.state.pose
+        ends = np.array([pose, pose])
+        for i, (low, high) in enumerate(self.pose_range.T):
+            for row, end in enumerate((low, high)):
+                along = np.tile(pose, (_ALONG, 1))
+                along[:, i] = np.linspace(pose[i], end, _ALONG)
+                free = allowed(robot, along)
+                ends[row, i] = along[-1 if free.all() else max(0, int(free.argmin()) - 1), i]
+        joints = self.state.joints
+        found = np.array([joints, joints])
+        for i in range(len(joints)):
+            for row in range(2):
+                if busy():
+                    return None
+                target = joints.copy()
+                target[i] = self.joint_range[row, i]
+                last = followed(robot, pose, joints, target)[0]
+                found[row, i] = inverse_kinematics(robot, last)[i]
+        return ends, found
 
     def force_scale(self) -> Array:
         """Return the force of each leg's drive, (n,), whose arrow has the usual length.
@@ -234,3 +343,15 @@ class Session:
         sizes = np.nan_to_num(np.abs(forces)).max(axis=0)
         units = np.array([leg.joint.force_unit for leg in loaded.legs])
         return np.array([sizes[units == unit].max() or 1.0 for unit in units])
+
+
+def _rotation(start: Array, end: Array) -> Array:
+    """Return the least rotation (3, 3) that turns one direction to another."""
+    a, b = start / np.linalg.norm(start), end / max(float(np.linalg.norm(end)), 1e-12)
+    across, cosine = np.cross(a, b), float(a @ b)
+    if cosine < -1.0 + 1e-9:
+        return np.eye(3)
+    cross = np.array(
+        [[0, -across[2], across[1]], [across[2], 0, -across[0]], [-across[1], across[0], 0]]
+    )
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + cosine))

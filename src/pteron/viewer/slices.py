@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.plots.canvas import svg
+from pteron.plots.printing import svg
 from pteron.plots.reach import reach_figure
-from pteron.viewer.meshes import Mesh, cells
 from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.reach_slices import Plane, slice_planes
 
@@ -39,23 +38,24 @@ def choices(robot: Manipulator) -> dict[str, Plane | None]:
     }
 
 
-def slice_meshes(
+def slice_strips(
     robot: Manipulator, pose: Array, plane: str, span: Array
-) -> list[tuple[Mesh, str]]:
-    """Return the parts of a slice through a pose, each with its colour.
+) -> list[tuple[str, Array]]:
+    """Return the parts of a slice through a pose: a colour, and strips (S, 4, 3) in space, m.
 
     They are where poses serve, and where only a joint's limit forbids them, within the least and
-    the greatest of each coordinate (2, m).
+    the greatest of each coordinate (2, m). A strip is a row of grid cells whose corners all do.
     """
-    cut, found = _slice(robot, pose, plane, span), []
+    cut = _slice(robot, pose, plane, span)
+    found = []
     for status, color in ((REACHABLE, SERVES), (BEYOND_LIMITS, BEYOND)):
-        flat, faces = cells(cut.first, cut.second, np.asarray(cut.status == status))
-        found.append(((_in_space(robot, pose, *cut.places, flat), faces), color))
+        flat = _strips(cut.first, cut.second, np.asarray(cut.status == status))
+        found.append((color, _in_space(robot, pose, *cut.places, flat)))
     return found
 
 
 def slice_map(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> str:
-    """Return the map of a slice along an angle, in HTML; see `slice_meshes`, `reach_figure`."""
+    """Return the map of a slice along an angle, in HTML; see `slice_strips`, `reach_figure`."""
     cut = _slice(robot, pose, plane, span)
     return str(svg(reach_figure(cut), name="slice", title=f"Reach over {' and '.join(plane)}"))
 
@@ -66,9 +66,20 @@ def _slice(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> ReachS
     return reach_slice(robot, pose, plane, extent=(left, right, low, high), points=POINTS)
 
 
-def _in_space(robot: Manipulator, pose: Array, i: int, j: int, flat: Array) -> NDArray[np.float64]:
-    """Return points (V, 2) of a slice in the base frame, (V, 3)."""
-    directions = robot.platform.directions
-    lengths = np.tile(pose[~robot.platform.angular], (len(flat), 1))
-    lengths[:, i], lengths[:, j] = flat[:, 0], flat[:, 1]
-    return np.asarray(lengths @ directions)
+def _strips(first: Array, second: Array, inside: NDArray[np.bool_]) -> Array:
+    """Return the rows of cells of a grid (B, A) whose corners are inside, as (S, 4, 2)."""
+    whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
+    edges = np.diff(np.pad(whole.astype(int), ((0, 0), (1, 1))), axis=1)
+    rows, starts = np.nonzero(edges == 1)
+    ends = np.nonzero(edges == -1)[1]
+    left, right, low, high = first[starts], first[ends], second[rows], second[rows + 1]
+    corners = [(left, low), (right, low), (right, high), (left, high)]
+    return np.stack([np.stack(corner, axis=-1) for corner in corners], axis=1)
+
+
+def _in_space(robot: Manipulator, pose: Array, i: int, j: int, flat: Array) -> Array:
+    """Return points (..., 2) of a slice in the base frame, (..., 3)."""
+    lengths = np.zeros((*flat.shape[:-1], len(robot.platform.lengths)))
+    lengths[:] = pose[~robot.platform.angular]
+    lengths[..., i], lengths[..., j] = flat[..., 0], flat[..., 1]
+    return np.asarray(lengths @ robot.platform.directions)

@@ -16,7 +16,8 @@ from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion, with_payload
 from pteron.motion.payload import payload_warning
 from pteron.platforms.coordinates import SHOWN
-from pteron.viewer.boundary import allowed, farthest, followed, told_rest, what_stops
+from pteron.viewer.boundary import allowed, followed, told_rest, what_stops
+from pteron.viewer.sliding import nearest
 from pteron.workspace import home_pose
 
 _SAME_POSE = 1e-6
@@ -65,15 +66,15 @@ def at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
 
 
 def moved(state: ViewerState, target: Array) -> ViewerState:
-    """Return the machine at rest in another pose (m,), or as near to it as it can go straight."""
+    """Return the machine at rest in another pose (m,), or as near to it as it slides."""
     if not np.isfinite(target).all():
         return replace(state, message="The pose is to have finite numbers.")
-    last, beyond = farthest(state.robot, state.pose, target)
+    last, beyond = nearest(state.robot, state.pose, target)
     if beyond is None:
         return _rest(state, target)
     rest = told_rest(state.robot, last, target)
     why = what_stops(state.robot, beyond)
-    return _rest(state, last, f"{why}. The platform stops {rest} before the pose asked for.")
+    return _rest(state, last, f"{why}. The platform is {rest} from the pose asked for.")
 
 
 def joint_moved(state: ViewerState, i: int, value: float) -> ViewerState:

@@ -2,41 +2,25 @@
 
 from __future__ import annotations
 
-import threading
-import traceback
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
-from time import monotonic
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
-from pteron.errors import DataError, PteronError, shown
+from pteron.errors import DataError, shown
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion, Simulation, joint_guides, joint_points
 from pteron.motion.enlarged_points import greatest_difference
 from pteron.plots.calibration import enlargement, expect_alike
+from pteron.report.typeset import template
 from pteron.shapes import PoseLike
-from pteron.viewer.handle import Handle
-from pteron.viewer.panel import Panel
-from pteron.viewer.readings import Readings, readings
-from pteron.viewer.scene import Scene
-from pteron.viewer.server import serve, stop
+from pteron.viewer.live import Live
+from pteron.viewer.server import Server
 from pteron.viewer.session import Session
-from pteron.viewer.slices import choices, slice_map, slice_meshes
-from pteron.viewer.solids import machine_size
-from pteron.viewer.state import ViewerState, stopped
-
-_FRAME = 1.0 / 30.0
-"""Time between two pictures of a motion, s."""
-
-_PANEL = 0.1
-"""Time between two readings of a motion, s: nobody reads faster, and browsers are busy."""
-
-_SETTLED = 0.25
-"""Time without an action after which results that take longer are shown, s."""
+from pteron.viewer.state import ViewerState
 
 STANDARD_CYCLE = "adept"
 """The name of the standard pick-and-place cycle at the command line."""
@@ -51,39 +35,36 @@ class Viewer:
     ----------
     url : str
         The page's address.
+    port : int
+        Its port.
+    beside : tuple of Viewer
+        The machines that stand beside it on the page.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        host: str,
-        port: int,
-        compared: tuple[Manipulator, float] | None = None,
-    ) -> None:
-        self._session, self._compared = session, compared
-        self._server = serve(host, port, session.state.robot.name)
+    def __init__(self, live: Live, host: str, port: int, beside: Sequence[Live] = ()) -> None:
+        self._live = live
+        rooms: dict[str, Any] = {"/": live}
+        if beside:
+            every = (live, *beside)
+            rooms = {"/": lambda: _side_by_side([one.name for one in every])}
+            rooms |= {f"/{k}": one for k, one in enumerate(every, start=1)}
+        self._server: Server | None = Server(host, port, rooms)
+        self.port = self._server.port
         shown = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
-        address = f"[{shown}]" if ":" in shown else shown
-        self.url = f"http://{address}:{self._server.get_port()}"
-        self._actions: dict[str, Callable[[], object]] = {}
-        self._wake = threading.Condition()
-        self._closed = False
-        self._idle = threading.Event()
-        self._faults: list[str] = []
-        gui, scene = self._server.gui, self._server.scene
-        gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
-        scene.configure_environment_map(None)
-        scene.configure_default_lights(cast_shadow=False)
-        scene.add_light_ambient("/light", intensity=0.7)
-        gui.main_panel.dock_right()
-        self._panel = Panel(self._server, session, self.do)
-        self._looks: tuple[object, ...] = ()
-        self._sliced: tuple[object, ...] = ()
-        self._scaled: tuple[object, ...] = ()
-        self._set_up()
-        self._show(settled=True)
-        self._thread = threading.Thread(target=self._run, name="pteron viewer", daemon=True)
-        self._thread.start()
+        self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{self.port}"
+        self.beside: tuple[Viewer, ...] = tuple(
+            self._of(one, f"{self.url}/{k}", self.port) for k, one in enumerate(beside, start=2)
+        )
+        for one in (live, *beside):
+            one.start()
+
+    @classmethod
+    def _of(cls, live: Live, url: str, port: int) -> Viewer:
+        """Return the viewer of a machine whose page another one serves."""
+        found = cls.__new__(cls)
+        found._live, found._server, found.beside = live, None, ()
+        found.url, found.port = url, port
+        return found
 
     def __enter__(self) -> Self:
         return self
@@ -97,37 +78,29 @@ class Viewer:
         self.close()
 
     @property
-    def port(self) -> int:
-        """The port of the page."""
-        return int(self._server.get_port())
-
-    @property
     def state(self) -> ViewerState:
         """The state that is shown."""
-        return self._session.state
+        return self._live.session.state
+
+    @property
+    def home(self) -> Array:
+        """The pose, (m,), to which `Home` leads."""
+        return self._live.session.home
 
     @property
     def faults(self) -> tuple[str, ...]:
         """Tracebacks of unexpected failures in the viewer; the page reports them too."""
-        return tuple(self._faults)
+        return tuple(self._live.faults)
 
     def move_to(self, pose: PoseLike) -> None:
         """Move the platform to a pose (m,), m and rad, or as near to it as it goes."""
         target = np.asarray(pose, dtype=float)
-        self.do("move_to", lambda: self._session.set_pose(target))
+        self._live.do("move_to", lambda: self._live.session.set_pose(target))
 
     def play(self, motion: Motion | Simulation, title: str = "motion") -> None:
         """Play a motion, or what a simulation did, again and again."""
         found = motion.motion if isinstance(motion, Simulation) else motion
-        self.do("load", lambda: self._session.take(found, title))
-
-    def do(self, name: str, act: Callable[[], object]) -> None:
-        """Do something with the session soon; of actions with one name only the last is done."""
-        with self._wake:
-            self._actions.pop(name, None)
-            self._actions[name] = act
-            self._idle.clear()
-            self._wake.notify()
+        self._live.do("load", lambda: self._live.session.take(found, title))
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until all that was asked for is done and sent to the page; say whether it is.
@@ -137,152 +110,19 @@ class Viewer:
         timeout : float, optional
             s.
         """
-        return self._idle.wait(timeout)
+        return self._live.idle.wait(timeout)
 
     def close(self) -> None:
-        """End the page; tabs say that the connection is lost."""
-        with self._wake:
-            if self._closed:
-                return
-            self._closed = True
-            self._wake.notify()
-        self._thread.join()
-        stop(self._server)
-
-    # The thread that owns the session.
-
-    def _run(self) -> None:
-        session = self._session
-        last = shown = changed = monotonic()
-        settled = True
-        while True:
-            with self._wake:
-                if not self._actions:
-                    self._idle.set()
-                if not self._actions and not self._closed:
-                    self._wake.wait(self._until(last, changed, settled))
-                if self._closed:
-                    return
-                actions, self._actions = self._actions, {}
-            for act in actions.values():
-                self._guard(act)
-            now = monotonic()
-            if actions:
-                changed, settled = now, False
-            advanced = session.playing and now - last >= _FRAME
-            if advanced:
-                elapsed = now - last
-                self._guard(lambda: session.advance(elapsed))  # noqa: B023
-            if advanced or not session.playing:
-                last = now
-            if actions or (advanced and now - shown >= _PANEL):
-                self._guard(self._show)
-                shown = now
-            elif advanced:
-                self._guard(self._show_picture)
-            if not settled and now - changed >= _SETTLED:
-                settled = not session.playing
-                changed = now
-                self._guard(lambda: self._show(settled=True))
-
-    def _until(self, last: float, changed: float, settled: bool) -> float | None:
-        """Return the time until the next picture, s; None where it waits for an action."""
-        now = monotonic()
-        times = [last + _FRAME - now] if self._session.playing else []
-        times += [] if settled else [changed + _SETTLED - now]
-        return max(0.0, min(times)) if times else None
-
-    def _guard(self, act: Callable[[], object]) -> None:
-        """Act; a failure is reported on the page, and the last good state stays."""
-        session = self._session
-        try:
-            act()
-        except PteronError as error:
-            session.playing = False
-            session.state = stopped(session.state, _sentence(str(error)))
-        except Exception as error:
-            session.playing = False
-            self._faults.append(traceback.format_exc())
-            message = f"Something failed in the viewer ({type(error).__name__}: {error})."
-            session.state = stopped(session.state, message)
-
-    # What the page shows.
-
-    def _set_up(self) -> None:
-        """Put the machine into the picture, in its working mode."""
-        session = self._session
-        self._robot = session.state.robot
-        self._scene = Scene(self._server, self._robot, session.examples, self._compared)
-        self._handle = Handle(self._server, self._robot, self._scene.size, self._pulled)
-
-    def _pulled(self, pose: Array) -> None:
-        self.do("handle", lambda: self._session.set_pose(pose))
-
-    def _show(self, *, settled: bool = False) -> None:
-        """Show all of the session's state: the picture first, which the panel need not delay."""
-        server = self._server
-        found = self._show_picture()
-        with server.atomic():
-            self._panel.show(found, settled=settled)
-            if settled:
-                self._panel.show_settled()
-                self._show_slice()
-        server.flush()
-
-    def _show_picture(self) -> Readings:
-        """Show the machine; return its numbers."""
-        state, server = self._session.state, self._server
-        found = readings(state)
-        with server.atomic():
-            if state.robot != self._robot:
-                self._handle.remove()
-                self._scene.remove()
-                self._set_up()
-                self._panel.show_ranges()
-                self._looks = self._sliced = ()
-            if self._scaled != self._scaled_for():
-                self._scale, self._scaled = self._session.force_scale(), self._scaled_for()
-            self._show_looks()
-            self._scene.show(state, found.forces, self._scale)
-            self._handle.show(state)
-        server.flush()
-        return found
-
-    def _scaled_for(self) -> tuple[object, ...]:
-        state = self._session.state
-        return state.robot, state.payload, self._session.title
-
-    def _show_looks(self) -> None:
-        panel = self._panel
-        # A handle is for a platform that waits to be moved.
-        handle = panel.handle.value and not self._session.playing
-        looks = panel.screws.value, panel.forces.value, handle
-        if looks != self._looks:
-            self._looks = looks
-            self._scene.set_visible("screws", looks[0])
-            self._scene.set_visible("forces", looks[1])
-            self._handle.set_visible(looks[2])
-
-    def _show_slice(self) -> None:
-        state, span = self._session.state, self._session.pose_range
-        plane = choices(state.robot)[self._panel.plane.value]
-        # A map shows where the machine is, too.
-        rest = [
-            value
-            for name, value in zip(state.robot.coordinates, state.pose, strict=True)
-            if not isinstance(plane, str) or name not in plane
-        ]
-        key = (plane, state.robot, *np.round(rest, 9)) if plane else ()
-        if key == self._sliced:
-            return
-        self._sliced = key
-        given = state.robot, state.pose
-        self._scene.show_slice(slice_meshes(*given, plane, span) if isinstance(plane, str) else [])
-        self._panel.map.content = slice_map(*given, plane, span) if isinstance(plane, tuple) else ""
+        """End the page; tabs say that the server is gone."""
+        for one in (self, *self.beside):
+            one._live.stop()
+        if self._server is not None:
+            self._server.stop()
+            self._server = None
 
 
-def _sentence(text: str) -> str:
-    return text if text.endswith((".", "?", "!")) else f"{text}."
+def _side_by_side(names: Sequence[str]) -> str:
+    return template("beside.html.j2", "viewer").render(names=names)
 
 
 def view(
@@ -294,6 +134,7 @@ def view(
     payload: float = 0.0,
     compare: RobotLike | None = None,
     enlarge: float | None = None,
+    beside: Sequence[RobotLike] = (),
 ) -> Viewer:
     """Show a machine in the browser, where it can be moved.
 
@@ -321,6 +162,8 @@ def view(
         stands there in grey, in the same pose.
     enlarge : float, optional
         How many times its differences are enlarged; by default so that the greatest is well seen.
+    beside : sequence of Manipulator, name or path, optional
+        Further machines, side by side with the first; each plays the motion as it can.
 
     Returns
     -------
@@ -330,7 +173,7 @@ def view(
     Raises
     ------
     ModelError
-        If the machine reaches no pose, or if viser is not installed.
+        If the machine reaches no pose.
     SingularPose
         If the machine is singular at every pose.
     UnreachablePose
@@ -346,6 +189,15 @@ def view(
     ...     viewer.url[:17]
     'http://127.0.0.1:'
     """
+    session = _session(robot, payload, motion)
+    live = Live(session, _compared(session, compare, enlarge))
+    others = [Live(_session(one, payload, motion), None) for one in beside]
+    return Viewer(live, host, port, others)
+
+
+def _session(
+    robot: RobotLike, payload: float, motion: Motion | Simulation | str | Path | None
+) -> Session:
     session = Session(as_manipulator(robot), payload)
     if isinstance(motion, Motion | Simulation):
         session.take(motion.motion if isinstance(motion, Simulation) else motion, "motion")
@@ -353,7 +205,7 @@ def view(
         session.load_standard()
     elif motion is not None:
         session.load(str(motion), read_bytes(motion))
-    return Viewer(session, host, port, _compared(session, compare, enlarge))
+    return session
 
 
 def _compared(
@@ -365,7 +217,8 @@ def _compared(
     expect_alike(robot, other)
     if enlarge is None:
         one, there = (joint_points(each, session.home) for each in (robot, other))
-        size = machine_size(one, joint_guides(robot, session.home))
+        paths = (guide.path for guide in joint_guides(robot, session.home))
+        size = float(np.ptp(np.vstack([*one.links, *paths]), axis=0).max())
         enlarge = enlargement(greatest_difference(one, there), size)
     return other, enlarge
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy import ndimage  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 from pteron.workspace.paving import Paving
@@ -94,15 +94,15 @@ def components(paving: Paving, *, smallest: float = 0.0) -> Components:
         return Components((), 0, None, 0.0)
     start, size, inside, possible = lattice(paving)
     around = np.ones((3,) * inside.ndim)
-    labels, count = ndimage.label(inside, around)
-    groups, _ = ndimage.label(possible, around)
+    labels, count = scipy.ndimage.label(inside, around)
+    groups, _ = scipy.ndimage.label(possible, around)
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
-    depth = ndimage.distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
+    depth = scipy.ndimage.distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
     depth = depth[(slice(1, -1),) * inside.ndim]
     each, whole = float(np.prod(size)), paving.inner_volume
     found = []
     volumes = np.bincount(labels.ravel(), minlength=count + 1) * each
-    for label, where in enumerate(ndimage.find_objects(labels), start=1):
+    for label, where in enumerate(scipy.ndimage.find_objects(labels), start=1):
         own = labels[where] == label
         if volumes[label] < smallest * whole:
             continue

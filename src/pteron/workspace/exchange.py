@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import minimize  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 from pteron.workspace.lattice_minima import failing_between
@@ -242,7 +242,7 @@ def _solved(
     low, high = program.bounds.T
     step = share * (high - low)
     low, high = np.maximum(low, good - step), np.minimum(high, good + step)
-    solution = minimize(
+    solution = scipy.optimize.minimize(
         lambda z: float(program.objective @ z),
         good,
         jac=lambda z: program.objective,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import distance_transform_cdt  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 from pteron.workspace.exchange import POINTS, Program, improved
@@ -195,7 +195,7 @@ def _on_grid(
             found = [Fit(grid[at], 0.0, side, float(least[at]))]
             low, high = grid[at] - 2.0 * step, grid[at] + 2.0 * step
             continue
-        far = distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
+        far = scipy.ndimage.distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
         far = far[(slice(1, -1),) * inside.ndim]
         found = []
         while len(found) < most and far.any():

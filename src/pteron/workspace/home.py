@@ -12,14 +12,12 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.optimize import minimize  # type: ignore[import-untyped]
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
-from pteron.kernels.cache import find_text, keep_text
-from pteron.kernels.kept import EQUATIONS, name_of
+from pteron.kernels.kept import kept_result
 from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -32,9 +30,6 @@ _DRAWN = 200
 
 _MEASURES = 0.3, 0.02, 0.0
 """Least type-I and type-II measures of these poses, tried in turn; 0 where reach is small."""
-
-_SOURCES = (*EQUATIONS, "kinematics", "workspace")
-"""Packages whose source a home pose depends on: their change makes a stored one void."""
 
 _STARTS = 12
 """Random poses, the best ones, that are improved by a local search."""
@@ -112,14 +107,8 @@ def home_pose(robot: RobotLike) -> Array:
 @lru_cache(maxsize=256)
 def _stored(robot: Manipulator) -> tuple[float, ...]:
     """Return the home pose that was worked out before, in another process too, or a new one."""
-    name = name_of("home_pose", bare(robot), sources=_SOURCES)
-    text = None if name is None else find_text(name)
-    if text is not None:
-        return tuple(map(float.fromhex, text.split()))
-    found = tuple(_best(robot).tolist())
-    if name is not None:
-        keep_text(name, " ".join(map(float.hex, found)))
-    return found
+    key, packages = ("home_pose", bare(robot)), ("kinematics", "workspace")
+    return kept_result(key, packages, lambda: tuple(_best(robot).tolist()))
 
 
 def _best(robot: Manipulator) -> Array:
@@ -206,7 +195,7 @@ def _on_axis(robot: Manipulator, poses: Array) -> Array:
     # Legs of a hexapod may stand in pairs, or in two halves.
     folds = [count, *(k for k in (3, 2) if k < count)] if robot.platform.tilts else [count]
     for fold in folds:
-        turn = Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
+        turn = scipy.spatial.transform.Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
         images = poses.copy()
         images[:, :lengths] = center + beside @ (directions @ turn @ directions.T).T
         if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):
@@ -244,7 +233,7 @@ def _refined(robot: Manipulator, start: Array, moved: NDArray[np.bool_] | None =
 
     first = start[free]
     simplex = np.vstack([first, first + np.diag(_steps(robot, *_STEPS)[free])])
-    found = minimize(
+    found = scipy.optimize.minimize(
         lambda values: -float(_worth(robot, pose(values))),
         first,
         method="Nelder-Mead",

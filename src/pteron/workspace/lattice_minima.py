@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 
@@ -39,11 +38,10 @@ def failing_between(
     points.
     """
     count = len(axes)
-    size = (3,) * count + (1,)
     values = np.nan_to_num(rows, nan=-1.0)
-    lowest = values == minimum_filter(values, size=size, mode="nearest")
+    lowest = values == _of_neighbours(np.minimum, values)
     # A row that rises by less to the neighbours than to zero has none between them.
-    near = values < maximum_filter(values, size=size, mode="nearest") - values
+    near = values < _of_neighbours(np.maximum, values) - values
     found = np.argwhere(lowest & near & (values >= -_DEPTH))
     if not len(found):
         return np.empty((0, count))
@@ -69,3 +67,14 @@ def failing_between(
         step = (_BEYOND * value[:, None] / steep + _FURTHER * cell.min()) * slope / steep
         places = np.clip(places - np.where(moving, step, 0.0), least, most)
     return np.asarray(places[failing])
+
+
+def _of_neighbours(extreme: np.ufunc, values: Array) -> Array:
+    """Return the least, or the greatest, of each point's value and those of its neighbours."""
+    for axis in range(values.ndim - 1):
+        along = np.moveaxis(values, axis, 0)
+        values = values.copy()
+        found = np.moveaxis(values, axis, 0)
+        extreme(found[1:], along[:-1], out=found[1:])
+        extreme(found[:-1], along[1:], out=found[:-1])
+    return values

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
-from pteron.kinematics.sampling import joint_limits
+from pteron.kinematics.sampling import joint_limits, type_ii_sizes
 from pteron.kinematics.singularities import best_type_ii
-from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.shapes import Numbers, PerJoint, PoseLike

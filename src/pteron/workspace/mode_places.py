@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
 
@@ -108,3 +109,24 @@ def _depth(robot: Manipulator, pose: Array) -> float:
         base += np.array(leg.guide_point) + (q * np.array(leg.joint_axis) if slides else 0.0)
     away = robot.platform.at(pose)[0] - base / len(robot.legs)
     return float(away @ np.array(robot.gravity) / np.linalg.norm(robot.gravity))
+
+
+def elbow_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
+    """Return a warning that another working mode may be meant, where the platform stands upright.
+
+    Most machines hang below their base. One that stands above it, and that would hang there with
+    other elbows and much the same margin, was perhaps given the wrong ones.
+    """
+    named = next((mode for mode in modes if mode.named), None)
+    likely = next((mode for mode in modes if mode.likely), None)
+    if named is None or likely is None or (named.place, likely.place) != ("above", "below"):
+        return ()
+    return (
+        f"elbow: the platform stands {-named.depth:.2g} m above its base at {_pose(named.pose)}; "
+        f"with elbows {likely.signs} it hangs {likely.depth:.2g} m below it at "
+        f"{_pose(likely.pose)}: is that the working mode that is meant?",
+    )
+
+
+def _pose(values: Array) -> str:
+    return f"({', '.join(f'{value:.3g}' for value in values)})"

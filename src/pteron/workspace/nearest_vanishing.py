@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
@@ -256,8 +257,6 @@ class Search:
     def _programmed(self, state: Array) -> Array:
         """Return where sequential quadratic programs lead to."""
         # Kinematics load without SciPy.
-        from scipy.optimize import minimize  # type: ignore[import-untyped]
-
         k, count = len(self.moving), 1 + len(self._sizes[1])
         scale = float(state[:k] @ state[:k])
 
@@ -276,7 +275,7 @@ class Search:
                 "jac": lambda x: values(x.tobytes())[2][rows],
             }
 
-        run = minimize(
+        run = scipy.optimize.minimize(
             distance,
             state,
             jac=True,

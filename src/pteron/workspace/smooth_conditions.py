@@ -90,7 +90,7 @@ class SmoothConditions:
 
     @cached_property
     def _pose_slopes(self) -> Kernel:
-        return self._kernel("vm", "condition_pose_slopes", 1)
+        return self._kernel("vm" if compiler() is None else "c", "condition_pose_slopes", 1)
 
     @cached_property
     def _all_slopes(self) -> Kernel:
@@ -120,6 +120,4 @@ def smooth_conditions(robot: Manipulator, given: tuple[Condition, ...]) -> Smoot
     return _known(bare(robot), given)
 
 
-@lru_cache(maxsize=16)
-def _known(robot: Manipulator, given: tuple[Condition, ...]) -> SmoothConditions:
-    return SmoothConditions(robot, given)
+_known = lru_cache(maxsize=16)(SmoothConditions)

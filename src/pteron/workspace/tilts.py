@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.stats import qmc  # type: ignore[import-untyped]
 
 from pteron.bodies.vectors import PARALLEL_TOLERANCE, dot
 from pteron.errors import DataError, ModelError
@@ -85,7 +85,7 @@ class TiltedBall:
     def sampled(self) -> Array:
         """Return poses (K, m) spread over it, a third of them on its rim."""
         free = len(self.lengths) + 2
-        shares = qmc.Sobol(free, seed=0).random(_SAMPLES)
+        shares = scipy.stats.qmc.Sobol(free, seed=0).random(_SAMPLES)
         tilt = self.tilt * np.sqrt(shares[:, 0])
         tilt[: _SAMPLES // 3] = self.tilt
         azimuth = 2.0 * np.pi * shares[:, 1]

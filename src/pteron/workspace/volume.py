@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError
@@ -166,7 +166,7 @@ def _far(robot: Manipulator, size: float) -> Iterator[Array]:
 
 def deepest(depths: Callable[[Array], Array], start: Array) -> Array:
     """Return a position that is deeper inside every bound, from one that need not be inside."""
-    found = minimize(
+    found = scipy.optimize.minimize(
         lambda v: -v[-1],
         np.append(start, float(depths(start).min())),
         method="SLSQP",
@@ -196,7 +196,7 @@ def _front(
 
 def _furthest(depths: Callable[[Array], Array], start: Array, objective: Array) -> float:
     """Return the least value of objective . p inside every bound, from a position inside."""
-    found = minimize(
+    found = scipy.optimize.minimize(
         lambda p: float(objective @ p),
         start,
         jac=lambda p: objective,

@@ -28,14 +28,14 @@ from pteron.cli.main import app  # noqa: E402
 from pteron.design import read_spec, search, survey  # noqa: E402
 from pteron.maps import map_index, pose_grid, save_map  # noqa: E402
 
-DRIVE = pteron.Drive(
+DRIVE = pteron.legs.Drive(
     coulomb=0.4,
     viscous=0.2,
     offset=0.05,
     rotor_inertia=2e-5,
     ratio=50.0,
     rest_speed=2e-3,
-    stribeck=pteron.Stribeck(0.3, 0.05),
+    stribeck=pteron.legs.Stribeck(0.3, 0.05),
     rated_torque=0.64,
     max_force=200.0,
     max_speed=20.0,
@@ -53,7 +53,7 @@ def with_legs(robot, **keys):
 
 
 def with_radii(robot):
-    return replace(robot, radii=pteron.Radii(0.012, 0.015, 0.008, 0.02))
+    return replace(robot, radii=pteron.manipulator.Radii(0.012, 0.015, 0.008, 0.02))
 
 
 def robots(folder):
@@ -64,7 +64,7 @@ def robots(folder):
     machines["quadrupteron"] = with_radii(
         with_legs(pteron.load("quadrupteron"), elbow_limits=(0.1, 3.0))
     )
-    leaning = pteron.Cone((0.0, 0.0, 1.0), 1.5)
+    leaning = pteron.legs.Cone((0.0, 0.0, 1.0), 1.5)
     delta = with_legs(pteron.load("delta"), bar_length=0.1)
     delta = replace(delta, platform=replace(delta.platform, tool=(0.01, 0.02, -0.1)))
     machines["delta"] = with_radii(delta)

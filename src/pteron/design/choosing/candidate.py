@@ -5,40 +5,32 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from pteron.design.choosing.kinds import slides
+from pteron.design.choosing.margins import DENSE, margins_of
+from pteron.design.choosing.proofs import is_clear, proofs_of, told
 from pteron.design.choosing.rating import Case, Rating
+from pteron.design.choosing.room import tool_places
 from pteron.design.choosing.samples import Places, sample_poses
 from pteron.design.choosing.search import front
 from pteron.design.choosing.tool import elasticity, greatest_errors, joint_errors, tolerances
-from pteron.design.worst_cases import worst_forces, worst_speeds
-from pteron.dynamics import drive_forces
 from pteron.errors import PteronError
 from pteron.indices import stiffness
 from pteron.kernels import Array
-from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
 from pteron.manipulator.saving import text_of
 from pteron.motion import Path, limits_of, time_optimal
-from pteron.workspace import Box, Cylinder, Proof, Region, prove
+from pteron.workspace import Proof, clearance
 
-_TRIED = 8
-"""Designs of which a proof is tried, the best first."""
+_WORST, _ROUNDS = 8, 4
+"""Worst sample poses about which nearer bodies are sought, and halvings of the distance."""
 
-_NOTHING = 1e-9
-"""Least force, speed or torque by which a limit is divided."""
-
-_DENSE = 7
-"""Poses along each side of a box at which errors and stiffness are looked at last."""
-
-_BOXES = 60_000
-"""Boxes after which a proof is given up."""
-
-_LONGER = 0.05
-"""Share of its travel by which a guide is made longer where a proof meets its end."""
+_TRIED = 9
+"""Designs of which a proof is tried: the best, and then ever further behind, as neighbours fail
+alike."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +49,8 @@ class Candidate:
         Designs that were rated, and those of them that keep all that is asked.
     proved : str
         What is proved of the workspace, in words.
+    clear : str
+        Whether it is proved, or sampled, that no two bodies touch.
     dimensions : dict
         m, by name.
     figures : dict
@@ -79,6 +73,7 @@ class Candidate:
     evaluated: int
     kept: int
     proved: str = ""
+    clear: str = ""
     dimensions: dict[str, float] = field(default_factory=dict)
     figures: dict[str, float] = field(default_factory=dict)
     drives: tuple[str, ...] = ()
@@ -104,8 +99,8 @@ def judged(case: Case, found: list[Rating]) -> Candidate:
         nearest = min(found, key=lambda one: one.cost(objectives[0]))
         return Candidate(case.kind.name, False, tuple(nearest.told.values()), *counts)
     why = ""
-    for one in good[:_TRIED]:
-        proofs = _proofs(case, one)
+    for one in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
+        proofs, one.robot = proofs_of(case, one)
         bad = next((p for p in proofs if p.counterexample is not None), None)
         why = str(bad)
         if bad is None:
@@ -123,6 +118,8 @@ def _exceeded(case: Case, found: Candidate) -> str:
     for name, asked in bounds.items():
         if asked is not None and figures[name] > asked.most:
             return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * asked.most:g} mm asked"
+    if figures["clearance"] < job.floors.clearance:
+        return f"not so: a clearance of {1e3 * figures['clearance']:.3g} mm"
     names = ("rated_margin", "peak_margin", "speed_margin")
     least = min(figures.get(name, np.inf) for name in names)
     return f"not so: the drives' margin is {least:.3g} at {found.worst}" if least < 1.0 else ""
@@ -134,48 +131,6 @@ def shown_objectives(objectives: Sequence[str]) -> list[str]:
     return list(objectives) if len(objectives) > 1 else [objectives[0], other]
 
 
-def _proofs(case: Case, one: Rating) -> list[Proof]:
-    """Return proofs of the workspace; guides that it meets the end of are made longer."""
-    floors = case.job.floors
-    found: list[Proof] = []
-    for _ in range(4):
-        robot = one.robot
-        assert robot is not None  # it keeps all that is asked
-        regions = list(_regions(case, robot, one.middle))
-        found = [
-            prove(robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_BOXES)
-            for region in regions
-        ]
-        causes = {c.leg for proof in found if not proof.holds for c in proof.causes}
-        ended = {i for i in causes if i and slides(robot.legs[i - 1])}
-        if not ended:
-            break
-        legs = list(robot.legs)
-        for i in ended:
-            low, high = legs[i - 1].limits or (0.0, 0.0)
-            spare = _LONGER * (high - low)
-            legs[i - 1] = replace(legs[i - 1], limits=(low - spare, high + spare))
-        one.robot = replace(robot, legs=tuple(legs))
-    return found
-
-
-def _regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
-    """Return the workspace as regions: each pose of a list, a cylinder at each turn."""
-    space, count = case.job.workspace, len(robot.platform.lengths)
-    if space.poses is not None:
-        return [Box(tuple(pose), tuple(pose)) for pose in middle + case.poses]
-    if space.radius is not None and space.height is not None:
-        turns = np.unique(case.poses[:, count:], axis=0)
-        centers = ((*middle[:count], *(middle[count:] + turn)) for turn in turns)
-        return [Cylinder(tuple(map(float, c)), space.radius, space.height) for c in centers]
-    half = np.abs(case.poses).max(axis=0)
-    half[:count] = case.half[:count]
-    low, high = middle - half, middle + half
-    if space.turn is not None:
-        low[-1], high[-1] = middle[-1] + space.turn[0], middle[-1] + space.turn[1]
-    return [Box(tuple(low.tolist()), tuple(high.tolist()))]
-
-
 def _candidate(
     case: Case, one: Rating, proofs: list[Proof], counts: tuple[int, int], best: list[Rating]
 ) -> Candidate:
@@ -183,43 +138,65 @@ def _candidate(
     assert robot is not None  # it keeps all that is asked
     carrying = case.loaded(robot)
     figures = dict(one.figures)
-    margins, worst, place = _margins(case, carrying, one)
-    figures |= margins
-    poses = one.middle + sample_poses(case.job, robot, _DENSE)
+    time = case.kind.numbers(one.values).get("time")
+    margins = margins_of(case, carrying, one.middle, time)
+    figures |= margins.figures
+    poses = one.middle + sample_poses(case.job, robot, DENSE)
+    figures["clearance"] = _least_clearance(case, robot, one.middle, poses)
     if case.job.accuracy is not None:
         figures["error"] = _error(case, robot, one, poses)
     if case.job.stiffness is not None:
         springs = elasticity(case.sections(one), [o.gearbox.stiffness for o in one.options])
         least = stiffness(robot, poses, springs).least.min()
         figures["deflection"] = float(case.job.stiffness.force / least)
-    times = _reached(case, carrying, one, place)
+    times = _reached(case, carrying, one, margins.place)
     objectives = shown_objectives(case.job.objectives)
     return Candidate(
         case.kind.name,
         True,
         (),
         *counts,
-        _proof_words(case, proofs),
+        told(case, proofs),
+        _clear_words(case, robot, one.middle, len(poses)),
         _dimensions(robot),
         {name: value for name, value in (figures | times).items() if np.isfinite(value)},
         tuple(option.name for option in one.options),
-        worst,
+        margins.worst,
         tuple({name: r.figures[name] for name in objectives} for r in best),
         text_of(replace(robot, name=f"{case.kind.name}-chosen")),
         tuple(one.middle.tolist()),
     )
 
 
-def _proof_words(case: Case, proofs: Sequence[Proof]) -> str:
-    boxes = sum(proof.boxes for proof in proofs)
-    if case.job.workspace.poses is not None:
-        return f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
-    if all(proof.holds for proof in proofs):
-        poses = "every pose" if len(proofs) == 1 else f"every position, at {len(proofs)} turns,"
-        return f"proved: {poses} keeps reach, limits and floors, by intervals over {boxes} boxes"
+def _clear_words(case: Case, robot: Manipulator, middle: Array, count: int) -> str:
+    least = case.job.floors.clearance
+    kept = f"come nearer than {1e3 * least:g} mm" if least else "touch"
+    if is_clear(case, robot, middle):
+        return f"proved: no two links, guides or the platform {kept}"
     return (
-        f"kept at {len(case.poses)} sample poses; intervals over {boxes} boxes do not decide of all"
+        f"no two links, guides or the platform {kept} at {count} sample poses and about the worst "
+        "of them; not proved"
     )
+
+
+def _least_clearance(case: Case, robot: Manipulator, middle: Array, poses: Array) -> float:
+    """Return the least distance of two bodies, m, at poses, and ever nearer about the worst."""
+    values = clearance(robot, poses).least
+    least, center = float(values.min()), tool_places(robot, middle[None])[0]
+    if case.job.workspace.poses is not None:
+        return least
+    count = len(robot.platform.lengths)
+    offsets = np.zeros((3**count, robot.freedom))
+    offsets[:, :count] = list(product((-1.0, 0.0, 1.0), repeat=count))
+    step = np.append(case.half[:count] / (DENSE - 1), np.zeros(robot.freedom - count))
+    for _ in range(_ROUNDS):
+        worst = poses[np.argsort(values)[:_WORST]]
+        poses = (worst[:, None] + step * offsets).reshape(-1, robot.freedom)
+        away = np.abs(tool_places(robot, poses) - center)
+        poses = poses[(away <= case.half + 1e-9).all(axis=1)]
+        values = clearance(robot, poses).least
+        least, step = min(least, float(values.min())), step / 2.0
+    return least
 
 
 def _dimensions(robot: Manipulator) -> dict[str, float]:
@@ -240,58 +217,6 @@ def _dimensions(robot: Manipulator) -> dict[str, float]:
     return found | ({"stroke": max(strokes)} if strokes else {})
 
 
-def _margins(
-    case: Case, robot: Manipulator, one: Rating
-) -> tuple[dict[str, float], str, tuple[Places, int] | None]:
-    """Return the drives' least margins with friction and rotors, and where the least of all is.
-
-    `robot` carries the payload, and has its drives.
-    """
-    drives = [leg.drive for leg in robot.legs]
-    most = np.array([d.max_force or np.inf for d in drives if d is not None])
-    rated = np.array([d.rated_force or np.inf for d in drives if d is not None])
-    fastest = np.array([d.max_speed or np.inf for d in drives if d is not None])
-    found = {"rated_margin": np.inf, "peak_margin": np.inf, "speed_margin": np.inf}
-    least, worst, place = np.inf, "", None
-    time = case.kind.numbers(one.values).get("time", 1.0)
-    for cycle in case.cycles:
-        duration = cycle.duration or time
-        states = case.states(cycle, one.middle, duration)
-        forces = drive_forces(robot, *states)
-        rates = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
-        means = np.trapezoid(forces**2, axis=1) / (forces.shape[1] - 1) * duration
-        held = cycle.dwell * forces[:, -1] ** 2
-        rms = np.sqrt((means + held) / (duration + cycle.dwell))
-        several = {
-            "rated_margin": (rated / np.maximum(rms, _NOTHING)).min(axis=-1),
-            "peak_margin": (most / np.maximum(np.abs(forces).max(axis=1), _NOTHING)).min(axis=-1),
-            "speed_margin": (fastest / np.maximum(np.abs(rates).max(axis=1), _NOTHING)).min(
-                axis=-1
-            ),
-        }
-        for name, values in several.items():
-            found[name] = min(found[name], float(values.min()))
-        every = np.min(list(several.values()), axis=0)
-        if every.min() < least:
-            k = int(every.argmin())
-            least, worst, place = float(every[k]), cycle.words(k), (cycle, k)
-    asked = case.job.motion
-    if asked.acceleration or asked.speed:
-        places = sample_poses(case.job, robot, _DENSE)
-        poses, speed = one.middle + places, max(asked.speed, _NOTHING)
-        forces = np.maximum(worst_forces(robot, poses, speed, asked.acceleration), _NOTHING)
-        rates = np.maximum(worst_speeds(robot, poses, speed), _NOTHING)
-        peak, fast = float((most / forces).min()), float((fastest / rates).min())
-        found["peak_margin"] = min(found["peak_margin"], peak)
-        found["speed_margin"] = min(found["speed_margin"], fast)
-        if min(peak, fast) < least:
-            at = (most / forces).min(axis=-1) if peak < fast else (fastest / rates).min(axis=-1)
-            corner = places[int(at.argmin())][: len(robot.platform.lengths)]
-            told = ", ".join(f"{1e3 * x:+.0f}" for x in corner)
-            worst = f"the motion in any direction, at ({told}) mm"
-    return found, worst, place
-
-
 def _error(case: Case, robot: Manipulator, one: Rating, poses: Array) -> float:
     """Return the greatest error of the tool, m, as the job counts it."""
     asked = case.job.accuracy
@@ -308,8 +233,7 @@ def _reached(
     if place is None:
         return {}
     cycle, k = place
-    shift = cycle.shifts[k][: len(robot.platform.lengths)]
-    path = _Moved(cycle.path, one.middle, shift, float(cycle.turns[k]))
+    path = _Moved(cycle.at(np.array([k])), one.middle)
     # Drives are left what the margin asks for.
     share = case.job.motors.margin
     drives = [leg.drive for leg in robot.legs if leg.drive is not None]
@@ -324,14 +248,10 @@ def _reached(
 
 
 class _Moved(Path):
-    """A path from the middle of a workspace, at a place and turned about the upright."""
+    """A path from the middle of a workspace at one place."""
 
-    def __init__(self, path: Path, middle: Array, shift: Array, turn: float) -> None:
-        self._path, self._at = path, middle.copy()
-        self._at[: len(shift)] += shift
-        self._turn = np.eye(len(middle))
-        c, s = np.cos(turn), np.sin(turn)
-        self._turn[:2, :2] = [[c, s], [-s, c]]
+    def __init__(self, place: Places, middle: Array) -> None:
+        self._place, self._middle, self._path = place, middle, place.path
 
     @property
     def length(self) -> float:
@@ -342,8 +262,8 @@ class _Moved(Path):
         return self._path.rests
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
-        pose, first, second = self._path.at(s)
-        return self._at + pose @ self._turn, first @ self._turn, second @ self._turn
+        pose, first, second = (part[0] for part in self._place.moved(*self._path.at(s)))
+        return self._middle + pose, first, second
 
     def place(self, s: float) -> str:
         return self._path.place(s)

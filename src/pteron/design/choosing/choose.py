@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
+import os
+import signal
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context, parent_process
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -18,17 +22,22 @@ from pteron.atomic import write_text
 from pteron.design.choosing.candidate import Candidate, judged
 from pteron.design.choosing.drives import GEARBOXES, MOTORS, Options, read_lists
 from pteron.design.choosing.job import Job
-from pteron.design.choosing.kinds import Build, Kind, fitting_kinds
+from pteron.design.choosing.kinds import Kind, fitting_kinds
 from pteron.design.choosing.rating import Case
 from pteron.design.choosing.samples import half_sides
 from pteron.design.choosing.search import search_kind
 from pteron.design.evolution import one_thread
-from pteron.errors import DataError
+from pteron.errors import DataError, PteronError
 from pteron.json_values import json_ready
-from pteron.maps.plan import RESULTS
+from pteron.kernels.kept import EQUATIONS, name_of
+from pteron.manipulator import load
+from pteron.manipulator.saving import text_of
 
 _SEARCH = 0.9
 """Share of a kind's work that is its search."""
+
+_SOURCES = (*EQUATIONS, "design", "dynamics", "indices", "kinematics", "motion", "workspace")
+"""The packages that a kept kind depends on: of other code it is searched again."""
 
 _KEPT = "kinds"
 """Folder of the kinds that are finished, in that of the results."""
@@ -132,10 +141,7 @@ def choose_machine(
 def cases_of(job: Job) -> dict[str, Case]:
     """Return the job for each kind that can do the motion."""
     space = job.workspace
-    turns, tilts = space.turn is not None, space.tilt is not None
-    names = fitting_kinds(job.kinds, job.lengths, turns, tilts)
-    if not names:
-        raise DataError("no kind of machine in the catalog has these freedoms")
+    names = fitting_kinds(job.kinds, job.lengths, space.turn is not None, space.tilts)
     files = (
         job.file(job.motors.list or str(MOTORS)),
         job.file(job.motors.gearboxes or str(GEARBOXES)),
@@ -150,14 +156,28 @@ def cases_of(job: Job) -> dict[str, Case]:
             f"price: asked for, but {unpriced[0]} has none; add a column price, or ask for "
             '"rated_power"'
         )
+    names = [name for name in names if _driven(name, options, job)]
     needed = 2.0 * float(half_sides(job).max())
-    stocks = {"upper": job.links.upper, "lower": job.links.lower}
-    build = Build(job.links.plate, job.links.carriage)
-    free = job.free
-    return {
-        name: Case(job, Kind(name, max(needed, 1e-3), stocks, build, free), options)
-        for name in names
-    }
+    tool = job.payload.tool
+    kinds = (Kind(name, max(needed, 1e-3), job.links, tool, job.free) for name in names)
+    found = {kind.name: Case(job, kind, options) for kind in kinds}
+    for case in found.values():
+        try:
+            case.loaded(case.kind.robot)
+        except PteronError as error:
+            raise DataError(f"payload: {error}") from None
+    return found
+
+
+def _driven(name: str, options: Mapping[str, Options], job: Job) -> bool:
+    """Say whether there are gearboxes for a kind's joints; refuse a kind that is asked for."""
+    units = {leg.joint.unit for leg in load(name).legs}
+    lacking = [unit for unit in sorted(units) if not options[unit].all]
+    if lacking and job.kinds is not None:
+        raise DataError(
+            f'{job.motors.gearboxes}: no gearbox with joint = "{lacking[0]}", as {name} needs'
+        )
+    return not lacking
 
 
 def _candidate(case: Case, progress: Callable[[float], None]) -> Candidate:
@@ -174,9 +194,9 @@ def _searched(
         for name, case in cases.items():
             yield name, _candidate(case, partial(tell, name))
         return
-    context = get_context("spawn")
+    context, others = get_context("spawn"), set(active_children())
     done = context.Array("d", len(cases))
-    with ProcessPoolExecutor(workers, context, _begin, (done,)) as pool:
+    with ProcessPoolExecutor(workers, context, _begin, (done,)) as pool, _ended_with(others):
         jobs = {
             pool.submit(_in_process, case, k): name for k, (name, case) in enumerate(cases.items())
         }
@@ -190,12 +210,33 @@ def _searched(
                 yield jobs[one], one.result()
 
 
+@contextmanager
+def _ended_with(others: set[BaseProcess]) -> Iterator[None]:
+    """End the processes that were started since, where the work is broken off."""
+    try:
+        yield
+    except BaseException:
+        for process in set(active_children()) - others:
+            process.terminate()
+        raise
+
+
 _shares: Any = None
 
 
 def _begin(shares: Any) -> None:
     global _shares
     _shares = shares
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when that which asked has ended, even if it was killed."""
+    parent = parent_process()
+    assert parent is not None  # this one was spawned
+    parent.join()
+    os._exit(1)
 
 
 def _in_process(case: Case, k: int) -> Candidate:
@@ -214,8 +255,10 @@ class _Kept:
     def _digest(self, name: str) -> str:
         job = self._job.model_dump(mode="json", exclude={"kinds"})
         options = {unit: repr(some.all) for unit, some in self._cases[name].options.items()}
-        text = json.dumps([RESULTS, name, job, options], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        text = json.dumps(
+            [name, job, options, text_of(self._cases[name].kind.robot)], sort_keys=True
+        )
+        return str(name_of("kind", text, sources=_SOURCES))
 
     def find(self, name: str) -> Candidate | None:
         """Return a kind that an earlier run has finished."""

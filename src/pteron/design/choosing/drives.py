@@ -96,9 +96,13 @@ def prices(path: str | Path, count: int) -> list[float]:
     if Path(path).suffix.lower() == ".toml":
         return [float("nan")] * count
     table = read_table(path)
-    return (
-        table.numbers(("price",))[:, 0].tolist() if "price" in table.columns else [np.nan] * count
-    )
+    if "price" not in table.columns:
+        return [np.nan] * count
+    found = table.numbers(("price",))[:, 0]
+    if (found < 0.0).any():
+        k = int(found.argmin())
+        raise DataError(f"{table.place(k)}: price: {found[k]:g} given, 0 or more expected")
+    return list(map(float, found))
 
 
 @dataclass(frozen=True)
@@ -184,8 +188,10 @@ class JointLoads:
 
     Attributes
     ----------
-    squares : array, shape (B, n, 3)
-        Means over each cycle, its rest included, of f^2, f q'' and q''^2.
+    squares : tuple of array, shape (B, n, 3)
+        Of each cycle at its places the means, its rest included, of f^2, f q'' and q''^2.
+    shares : array, shape (C,)
+        Of the time that each cycle has in a duty cycle of all; empty where each counts by itself.
     forces, accelerations : array, shape (S, n)
         Of all samples.
     speeds : array, shape (n,)
@@ -194,7 +200,8 @@ class JointLoads:
         Worst force at the asked acceleration and speed in any direction, and acceleration there.
     """
 
-    squares: Array
+    squares: tuple[Array, ...]
+    shares: Array
     forces: Array
     accelerations: Array
     speeds: Array
@@ -204,9 +211,13 @@ class JointLoads:
         """Return what options can do over what legs ask: rated, peak torque, speed, (3, O)."""
         ratio, inertia, rated, peak, speed, *_ = options.numbers
         one, i, j = list(legs), ratio[:, None], inertia[:, None]
-        f, mixed, a = np.moveaxis(self.squares[:, one].reshape(-1, 3), -1, 0)
-        square = f / i**2 + 2.0 * j * mixed + (j * i) ** 2 * a
-        found = [rated / np.sqrt(np.maximum(square, 1e-30).max(axis=1, initial=1e-30))]
+        worst_squares = []
+        for part in self.squares:
+            f, mixed, a = np.moveaxis(part[None, :, one], -1, 0)
+            square = f / i[..., None] ** 2 + 2.0 * j[..., None] * mixed
+            worst_squares.append((square + (j * i)[..., None] ** 2 * a).max(axis=1))
+        square = in_duty(np.array(worst_squares), self.shares).max(axis=1)
+        found = [rated / np.sqrt(np.maximum(square, 1e-30))]
         force, rise = (part[:, one].ravel() for part in (self.forces, self.accelerations))
         force, rise = _outermost(force, rise)
         worst = np.abs(force / i + j * i * rise).max(axis=1, initial=0.0)
@@ -215,6 +226,13 @@ class JointLoads:
         found.append(peak / np.maximum(worst, 1e-15))
         fastest = float(self.speeds[one].max())
         return np.array([*found, speed / np.maximum(ratio * fastest, 1e-15)])
+
+
+def in_duty(worst: Array, shares: Array) -> Array:
+    """Return worst values of cycles (C, ...) as the mean over a duty cycle, or the greatest."""
+    if len(shares):
+        return np.tensordot(shares / shares.sum(), worst, axes=1)
+    return np.asarray(worst.max(axis=0))
 
 
 def _outermost(x: Array, y: Array) -> tuple[Array, Array]:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    field_validator,
+    model_validator,
+)
 
 from pteron.bodies.tables import Count, Number, Table, Three, Two
+from pteron.design.choosing.known_kinds import KINDS
 from pteron.design.loads import PayloadTable, Positive
 from pteron.design.spec import Floor
 from pteron.errors import DataError, ModelError, shown
@@ -22,6 +31,9 @@ _ABSENT = "no such file; it should describe what a machine must do"
 _FAR = 20.0
 """Metres from which on a workspace or a cell was probably given in millimetres."""
 
+_TURNS = 7.0
+"""Radians from which on a turn was probably given in degrees."""
+
 OBJECTIVES = {
     "price": "",
     "rated_power": "W",
@@ -33,28 +45,55 @@ OBJECTIVES = {
 }
 """The objectives that a machine can be chosen for, less being better, with units."""
 
-Positions = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
-
 
 def _listed(given: Any) -> Any:
     return [given] if isinstance(given, str) else given
 
 
-class WorkspaceTable(Table):
-    """`[workspace]`: where the platform's point P must work; it has one of three shapes."""
+def _near(given: Any) -> Any:
+    """Refuse lengths, m, that are those of no cell."""
+    lengths = np.abs(given).ravel()
+    if lengths.max() > _FAR:
+        raise ValueError(f"{lengths.max():g} m given: are these mm?")
+    return given
 
-    size: Positions | None = Field(None, description="sides of a box, m; two for a flat one")
-    radius: Positive | None = Field(None, description="of an upright cylinder, m")
-    height: Positive | None = Field(None, description="of the cylinder, m")
+
+def _named_once(given: list[str], known: Collection[str]) -> list[str]:
+    for k, name in enumerate(given):
+        if name not in known:
+            raise ValueError(f"{shown(name)} is none of {', '.join(known)}")
+        if name in given[:k]:
+            raise ValueError(f"{shown(name)} given twice")
+    return given
+
+
+Near = Annotated[Positive, AfterValidator(_near)]
+"""A length above 0 and of a cell's size, m."""
+
+Place = Annotated[Three, AfterValidator(_near)]
+"""A place in a cell, m."""
+
+
+class WorkspaceTable(Table):
+    """`[workspace]`: where the tool's centre point must work; it has one of three shapes."""
+
+    size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = Field(
+        None, description="sides of a box, m; two for a flat one"
+    )
+    radius: Near | None = Field(None, description="of an upright cylinder, m")
+    height: Near | None = Field(None, description="of the cylinder, m")
     poses: Annotated[list[tuple[Number, ...]], Field(min_length=1)] | None = Field(
         None, description="positions, all of which must be met: x y z, m"
     )
-    center: Three | None = Field(
+    center: Place | None = Field(
         None, description="its middle in the cell, m; left out, it may be anywhere in the cell"
     )
     turn: Two | None = Field(None, description="least and greatest turn about the upright, rad")
     tilt: Annotated[Number, Field(gt=0.0, lt=1.5)] | None = Field(
-        None, description="roll and pitch each, to both sides, rad"
+        None, description="of the platform to every side, rad: it fills a cone"
+    )
+    directions: Annotated[list[Three], Field(min_length=1)] | None = Field(
+        None, description="of the platform's z, at each of which it must work; level is [0, 0, 1]"
     )
 
     @model_validator(mode="after")
@@ -66,22 +105,48 @@ class WorkspaceTable(Table):
                 f"{', '.join(given) or 'nothing'} given; a box has size, a cylinder radius and "
                 "height, anything else a list of poses"
             )
-        lengths = [*(self.size or ()), self.radius or 0.0, self.height or 0.0]
-        if max(lengths) > _FAR:
-            raise ValueError(f"a workspace of {max(lengths):g} m given: are these mm?")
         if self.poses is not None and {len(one) for one in self.poses} not in ({2}, {3}):
             raise ValueError("poses: each has x y, or x y z")
+        _near(self.poses or 0.0)
         if self.turn is not None and not self.turn[0] < self.turn[1]:
             raise ValueError(f"turn: {list(self.turn)} given, [low, high] expected, rad")
+        if self.turn is not None and max(map(abs, self.turn)) > _TURNS:
+            raise ValueError(f"turn: {list(self.turn)} rad given: are these degrees?")
+        if self.directions is not None and not all(one[2] > 0.0 for one in self.directions):
+            raise ValueError("directions: each leads upwards; z above 0 expected")
         return self
+
+    @property
+    def tilts(self) -> bool:
+        """Whether it asks for tilts."""
+        return self.tilt is not None or self.directions is not None
+
+    @property
+    def words(self) -> str:
+        """Its shape in words."""
+        if self.size is not None:
+            return f"workspace {' x '.join(f'{1e3 * x:g}' for x in self.size)} mm"
+        if self.poses is not None:
+            return f"workspace of {len(self.poses)} poses"
+        return f"workspace: cylinder of radius {self.radius:g} m, height {self.height:g} m"
+
+
+class LoadTable(PayloadTable):
+    """`[payload]`: what the platform carries, a tool with its centre point among it."""
+
+    tool: Place = Field(
+        (0.0, 0.0, 0.0),
+        description="the tool's centre point in the platform's frame, m: what must reach",
+    )
 
 
 class CycleTable(Table):
-    """`[[cycles]]`: a path of the platform through points, again and again."""
+    """`[[cycles]]`: a path of the tool through points, again and again."""
 
     name: str | None = None
     points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] = Field(
-        description="from the middle of the workspace, m"
+        description="from the middle of the workspace, m; a turn about the upright may follow, or "
+        "roll, pitch and yaw, rad"
     )
     corner: Annotated[Number, Field(ge=0.0)] = Field(
         0.0, description="metres before and after a point where the path leaves its lines; 0: stop"
@@ -91,6 +156,10 @@ class CycleTable(Table):
     )
     dwell: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="rest after it, s")
     back: bool = Field(False, description="whether the path goes back as it came")
+    share: Positive | None = Field(
+        None,
+        description="how often it is done in a duty cycle of all; without it each counts by itself",
+    )
     anywhere: bool = Field(
         True, description="whether it may be at any place and in any direction of the workspace"
     )
@@ -116,6 +185,11 @@ class AccuracyTable(Table):
     length: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of links, m")
     angle: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of axes, rad")
 
+    @property
+    def of_parts(self) -> bool:
+        """Whether errors of the machine's parts count, beside those of its drives."""
+        return bool(self.point or self.length or self.angle)
+
 
 class StiffnessTable(Table):
     """`[stiffness]`: how far the tool may give way."""
@@ -140,8 +214,8 @@ class KeepOutTable(Table):
 class CellTable(Table):
     """`[cell]`: the room for the machine."""
 
-    footprint: tuple[Positive, Positive] | None = Field(None, description="along x and y, m")
-    height: Positive | None = Field(None, description="m")
+    footprint: tuple[Near, Near] | None = Field(None, description="along x and y, m")
+    height: Near | None = Field(None, description="m")
     low: Three | None = Field(None, description="of a cell with a place of its own, m")
     high: Three | None = Field(None, description="m")
     margin: Annotated[Number, Field(ge=0.0)] = Field(
@@ -173,6 +247,7 @@ class LinksTable(Table):
     )
     plate: Positive = Field(0.006, description="thickness of an aluminium platform, m")
     carriage: Positive = Field(0.4, description="mass of what slides on a guide, kg")
+    guide: Positive = Field(0.015, description="half the width of a guide, m")
 
     @field_validator("upper", "lower")
     @classmethod
@@ -190,6 +265,9 @@ class FloorsTable(Table):
 
     type_i: Floor = 0.1
     type_ii: Floor = 0.05
+    clearance: Annotated[Number, Field(ge=0.0)] = Field(
+        0.0, description="least distance of two bodies from surface to surface, m"
+    )
 
 
 class SearchTable(Table):
@@ -213,7 +291,7 @@ class Job(Table):
     """A job that a machine must do, as its file has it."""
 
     workspace: WorkspaceTable
-    payload: PayloadTable = Field(default_factory=lambda: PayloadTable.model_validate({}))
+    payload: LoadTable = Field(default_factory=lambda: LoadTable.model_validate({}))
     cycles: list[CycleTable] = Field(default_factory=list)
     motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
     accuracy: AccuracyTable | None = None
@@ -224,7 +302,7 @@ class Job(Table):
     links: LinksTable = Field(default_factory=lambda: LinksTable.model_validate({}))
     floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
     most: BoundTable = Field(default_factory=lambda: BoundTable.model_validate({}))
-    kinds: Annotated[list[str], Field(min_length=1)] | None = Field(
+    kinds: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
         None, description="to choose from; else all that can do it"
     )
     objectives: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
@@ -234,6 +312,16 @@ class Job(Table):
 
     _folder: Path = PrivateAttr(Path())
 
+    @field_validator("objectives")
+    @classmethod
+    def _known_objectives(cls, given: list[str]) -> list[str]:
+        return _named_once(given, OBJECTIVES)
+
+    @field_validator("kinds")
+    @classmethod
+    def _known_kinds(cls, given: list[str] | None) -> list[str] | None:
+        return given and _named_once(given, KINDS)
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         faults = list(self._faults())
@@ -242,9 +330,6 @@ class Job(Table):
         return self
 
     def _faults(self) -> Iterator[str]:
-        for name in self.objectives:
-            if name not in OBJECTIVES:
-                yield f"objectives: {shown(name)} is none of {', '.join(OBJECTIVES)}"
         if not self.cycles and not self.motion.acceleration:
             yield "no [[cycles]] and no [motion] acceleration: nothing says what the motors must do"
         if self.free and "cycle_time" not in self.objectives and self.most.cycle_time is None:
@@ -255,18 +340,47 @@ class Job(Table):
         if "cycle_time" in self.objectives and not self.free:
             yield "objectives: cycle_time, but every cycle has its duration; leave one out"
         for k, cycle in enumerate(self.cycles, start=1):
-            if {len(point) for point in cycle.points} != {self.lengths}:
-                yield f"cycles[{k}]: points of {self.lengths} numbers expected, as the workspace's"
+            yield from (f"cycles[{k}]: {text}" for text in self._cycle_faults(cycle))
+        if 0 < sum(cycle.share is None for cycle in self.cycles) < len(self.cycles):
+            yield "cycles: share given of some; give each its share, or none"
         if (self.cell.low is None) != (self.cell.high is None):
             yield "cell: low and high go together"
+        elif self.cell.low is not None and not (np.array(self.cell.low) < self.cell.high).all():
+            yield f"cell: low {list(self.cell.low)} is not below high {list(self.cell.high or ())}"
         elif self.cell.low is not None and self.workspace.center is None:
             yield (
                 "cell: low and high need [workspace] center; of a workspace that floats give "
                 "footprint and height"
             )
-        for k, cycle in enumerate(self.cycles, start=1):
-            if any(a == b for a, b in pairwise(cycle.points)):
-                yield f"cycles[{k}]: two points that follow each other are the same"
+
+    def _cycle_faults(self, cycle: CycleTable) -> Iterator[str]:
+        space, k = self.workspace, self.lengths
+        sizes = {len(point) for point in cycle.points}
+        known = {2: "x y", 3: "x y z"}[k]
+        if len(sizes) > 1 or not sizes <= {k, k + 1, k + 3 * (k == 3)}:
+            tilting = f", or {known} roll pitch yaw" if k == 3 else ""
+            yield (
+                f"points of {' and '.join(map(str, sorted(sizes)))} numbers given, {known} "
+                f"expected, as of the workspace, or {known} turn{tilting}"
+            )
+            return
+        if any(a == b for a, b in pairwise(cycle.points)):
+            yield "two points that follow each other are the same"
+        angles = np.array(cycle.points)[:, k:]
+        if not angles.any():
+            return
+        low, high = float(angles[:, -1].min()), float(angles[:, -1].max())
+        allowed = space.turn or (0.0, 0.0)
+        if low < allowed[0] or high > allowed[1]:
+            given = "not given" if space.turn is None else f"{list(space.turn)}"
+            yield (
+                f"it turns from {low:g} to {high:g} rad, and [workspace] turn is {given}; "
+                f"at least [{min(low, 0.0):g}, {max(high, 0.0):g}] is needed"
+            )
+        tilt = float(np.arccos(np.cos(angles[:, :-1]).prod(axis=1)).max())
+        if tilt > (space.tilt or 0.0) + 1e-9:
+            given = "not given" if space.tilt is None else f"{space.tilt:g}"
+            yield f"it tilts by {tilt:.4g} rad, and [workspace] tilt is {given}; give so much"
 
     @property
     def lengths(self) -> int:

@@ -9,32 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from pteron.bodies.vectors import Vector
+from pteron.design.choosing.job import LinksTable
+from pteron.design.choosing.known_kinds import KINDS
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
-from pteron.manipulator import Manipulator, load
+from pteron.manipulator import Manipulator, Radii, load
 from pteron.manipulator.dimensions import Stock
+from pteron.toml import told
 from pteron.workspace import home_pose
-
-KINDS: dict[str, tuple[str, str]] = {
-    "delta": ("base_radius platform_radius crank", "z"),
-    "linear-delta": ("base_radius platform_radius", "z"),
-    "orthoglide": ("", "xyz"),
-    "tripteron": ("crank", "xyz"),
-    "delta-4": ("base_radius platform_radius crank", "z"),
-    "h4": ("base_radius crank", "yz"),
-    "par4": ("base_radius crank", "z"),
-    "quadrupteron": ("crank", "xyz"),
-    "hexa": ("base_radius platform_radius crank", "z"),
-    "hexaglide": ("base_radius platform_radius", "yz"),
-    "stewart": ("base_radius platform_radius", "z"),
-    "five-bar": ("base_radius crank", "y"),
-    "3-rrr": ("base_radius platform_radius crank", "xy"),
-    "3-prr": ("base_radius platform_radius", "xy"),
-    "3-rpr": ("base_radius platform_radius", "xy"),
-}
-"""Of each kind the dimensions that vary beside the size, and the coordinates of its place that do:
-the others are those of its plane or axis of symmetry."""
 
 _POWERS = {"m": 3, "g": 4, "I": 5}
 """Powers of the size with which masses, first and second moments grow."""
@@ -50,14 +34,6 @@ _ALUMINIUM = 2700.0
 
 
 @dataclass(frozen=True)
-class Build:
-    """What moving parts are made of: a plate's thickness, m, and a carriage's mass, kg."""
-
-    plate: float
-    carriage: float
-
-
-@dataclass(frozen=True)
 class Kind:
     """A kind of machine, whose designs are few numbers.
 
@@ -67,34 +43,34 @@ class Kind:
         In the catalog.
     needed : float
         The workspace's greatest side, m.
-    stocks : mapping of str to sequence of str
-        What upper and lower links may be cut from.
-    build : Build
-        Of the other parts.
+    links : LinksTable
+        What moving parts are made of.
+    tool : vector
+        The tool's centre point in the platform's frame, m.
     free : bool
         Whether a cycle's time is one of the numbers.
     """
 
     name: str
     needed: float
-    stocks: Mapping[str, Sequence[str]]
-    build: Build
+    links: LinksTable
+    tool: Vector = (0.0, 0.0, 0.0)
     free: bool = False
 
     @cached_property
     def robot(self) -> Manipulator:
         """The catalog's machine; what slides is without limits, for they follow from the job.
 
-        So are the joints at a hexapod's rams, whose cones follow from its proportions.
+        So are ball joints, whose cones follow from a machine's proportions.
         """
         found = load(self.name)
         legs = []
         for leg in found.legs:
-            ends = {"limits": None} if slides(leg) else {}
-            if hasattr(leg, "base_cone"):
-                ends |= {"base_cone": None, "platform_cone": None}
-            legs.append(replace(leg, **ends))
-        return replace(found, legs=tuple(legs), radii=None)
+            cones = (f"{end}_cone" for end in ("base", "tip", "platform"))
+            ends = dict.fromkeys(cone for cone in cones if hasattr(leg, cone))
+            legs.append(replace(leg, **ends | ({"limits": None} if slides(leg) else {})))
+        platform = replace(found.platform, tool=self.tool)
+        return replace(found, legs=tuple(legs), platform=platform, radii=None)
 
     @cached_property
     def like(self) -> Manipulator:
@@ -118,6 +94,11 @@ class Kind:
         found |= {key: (0.0, len(stock) - 1e-9) for key, stock in self._choices.items()}
         return found | ({"time": (np.log(0.05), np.log(5.0))} if self.free else {})
 
+    @property
+    def stocks(self) -> dict[str, list[str]]:
+        """The stock that upper and lower links may be cut from."""
+        return {"upper": self.links.upper, "lower": self.links.lower}
+
     @cached_property
     def _choices(self) -> dict[str, Sequence[str]]:
         keys = {own for leg in self.robot.legs for own, *_ in leg.extents.values()}
@@ -127,6 +108,11 @@ class Kind:
     def ranges(self) -> Array:
         """Least and greatest value of each number (2, V)."""
         return np.array(list(self.variables.values())).T
+
+    @property
+    def counts(self) -> Array:
+        """Numbers of things to choose from (V,); 0 of a measure."""
+        return np.array([len(self._choices.get(name, ())) for name in self.variables])
 
     def numbers(self, values: Array) -> dict[str, float]:
         """Return numbers by name, as they are meant: sizes over the catalog's, times in s."""
@@ -151,10 +137,22 @@ class Kind:
                 middle[i] += given[letter] * size * reach
             elif letter == "x" or (letter == "y" and "z" in KINDS[self.name][1]):
                 middle[i] = 0.0
-        stocks = {
-            key: Stock.of(stock[int(given.get(key, 0.0))]) for key, stock in self.stocks.items()
-        }
-        return _built(self.robot, given, stocks, self.build), middle
+        return _built(self.robot, given, self._stock(values), self.links), middle
+
+    def cut(self, values: Array) -> dict[str, str]:
+        """Return what a design's upper and lower links are cut from."""
+        given = self.numbers(values)
+        return {key: names[int(given.get(key, 0.0))] for key, names in self.stocks.items()}
+
+    def _stock(self, values: Array) -> dict[str, Stock]:
+        return {key: Stock.of(name) for key, name in self.cut(values).items()}
+
+    def with_travel(self, leg: Any, travel: tuple[float, float], values: Array) -> Any:
+        """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""
+        found = replace(leg, limits=travel)
+        if slides(leg):
+            return found
+        return found.with_bodies(_bodies(found, 1.0, self._stock(values), self.links))
 
 
 def slides(leg: Any) -> bool:
@@ -163,11 +161,12 @@ def slides(leg: Any) -> bool:
 
 
 def _lengths(leg: Any) -> set[str]:
-    return {q.name for q in leg.quantities if q.role == "length"}
+    keys = leg.every_key().items()
+    return {name for name, key in keys if key.role == "length" and getattr(leg, name) is not None}
 
 
 def _built(
-    robot: Manipulator, given: Mapping[str, float], stocks: Mapping[str, Stock], build: Build
+    robot: Manipulator, given: Mapping[str, float], stocks: Mapping[str, Stock], links: LinksTable
 ) -> Manipulator:
     """Return a machine of another size, proportions and parts.
 
@@ -198,8 +197,8 @@ def _built(
         other = replace(leg, **found)
         at = np.array(other.platform_point) @ frame + other.fixed_offset
         radius = max(radius, float(np.linalg.norm(flat @ at)))
-        legs.append(other.with_bodies(_bodies(other, size, stocks, build)))
-    mass = 0.5 * np.pi * radius**2 * build.plate * _ALUMINIUM
+        legs.append(other.with_bodies(_bodies(other, size, stocks, links)))
+    mass = 0.5 * np.pi * radius**2 * links.plate * _ALUMINIUM
     moments = {"m": mass, "I": mass * radius**2 / 2.0, "Izz": mass * radius**2 / 2.0}
     moments |= dict.fromkeys(("Ixx", "Iyy"), mass * radius**2 / 4.0)
     plate = platform.inertia.of_values([moments.get(k, 0.0) for k in platform.inertia.kinds])
@@ -207,12 +206,15 @@ def _built(
         replace(bar, mass=size**3 * bar.mass, hinge=tuple(size * outer @ bar.hinge))
         for bar in platform.bars
     )
-    tool = tuple((size * np.array(platform.tool)).tolist())
-    carried = replace(platform, bars=bars, inertia=plate, tool=tool)
-    return replace(robot, legs=tuple(legs), platform=carried)
+    carried = replace(platform, bars=bars, inertia=plate)
+    upper, lower = (stocks[key].outer / 2.0 for key in ("upper", "lower"))
+    radii = Radii(links.guide, upper, lower, links.plate / 2.0)
+    return replace(robot, legs=tuple(legs), platform=carried, radii=radii)
 
 
-def _bodies(leg: Any, size: float, stocks: Mapping[str, Stock], build: Build) -> dict[str, Any]:
+def _bodies(
+    leg: Any, size: float, stocks: Mapping[str, Stock], links: LinksTable
+) -> dict[str, Any]:
     """Return the bodies of a leg: links cut from stock, a carriage, or grown with the size."""
     found = {}
     for letter, body in leg.bodies.items():
@@ -220,7 +222,7 @@ def _bodies(leg: Any, size: float, stocks: Mapping[str, Stock], build: Build) ->
         grown = [v * size**p for v, p in zip(body.values, powers, strict=True)]
         found[letter] = body.of_values(grown)
         if slides(leg) and letter == "p":
-            found[letter] = body.of_values([build.carriage] + [0.0] * (len(grown) - 1))
+            found[letter] = body.of_values([links.carriage] + [0.0] * (len(grown) - 1))
         key, low, high, _ = leg.extents.get(letter, ("", 0.0, 0.0, ""))
         if key in stocks:
             count = getattr(leg, "rods", 1) if key == "lower" else 1
@@ -234,13 +236,10 @@ def fitting_kinds(asked: Sequence[str] | None, lengths: int, turn: bool, tilt: b
     Raises
     ------
     DataError
-        If one that is asked for is none, or cannot do it.
+        If one that is asked for cannot do it, or none can.
     """
     faults, found = [], []
     for name in KINDS if asked is None else asked:
-        if name not in KINDS:
-            faults.append(f"kinds: {name!r} is none of {', '.join(KINDS)}")
-            continue
         platform = load(name).platform
         lacks = [
             text
@@ -255,6 +254,8 @@ def fitting_kinds(asked: Sequence[str] | None, lengths: int, turn: bool, tilt: b
             found.append(name)
         elif asked is not None:
             faults.append(f"kinds: {name} {' and '.join(lacks)}, but the job asks for more")
+    if not found and not faults:
+        faults.append("no kind of machine in the catalog has these freedoms")
     if faults:
-        raise DataError("\n  ".join(faults))
+        raise DataError(told(faults))
     return found

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from pteron.bodies.inertia import inertia_count
 from pteron.design.choosing.drives import JointLoads, Option, Options
 from pteron.design.choosing.job import OBJECTIVES, Job
 from pteron.design.choosing.kinds import Kind, slides
+from pteron.design.choosing.room import Room
 from pteron.design.choosing.samples import Places, cycles_of, half_sides, sample_poses
 from pteron.design.choosing.tool import (
     compliance_with,
@@ -29,19 +29,18 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics, jacobian, joint_accelerations
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion import with_payload
 
 _STROKE = 0.03
 """Share of a slider's travel by which its guide is longer at each end."""
+
+_TELESCOPE = 1.7
+"""Greatest length of a ram over its least."""
 
 _FLOOR = 1.05
 """Ratio of the floors in a search to those that are proved at last."""
 
 _HEAVY = 1e6
 """kg m^2: an inertia beside which that of a machine is nothing."""
-
-_STEPS = 6
-"""Points along a link at which it is outside of keep-out boxes."""
 
 _BY_STAGE = 100.0
 """Cost of a design that fails at the last stage; of one before it is twice as much, and so on."""
@@ -110,8 +109,10 @@ class Case:
         self.poses = sample_poses(job, kind.robot)
         self.corners = sample_poses(job, kind.robot, 2)
         self.outline = sample_poses(job, kind.robot, 3)
-        self.cycles = cycles_of(job, kind.robot)
+        self.every_cycle = cycles_of(job, kind.robot)
+        self.cycles = [cycle.some() for cycle in self.every_cycle]
         self.half = half_sides(job)
+        self.room = Room(job, kind.robot)
 
     @cached_property
     def groups(self) -> list[list[int]]:
@@ -138,7 +139,7 @@ class Case:
         return found
 
     def _reach(self, found: Rating) -> None:
-        """Judge reach, floors and limits over the workspace; set the limits of what slides."""
+        """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
         robot, poses, floors = _of(found), found.middle + self.poses, self.job.floors
         squares = np.asarray(numeric(robot, "squared_type_i")(poses)[0])
         measure = np.asarray(numeric(robot, "type_ii")(poses)[0])
@@ -161,8 +162,13 @@ class Case:
         legs = []
         for leg, low, high in zip(robot.legs, joints.min(axis=0), joints.max(axis=0), strict=True):
             spare = _STROKE * (high - low) + 1e-6
-            if slides(leg):
-                leg = replace(leg, limits=(float(low - spare), float(high + spare)))
+            if leg.joint.unit == "m":
+                travel = float(low - spare), float(high + spare)
+                if not slides(leg):
+                    beyond = travel[1] - _TELESCOPE * travel[0]
+                    _below(found, "rams' margin to their shortest", -beyond / travel[1], 0.0)
+                if slides(leg) or not found.misses:
+                    leg = self.kind.with_travel(leg, travel, found.values)
             elif leg.limits is not None:
                 half = 0.5 * (leg.limits[1] - leg.limits[0])
                 margin = min(low - leg.limits[0], leg.limits[1] - high) / half
@@ -171,38 +177,11 @@ class Case:
         found.robot = replace(robot, legs=tuple(legs))
 
     def _room(self, found: Rating) -> None:
-        """Judge the footprint, the height, and what is to be kept out of."""
-        robot, cell = _of(found), self.job.cell
-        points = np.asarray(numeric(robot, "joint_points")(found.middle + self.poses)[0])
-        count = len(robot.platform.lengths)
-        middle = found.middle[:count] @ robot.platform.directions
-        points = points - middle
-        flat = points.reshape(-1, 3)
-        flat = flat[np.isfinite(flat).all(axis=1)]
-        low, high = flat.min(axis=0) - cell.margin, flat.max(axis=0) + cell.margin
-        size = high - low
-        found.figures |= {"footprint": float(size[0] * size[1]), "height": float(size[2])}
-        found.figures |= {"width": float(size[0]), "depth": float(size[1])}
-        for name, value, most in (
-            ("width", size[0], cell.footprint and cell.footprint[0]),
-            ("depth", size[1], cell.footprint and cell.footprint[1]),
-            ("height", size[2], cell.height),
-        ):
-            _above(found, name, float(value), most, " m")
-        center = np.array(self.job.workspace.center or (0.0, 0.0, 0.0))
-        if cell.low is not None and cell.high is not None:
-            beyond = np.maximum(cell.low - (center + low), center + high - cell.high)
-            if beyond.max() > 0.0:
-                _miss(found, "cell", beyond.max(), f"parts {beyond.max():.3g} m outside the cell")
-        if self.job.keep_out:
-            ends = np.linspace(0.0, 1.0, _STEPS)[:, None, None]
-            along = points[..., :-1, :][..., None, :, :]
-            lines = along + ends * np.diff(points, axis=-2)[..., None, :, :] + center
-            for box in self.job.keep_out:
-                inside = np.minimum(lines - box.low, box.high - lines).min(axis=-1) + cell.margin
-                depth = float(np.nanmax(inside, initial=-1.0))
-                if depth > 0.0:
-                    _miss(found, "keep-out", depth, f"parts {depth:.3g} m inside a keep-out box")
+        """Judge the footprint, the height, what is to be kept out of, and whether links touch."""
+        figures, misses = self.room.judged(_of(found), found.middle + self.poses, found.middle)
+        found.figures |= figures
+        for name, (share, told) in misses.items():
+            _miss(found, name, share, told)
 
     def _drive(self, found: Rating) -> None:
         """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
@@ -241,7 +220,8 @@ class Case:
                 best = int(least.argmax())
                 for name, share in shares.items():
                     if (part := float(share[best])) < 1.0:
-                        told = f"{name} {part:.0%} of what is asked, with {all_.all[best].name}"
+                        much = f"{part:.0%}" if part >= 0.01 else "less than 1%"
+                        told = f"{name} {much} of what is asked, with {all_.all[best].name}"
                         _miss(found, name, 1.0 / max(part, 1e-3) - 1.0, told)
                 return
             first = int(good[0])
@@ -263,11 +243,21 @@ class Case:
                 sum(o.motor.rated_torque * o.motor.max_speed for o in found.options)
             ),
             "moving_mass": moving_mass(found.robot),
-            "energy": max(
-                (float(work_ + (friction * way).sum()) for work_, way in work), default=0.0
-            ),
+            "energy": self._energy([float((w + way @ friction).max()) for w, way in work]),
             "cycle_time": given.get("time", 0.0),
         }
+
+    def shares(self, time: float | None) -> Array:
+        """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""
+        given = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
+        return np.array([share * whole for share, whole in given])
+
+    def _energy(self, worst: Sequence[float]) -> float:
+        """Return the energy of a cycle, J: on the mean of a duty cycle, or the greatest."""
+        shares = [cycle.share for cycle in self.cycles]
+        if not any(shares):
+            return max(worst, default=0.0)
+        return float(np.average(worst, weights=shares))
 
     def _rest(self, found: Rating) -> None:
         """Judge what else has a greatest value."""
@@ -276,27 +266,15 @@ class Case:
 
     def loaded(self, robot: Manipulator) -> Manipulator:
         """Return a machine with the payload."""
-        payload = self.job.payload
-        if not payload.mass:
-            return robot
-        count = inertia_count(robot.platform.inertia.kinds)
-        given = payload.inertia
-        inertia: float | Sequence[float]
-        if isinstance(given, tuple):
-            inertia = given if count > 1 else given[5]
-        else:
-            inertia = (given, 0.0, 0.0, given, 0.0, given) if count > 1 else given
-        return with_payload(robot, payload.mass, payload.center, inertia)
+        return self.job.payload.on(robot)
 
     def sections(self, found: Rating) -> dict[str, Section]:
         """Return the sections of a design's links."""
-        given = self.kind.numbers(found.values)
-        chosen = {key: names[int(given.get(key, 0.0))] for key, names in self.kind.stocks.items()}
-        return link_sections(_of(found), chosen)
+        return link_sections(_of(found), self.kind.cut(found.values))
 
     def loads(
         self, robot: Manipulator, middle: Array, time: float | None
-    ) -> tuple[JointLoads, list[tuple[float, Array]]]:
+    ) -> tuple[JointLoads, list[tuple[Array, Array]]]:
         """Return the loads of all cycles at all places, and of each the work and ways of joints."""
         n = robot.joint_count
         squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
@@ -314,7 +292,7 @@ class Case:
             step = duration / (f.shape[1] - 1)
             given = np.trapezoid(np.maximum(f * v, 0.0), axis=1).sum(axis=-1) * step
             ways = np.trapezoid(np.abs(v), axis=1) * step
-            work += list(zip(given.tolist(), ways, strict=True))
+            work.append((given, ways))
             forces.append(f.reshape(-1, n))
             rises.append(a.reshape(-1, n))
             speeds = np.maximum(speeds, np.abs(v).max(axis=(0, 1)))
@@ -328,10 +306,15 @@ class Case:
             spun = worst_forces(replace(robot, legs=tuple(heavy)), poses, speed, asked.acceleration)
             everywhere[1] = spun.max(axis=0) / _HEAVY
             speeds = np.maximum(speeds, worst_speeds(robot, poses, speed).max(axis=0))
-        every = np.concatenate(squares) if squares else np.zeros((1, n, 3))
-        return JointLoads(
-            every, np.concatenate(forces), np.concatenate(rises), speeds, everywhere
-        ), work
+        loads = JointLoads(
+            tuple(squares) or (np.zeros((1, n, 3)),),
+            self.shares(time),
+            np.concatenate(forces),
+            np.concatenate(rises),
+            speeds,
+            everywhere,
+        )
+        return loads, work
 
     def states(self, cycle: Places, middle: Array, duration: float) -> tuple[Array, Array, Array]:
         """Return the states (B, K, m) of a cycle that takes so long."""
@@ -350,10 +333,10 @@ def _miss(found: Rating, name: str, share: float, told: str) -> None:
         found.misses[name], found.told[name] = float(share), told
 
 
-def _below(found: Rating, name: str, value: float, least: float) -> None:
+def _below(found: Rating, name: str, value: float, least: float, unit: str = "") -> None:
     if not value >= least:
         share = least - value if np.isfinite(value) else 1.0
-        _miss(found, name, share, f"{name} {value:.3g}, at least {least:.3g} asked")
+        _miss(found, name, share, f"{name} {value:.3g}{unit}, at least {least:.3g}{unit} asked")
 
 
 def _above(found: Rating, name: str, value: float, most: float | None, unit: str) -> None:

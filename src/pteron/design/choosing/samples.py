@@ -1,28 +1,41 @@
-"""Sample poses and cycles of a job, relative to the middle of its workspace, for a kind."""
+"""Sample poses and cycles of a job, relative to the middle of its workspace, for a kind.
+
+Places are those of the tool's centre point: where the platform turns, P moves against it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 
 from pteron.design.choosing.job import CycleTable, Job
 from pteron.errors import DataError
 from pteron.kernels import Array
+from pteron.kinematics import pose_of
 from pteron.manipulator import Manipulator
 from pteron.motion import Path, line_path, there_and_back
 from pteron.motion.trajectories.time_polynomials import polynomial
+from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 
-_ALONG = 4
-"""Poses along each side of a box."""
+_ALONG, _ALONG_TILTED = 4, 3
+"""Poses along each side of a box; where it is met at several tilts."""
 
 _ROUND = 12
 """Poses round a cylinder."""
 
+_RIM = 6
+"""Directions round the rim of a cone of tilts."""
+
 _DIRECTIONS = 4
 """Directions of a cycle in half a turn."""
+
+_PLACES = 64
+"""Most places of a cycle that a search looks at."""
 
 _IN_CYCLE = 49
 """Samples of a cycle."""
@@ -36,45 +49,90 @@ _INSIDE = 1e-9
 
 @dataclass(frozen=True)
 class Places:
-    """A cycle at all its places and in all its directions.
+    """A cycle at its outermost places and in several directions.
 
     Attributes
     ----------
     name : str
         The cycle's name.
+    robot : Manipulator
+        Of the kind, with its tool.
     path : Path
-        As it is given, from the middle.
-    shifts, turns : array, shape (B, 3) and (B,)
-        Where its points' origin is, m, and by how much it is turned, rad.
-    states : tuple of array, shape (B, K, m)
-        Poses from the middle, velocities and accelerations at even times, if it takes 1 s.
+        That of the tool, as it is given, from the middle.
+    shifts, turns : array, shape (B, m) and (B,)
+        Where its points' origin is, m and rad, and by how much it is turned, rad.
     duration : float or None
         s; None: as fast as the motors can.
     dwell : float
         s.
+    share : float
+        How often it is done in a duty cycle of all; 0 where each counts by itself.
     """
 
     name: str
+    robot: Manipulator
     path: Path
     shifts: Array
     turns: Array
-    states: tuple[Array, Array, Array]
     duration: float | None
     dwell: float
+    share: float
 
     def words(self, k: int) -> str:
         """Return place k in words."""
-        at = ", ".join(f"{1e3 * x:+.0f}" for x in self.shifts[k])
-        return f"{self.name} at ({at}) mm, turned by {np.degrees(self.turns[k]):.0f} deg"
+        shift, count = self.shifts[k], len(self.robot.platform.lengths)
+        at = ", ".join(f"{1e3 * x:+.0f}" for x in shift[:count])
+        angles = zip(self.robot.coordinates[count:], np.degrees(shift[count:]), strict=True)
+        told = "".join(f", {name} {angle:+.0f} deg" for name, angle in angles if angle)
+        return f"{self.name} at ({at}) mm{told}, turned by {np.degrees(self.turns[k]):.0f} deg"
+
+    def some(self) -> Places:
+        """Return it at no more places than a search looks at, evenly chosen."""
+        chosen = np.unique(np.linspace(0, len(self.turns) - 1, _PLACES).round().astype(int))
+        return self.at(chosen)
+
+    def at(self, chosen: Array) -> Places:
+        """Return it at some of its places."""
+        return replace(self, shifts=self.shifts[chosen], turns=self.turns[chosen])
+
+    @cached_property
+    def states(self) -> Curve:
+        """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s."""
+        curve = _timed(self.path, np.linspace(0.0, 1.0, _IN_CYCLE))
+        return self.moved(*curve)
+
+    def moved(self, *curve: Array) -> Curve:
+        """Return poses of the tool (K, m) and two derivatives as P's (B, K, m), at all places."""
+        parts: list[Array] = []
+        for part in curve:
+            every = np.tile(part, (len(self.turns), 1, 1))
+            every[..., :2] = np.einsum("bij,kj->bki", _plane(self.turns), part[:, :2])
+            parts.append(every)
+        parts[0] += self.shifts[:, None]
+        return _of_platform(self.robot, *parts)
 
 
-def sample_poses(job: Job, robot: Manipulator, along: int = _ALONG) -> Array:
+def _of_platform(robot: Manipulator, *curve: Array) -> Curve:
+    """Return places of the tool from the middle, and two derivatives, as those of P."""
+    pose, first, second = pose_motion(robot.platform, *curve)
+    rest = np.zeros((1, robot.freedom))
+    return pose + tool_motion(robot.platform, rest, rest, rest)[0], first, second
+
+
+def with_tool_in_the_middle(robot: Manipulator, angles: Array) -> Array:
+    """Return poses (A, m) from the middle at which P is elsewhere, but the tool is there."""
+    found = np.zeros((len(angles), robot.freedom))
+    found[:, len(robot.platform.lengths) :] = angles
+    return _of_platform(robot, found, np.zeros_like(found), np.zeros_like(found))[0]
+
+
+def sample_poses(job: Job, robot: Manipulator, along: int | None = None) -> Array:
     """Return poses (N, m) over the workspace and its orientations, from its middle."""
     count = len(robot.platform.lengths)
-    places, turns = _positions(job, along), _orientations(job, robot)
-    found = np.zeros((len(turns), len(places), robot.freedom))
-    found[..., :count] = places[:, :count]
-    found[..., count:] = turns[:, None]
+    level = with_tool_in_the_middle(robot, orientations(job, robot))
+    places = _positions(job, along or (_ALONG_TILTED if job.workspace.tilts else _ALONG))
+    found = np.repeat(level[:, None], len(places), axis=1)
+    found[..., :count] += places[:, :count]
     return found.reshape(-1, robot.freedom)
 
 
@@ -110,21 +168,38 @@ def _positions(job: Job, along: int) -> Array:
     return np.array([(x, y, z) for x, y in circle for z in upright]) * half
 
 
-def _orientations(job: Job, robot: Manipulator) -> Array:
-    """Return angles (A, a) of the platform that the workspace asks for."""
-    count = len(robot.platform.angles)
-    found = [np.zeros(count)]
-    space = job.workspace
-    if space.turn is not None:
-        found = [np.append(np.zeros(count - 1), turn) for turn in (*space.turn, *_zero(space.turn))]
+def orientations(job: Job, robot: Manipulator) -> Array:
+    """Return angles (A, a) of the platform that the workspace asks for; tilts at each turn."""
+    turn = job.workspace.turn
+    turns = [0.0] if turn is None else [*([0.0] if turn[0] < 0.0 < turn[1] else []), *turn]
+    return np.concatenate([_turned(tilts(job, robot), angle) for angle in turns])
+
+
+def tilts(job: Job, robot: Manipulator) -> Array:
+    """Return angles (A, a) of the tilts: of a cone those of its middle and round its rim."""
+    space, count = job.workspace, len(robot.platform.angles)
+    if not space.tilts:
+        return np.zeros((1, count))
+    given = np.array(space.directions or [(0.0, 0.0, 1.0)])
     if space.tilt is not None:
-        sides = [-space.tilt, 0.0, space.tilt]
-        found = [np.array([a, b, one[-1]]) for one in found for a, b in product(sides, sides)]
-    return np.array(found)
+        rim = 2.0 * np.pi * np.arange(_RIM) / _RIM
+        side, up = np.sin(space.tilt), np.full(_RIM, np.cos(space.tilt))
+        given = np.vstack([given, np.c_[side * np.cos(rim), side * np.sin(rim), up]])
+    # The shortest turn from upright.
+    across = np.cross([0.0, 0.0, 1.0], given)
+    size = np.linalg.norm(across, axis=1, keepdims=True)
+    angle = np.arctan2(size, given[:, 2:])
+    matrices = scipy.spatial.transform.Rotation.from_rotvec(
+        across / np.where(size > 0.0, size, 1.0) * angle
+    ).as_matrix()
+    return np.asarray(pose_of(robot, np.zeros(3), matrices)[:, -count:])
 
 
-def _zero(turn: tuple[float, float]) -> list[float]:
-    return [0.0] if turn[0] < 0.0 < turn[1] else []
+def _turned(angles: Array, turn: float) -> Array:
+    """Return angles (A, a) turned further about the upright."""
+    if not angles.shape[1]:
+        return angles
+    return np.asarray(angles + turn * np.eye(angles.shape[1])[-1])
 
 
 def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
@@ -139,28 +214,25 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
 
 
 def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
-    count, name = len(robot.platform.lengths), cycle.name or f"cycle {k}"
+    name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
-    given = _wide([point[:3] for point in cycle.points])
-    points[:, :count] = given[:, :count]
-    path: Path = line_path(robot, points, cycle.corner)
+    given = np.array(cycle.points)
+    points[:, : job.lengths] = given[:, : job.lengths]
+    angles = given[:, job.lengths :]
+    points[:, robot.freedom - angles.shape[1] :] = angles
+    # The path is that of the tool, which of this machine is P.
+    bare = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
+    path: Path = line_path(bare, points, cycle.corner)
     path = there_and_back(path) if cycle.back else path
-    pose, velocity, acceleration = _timed(path, np.linspace(0.0, 1.0, _IN_CYCLE))
-    kept = list(_fitting(job, pose[:, :count], cycle.anywhere))
+    poses = path.at(np.linspace(0.0, path.length, _IN_CYCLE))[0]
+    kept = list(_fitting(job, robot, poses, cycle.anywhere))
     if not kept:
-        size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(given, axis=0))
+        size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(_wide(given[:, : job.lengths]), axis=0))
         room = " x ".join(f"{2e3 * x:.0f}" for x in half_sides(job))
         raise DataError(f"cycles[{k}]: {size} mm does not fit into the workspace of {room} mm")
     shifts, turns = np.array([s for s, _ in kept]), np.array([t for _, t in kept])
-    states: list[Array] = []
-    for part in (pose, velocity, acceleration):
-        every = np.tile(part, (len(kept), 1, 1))
-        every[..., :2] = np.einsum("bij,kj->bki", _plane(turns), part[:, :2])
-        states.append(every)
-    states[0][..., :count] += shifts[:, None, :count]
-    return Places(
-        name, path, shifts, turns, (states[0], states[1], states[2]), cycle.duration, cycle.dwell
-    )
+    times = cycle.duration, cycle.dwell, cycle.share or 0.0
+    return Places(name, robot, path, shifts, turns, *times)
 
 
 def _plane(turns: Array) -> Array:
@@ -168,12 +240,16 @@ def _plane(turns: Array) -> Array:
     return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
 
 
-def _fitting(job: Job, points: Array, anywhere: bool) -> Iterator[tuple[Array, float]]:
-    """Yield shifts and turns that keep a path (K, k) in the workspace: its outermost places."""
-    half = half_sides(job)
-    path = _wide(points)
-    angles = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS if anywhere else [0.0]
-    for turn in angles:
+def _fitting(
+    job: Job, robot: Manipulator, poses: Array, anywhere: bool
+) -> Iterator[tuple[Array, float]]:
+    """Yield shifts (m,) and turns of a path (K, m): its outermost places in the workspace."""
+    half, count = half_sides(job), len(robot.platform.lengths)
+    path = _wide(poses[:, :count])
+    directions = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS if anywhere else [0.0]
+    own = poses[:, count:]
+    around = list(_angles(job, robot, own)) if anywhere and own.size else [np.zeros(own.shape[1])]
+    for turn in directions:
         turned = path.copy()
         turned[:, :2] = path[:, :2] @ _plane(np.array([turn]))[0].T
         low, high = -half - turned.min(axis=0), half - turned.max(axis=0)
@@ -185,8 +261,22 @@ def _fitting(job: Job, points: Array, anywhere: bool) -> Iterator[tuple[Array, f
             # Of a cylinder the corner of its box is outside: as far towards it as can be.
             for share in _SHARES:
                 if _holds(job, half, turned + share * shift):
-                    yield share * shift, float(turn)
+                    place = (share * shift)[:count]
+                    yield from ((np.append(place, angles), float(turn)) for angles in around)
                     break
+
+
+def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
+    """Yield angles (a,) by which a cycle's may be shifted: to the ends of the turn, to each tilt.
+
+    A cycle that tilts by itself keeps its tilts.
+    """
+    own = np.zeros((1, angles.shape[1])) if angles[:, :-1].any() else tilts(job, robot)
+    last, ends = angles[:, -1], {0.0}
+    if job.workspace.turn is not None:
+        ends = {job.workspace.turn[0] - last.min(), job.workspace.turn[1] - last.max()}
+    for end in sorted(ends):
+        yield from _turned(own, float(end))
 
 
 def _holds(job: Job, half: Array, points: Array) -> bool:

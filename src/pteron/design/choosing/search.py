@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import islice, product
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 
 from pteron.design.choosing.rating import Case, Rating
 from pteron.kernels import Array, alike
@@ -28,10 +30,12 @@ def search_kind(
     """Return all designs that were rated, for every objective a share of them.
 
     Differential evolution (Storn and Price, Journal of Global Optimization 11, 1997) towards the
-    best, from the best of designs that are drawn evenly; then Nelder and Mead's method.
+    best, from the best of designs that are drawn evenly; then every stock of the links is tried,
+    and Nelder and Mead's method improves the other numbers.
     """
     found: list[Rating] = []
     low, high = case.kind.ranges
+    counts = case.kind.counts
     objectives = case.job.objectives
 
     def rated(units: Array) -> Rating:
@@ -45,6 +49,8 @@ def search_kind(
             rng = np.random.default_rng((seed, k))
             end = evaluations * (k + 1) // len(objectives)
             _evolved(rated, found, rng, end, objective, (low, high))
+            start = min(found, key=lambda one: one.cost(objective))
+            _refined(rated, found, (start.values - low) / (high - low), end, objective, counts)
     return found
 
 
@@ -56,7 +62,7 @@ def _evolved(
     objective: str,
     ranges: tuple[Array, Array],
 ) -> None:
-    """Rate designs until so many are found: what is known already counts."""
+    """Rate designs until few of so many are left: what is known already counts."""
     size = len(ranges[0])
     count = _POPULATION * size
     first = min(_SPREAD * count, (end - len(found)) // 2)
@@ -69,7 +75,7 @@ def _evolved(
     units = np.array([(one.values - low) / (high - low) for one in known])
     costs = np.array([one.cost(objective) for one in known])
     start = len(found)
-    while len(found) < end - int(_REFINED * (end - start)):
+    while len(units) > 1 and len(found) < end - int(_REFINED * (end - start)):
         for i in range(len(units)):
             a, b = units[rng.choice(len(units), 2, replace=False)]
             weight = rng.uniform(*_WEIGHT)
@@ -81,31 +87,50 @@ def _evolved(
             cost = rated(trial).cost(objective)
             if cost <= costs[i]:
                 units[i], costs[i] = trial, cost
-    _refined(rated, found, units[costs.argmin()], end, objective)
 
 
 def _refined(
-    rated: Callable[[Array], Rating], found: list[Rating], start: Array, end: int, objective: str
+    rated: Callable[[Array], Rating],
+    found: list[Rating],
+    start: Array,
+    end: int,
+    objective: str,
+    counts: Array,
 ) -> None:
-    from scipy.optimize import minimize  # type: ignore[import-untyped]
+    """Improve a design until so many are found; `counts` are those of what is chosen, or 0."""
 
+    def cost(units: Array) -> float:
+        return rated(units).cost(objective)
+
+    free = counts == 0
+    stocks = [(np.arange(count) + 0.5) / count for count in counts[~free]]
+    least = np.inf
+    for choice in islice(product(*stocks), max(end - len(found), 0)):
+        trial = start.copy()
+        trial[~free] = choice
+        if (value := cost(trial)) < least:
+            least, best = value, trial
     while len(found) < end:
-        before = len(found)
-        simplex = np.vstack(
-            [start, start + 0.05 * np.where(start > 0.5, -1.0, 1.0) * np.eye(len(start))]
+        simplex = best[free] + np.vstack(
+            [
+                np.zeros(free.sum()),
+                0.05 * np.where(best[free] > 0.5, -1.0, 1.0) * np.eye(free.sum()),
+            ]
         )
-        answer = minimize(
-            lambda units: rated(units).cost(objective),
-            start,
+
+        def whole(units: Array, best: Array = best) -> Array:
+            trial = best.copy()
+            trial[free] = np.clip(units, 0.0, 1.0)
+            return trial
+
+        options = {"maxfev": end - len(found), "initial_simplex": simplex, "xatol": 1e-4}
+        answer = scipy.optimize.minimize(
+            lambda units, whole=whole: cost(whole(units)),
+            best[free],
             method="Nelder-Mead",
-            options={
-                "maxfev": end - before,
-                "initial_simplex": simplex,
-                "xatol": 1e-4,
-                "fatol": 1e-6,
-            },
+            options=options | {"fatol": 1e-6},
         )
-        start = np.clip(answer.x, 0.0, 1.0)
+        best = whole(answer.x)
 
 
 def front(ratings: list[Rating], objectives: list[str]) -> list[Rating]:

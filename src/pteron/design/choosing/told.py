@@ -13,6 +13,7 @@ _FIGURES = {
     "shortest_time": ("time (s)", 1.0),
     "error": ("error (mm)", 1e3),
     "deflection": ("gives way (mm)", 1e3),
+    "clearance": ("clear (mm)", 1e3),
     "moving_mass": ("mass (kg)", 1.0),
     "energy": ("energy (J)", 1.0),
 }
@@ -53,22 +54,22 @@ def margins(one: Candidate) -> str:
 def asked(job: Job) -> list[str]:
     """Return what a job asks for, a line each, as it was asked."""
     space, found = job.workspace, []
-    if space.size is not None:
-        found.append(f"workspace {' x '.join(f'{1e3 * x:g}' for x in space.size)} mm")
-    elif space.poses is not None:
-        found.append(f"workspace of {len(space.poses)} poses")
-    else:
-        found.append(f"workspace: cylinder of radius {space.radius:g} m, height {space.height:g} m")
+    found.append(space.words)
     if space.turn is not None:
         found.append(f"turn from {space.turn[0]:g} to {space.turn[1]:g} rad")
     if space.tilt is not None:
-        found.append(f"tilt {space.tilt:g} rad to each side")
+        found.append(f"tilt of {space.tilt:g} rad to every side")
+    if space.directions is not None:
+        found.append(f"{len(space.directions)} directions of the platform")
+    if any(job.payload.tool):
+        found.append(f"tool at {' x '.join(f'{1e3 * x:g}' for x in job.payload.tool)} mm from P")
     if job.payload.mass:
         found.append(f"payload {job.payload.mass:g} kg")
     for k, cycle in enumerate(job.cycles, start=1):
         time = "as fast as can be" if cycle.duration is None else f"in {cycle.duration:g} s"
         where = ", anywhere in the workspace" if cycle.anywhere else ""
-        found.append(f"{cycle.name or f'cycle {k}'} {time}{where}")
+        share = "" if cycle.share is None else f", {cycle.share:g} in a duty cycle"
+        found.append(f"{cycle.name or f'cycle {k}'} {time}{where}{share}")
     if job.motion.acceleration:
         found.append(
             f"{job.motion.acceleration:g} m/s^2 at up to {job.motion.speed:g} m/s in any direction"
@@ -92,7 +93,7 @@ def assumed(choice: Choice) -> list[str]:
     examples = [] if motors.list else ["The motors are the package's examples, not products."]
     stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
     errors = choice.job.accuracy
-    left_out = errors is not None and not (errors.point or errors.length or errors.angle)
+    left_out = errors is not None and not errors.of_parts
     exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
     return [
         *examples,
@@ -100,7 +101,9 @@ def assumed(choice: Choice) -> list[str]:
         f"{motors.friction:.0%} of their rated torque.",
         f"Links are cut from {stocks}; the platform is half of an aluminium disc "
         f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
-        "The workspace is that of the platform's point P; a hexapod's joints have no cones.",
+        f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as cranks; a ram is "
+        "at most 1.7 times its least length; where links may meet, a pair of rods counts as one; "
+        "ball joints have no cones.",
         "The shortest time is that of the cycle at its worst place with this margin.",
         *(exact if left_out else []),
     ]

@@ -41,11 +41,10 @@ def joint_errors(asked: AccuracyTable, ratios: Array, backlash: Array) -> Array:
 
 def unit_errors(asked: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
     """Return the tool's error at poses (N,) by a joint error of 1, and by all else, m."""
-    joints, others = (
-        greatest_errors(asked, robot, poses, given)
-        for given in (Tolerances(joints=1.0), tolerances(asked, 0.0))
-    )
-    return joints, others
+    joints = greatest_errors(asked, robot, poses, Tolerances(joints=1.0))
+    if not asked.of_parts:
+        return joints, np.zeros_like(joints)
+    return joints, greatest_errors(asked, robot, poses, tolerances(asked, 0.0))
 
 
 def greatest_errors(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 
 from pteron.export.engines.chains import LegStance, leg_stances
 from pteron.export.engines.parts import Tree
@@ -66,8 +67,6 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
 
 def _leg(home: LegStance, away: LegStance) -> list[Array]:
     """Return how far each joint of a leg has moved from the home pose, (K,) each."""
-    from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
-
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     found: list[Array] = []
@@ -88,7 +87,7 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
                 np.einsum("ki,ki->k", np.cross(across, now), here),
             )
             center = turn @ point + shift
-            turned = Rotation.from_rotvec(by[:, None] * now).as_matrix()
+            turned = scipy.spatial.transform.Rotation.from_rotvec(by[:, None] * now).as_matrix()
             turn = turned @ turn
             shift = center + np.einsum("kij,kj->ki", turned, shift - center)
         found.append(by)

@@ -11,7 +11,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import direct_kinematics, inverse_kinematics, random_poses
 from pteron.kinematics.evaluate import checked_one
-from pteron.kinematics.type_ii_sizes import type_ii_sizes
+from pteron.kinematics.sampling import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace import home_pose

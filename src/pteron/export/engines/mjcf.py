@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 
 from pteron.atomic import write_texts
 from pteron.dynamics import inverse_dynamics
@@ -137,10 +138,8 @@ def _notes(opened: Tree) -> list[str]:
 
 def _placed(opened: Tree, body: TreeBody) -> str:
     """Return where a body is in the frame of the one before."""
-    from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
-
     there = from_parent(opened.bodies, body)
-    x, y, z, w = Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)
+    x, y, z, w = scipy.spatial.transform.Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)
     text = f'pos="{row(there[:3, 3])}"'
     turned = row([w, x, y, z])
     return text if turned == "1 0 0 0" else f'{text} quat="{turned}"'

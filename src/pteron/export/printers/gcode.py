@@ -8,8 +8,9 @@ their mean.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -36,20 +37,11 @@ def marlin_lines(robot: RobotLike) -> list[str]:
     ModelError
         As `export_marlin`.
     """
-    robot = as_manipulator(robot)
-    found, order = _numbers(robot)
+    found, order = _numbers(as_manipulator(robot))
     rod = float(np.mean(found.arms))
-    height, ends = "", []
-    if found.ends is not None:
-        low = min(found.ends)
-        height, ends = f" H{_mm(low)}", [low - found.ends[i] for i in order]
     trims = [found.arms[i] - rod for i in order]
-    return [
-        f"M665 L{_mm(rod)} R{_mm(found.radius)}{height} B{1e3 * found.bed:.1f}"
-        + _each("XYZ", _turns(found, order), 1.0)
-        + (_each("ABC", trims) if max(map(abs, trims)) > 0.5e-7 else ""),
-        *([f"M666{_each('XYZ', ends)}"] if ends else []),
-    ]
+    told = _each("ABC", trims) if max(map(abs, trims)) > 0.5e-7 else ""
+    return _lines(found, order, _mm(rod), told, min, -1.0)
 
 
 def reprap_lines(robot: RobotLike) -> list[str]:
@@ -60,18 +52,27 @@ def reprap_lines(robot: RobotLike) -> list[str]:
     ModelError
         As `export_reprap`.
     """
-    robot = as_manipulator(robot)
-    found, order = _numbers(robot)
-    height, ends = "", []
-    if found.ends is not None:
-        mean = float(np.mean(found.ends))
-        height, ends = f" H{_mm(mean)}", [found.ends[i] - mean for i in order]
+    found, order = _numbers(as_manipulator(robot))
     rods = ":".join(_mm(found.arms[i]) for i in order)
-    return [
-        f"M665 L{rods} R{_mm(found.radius)}{height} B{1e3 * found.bed:.1f}"
-        + _each("XYZ", _turns(found, order), 1.0),
-        *([f"M666{_each('XYZ', ends)}"] if ends else []),
-    ]
+    return _lines(found, order, rods, "", np.mean, 1.0)
+
+
+def _lines(
+    found: LinearDelta,
+    order: Sequence[int],
+    rods: str,
+    trims: str,
+    of_ends: Callable[[Sequence[float]], Any],
+    sign: float,
+) -> list[str]:
+    """Return M665 and M666; `of_ends` gives the height, from which ends are told with a sign."""
+    height, rest = "", []
+    if found.ends is not None:
+        level = float(of_ends(found.ends))
+        ends = [sign * (found.ends[i] - level) for i in order]
+        height, rest = f" H{_mm(level)}", [f"M666{_each('XYZ', ends)}"]
+    first = f"M665 L{rods} R{_mm(found.radius)}{height} B{1e3 * found.bed:.1f}"
+    return [first + _each("XYZ", _turns(found, order), 1.0) + trims, *rest]
 
 
 def export_marlin(robot: RobotLike, folder: str | Path = ".") -> list[Path]:

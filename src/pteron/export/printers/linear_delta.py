@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
@@ -135,7 +135,7 @@ class LinearDelta:
         found = start
         off, errors = 0.0, _errors(robot, start, level, rises, highest, good)
         if np.abs(errors).max() > 0.1 * SAME:
-            fitted = least_squares(
+            fitted = scipy.optimize.least_squares(
                 lambda p: _errors(robot, p, level, rises, highest, good).ravel(),
                 start,
                 x_scale=radius,

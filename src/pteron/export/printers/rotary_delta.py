@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from pteron.export.printers.sections import (
     reading_comment,
     signed,
 )
+from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
@@ -28,36 +30,61 @@ from pteron.manipulator import Manipulator
 _TAKER = "Klipper's rotary_delta"
 
 
-def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSection]:
-    """Yield the sections of `rotary_delta`: arms that turn in vertical planes through z."""
-    radii, heights, angles, lifts, zeros = [], [], [], [], []
-    for i, center in enumerate(centers, start=1):
+class _Arm(NamedTuple):
+    """A crank as Klipper has it: its shoulder, and its angle, lift q + zero, from the level."""
+
+    number: int
+    """Of its leg, from 1."""
+    limits: tuple[float, float] | None
+    shoulder: Array
+    out: Array
+    """From the z axis to the shoulder, a unit vector."""
+    lift: float
+    """1 where the arm lifts as its joint coordinate grows, else -1."""
+    zero: float
+    upper: float
+    lower: float
+
+    @classmethod
+    def of(cls, robot: Manipulator, center: Center) -> _Arm:
+        """Return the arm of a leg whose crank turns in a vertical plane through z."""
         assert center.across is not None  # it turns
         out = np.array([*center.at[:2], 0.0]) / np.hypot(*center.at[:2])
         axis = np.cross(center.along, center.across)
         axis /= np.linalg.norm(axis)
+        i, aside = center.leg + 1, 1000.0 * float(center.at @ axis)
         if abs(axis[2]) > SAME:
             raise differs(robot, i, "its crank's axis is not horizontal", _TAKER)
-        aside = 1000.0 * float(center.at @ axis)
         if abs(aside) > 1000.0 * SAME:
             told = f"its crank's plane passes the z axis at {abs(aside):.6g} mm, not through it"
             raise differs(robot, i, told, _TAKER)
-        lifts.append(float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis)))
-        zeros.append(math.atan2(center.along[2], center.along @ out))
-        radii.append(float(np.hypot(*center.at[:2])))
-        heights.append(float(center.at[2]))
-        angles.append(degrees(center.at))
+        lift = float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis))
+        zero, upper = math.atan2(center.along[2], center.along @ out), np.linalg.norm(center.along)
+        limits = robot.legs[center.leg].limits
+        return cls(i, limits, center.at, out, lift, zero, float(upper), center.radius)
+
+    def top(self, radius: float) -> float | None:
+        """Return z over the shoulder, on the axis, where its limits let it be highest."""
+        if self.limits is None:
+            return None
+        angle = self.zero + self.lift * self.limits[1 if self.lift > 0.0 else 0]
+        across = radius + self.upper * math.cos(angle)
+        if abs(across) >= self.lower:
+            return None
+        return self.upper * math.sin(angle) - math.sqrt(self.lower**2 - across**2)
+
+
+def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSection]:
+    """Yield the sections of `rotary_delta`: arms that turn in vertical planes through z."""
+    arms = [_Arm.of(robot, center) for center in centers]
+    radii = [float(np.hypot(*arm.shoulder[:2])) for arm in arms]
     radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
+    heights = [float(arm.shoulder[2]) for arm in arms]
     height = common(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
-    uppers = [float(np.linalg.norm(center.along)) for center in centers]
-    arms = [center.radius for center in centers]
-    _outside(robot, centers, lifts, zeros, height)
-    tops = [
-        _rotary_top(robot.legs[k].limits, lift, zero, radius, upper, arm)
-        for k, (lift, zero, upper, arm) in enumerate(zip(lifts, zeros, uppers, arms, strict=True))
-    ]
+    _outside(robot, arms, height)
+    tops = [arm.top(radius) for arm in arms]
     highest = min((top for top in tops if top is not None), default=0.0)
-    level, comments = _bed(robot, radius, height, uppers, arms, highest)
+    level, comments = _bed(robot, arms, radius, height, highest)
     yield ConfigSection(
         "printer",
         (
@@ -69,38 +96,30 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSect
         ),
         (*comments, "For another bed change shoulder_height and the end stops."),
     )
-    for k, name in enumerate("abc"):
-        leg = robot.legs[k]
-        joint = f"{leg.joint.coordinate}{k + 1}"
-        top = tops[k]
+    for k, (name, arm, top) in enumerate(zip("abc", arms, tops, strict=True)):
         end = None if top is None else mm(height + top - level)
+        joint = f"{'' if arm.lift > 0.0 else '-'}{robot.joint_names[k]}"
         yield ConfigSection(
             f"stepper_{name}",
             (
-                ("angle", number(angles[k])),
-                ("upper_arm_length", mm(uppers[k])),
-                ("lower_arm_length", mm(arms[k])),
+                ("angle", number(degrees(arm.shoulder))),
+                ("upper_arm_length", mm(arm.upper)),
+                ("lower_arm_length", mm(arm.lower)),
                 ("position_endstop", end),
                 ("gear_ratio", _gear(robot, k)),
                 ("endstop_pin", None),
                 *PINS,
             ),
             (
-                f"Its position is {'' if lifts[k] > 0.0 else '-'}{joint} in rad "
-                f"{signed(zeros[k])} rad: 0 where the arm is level, growing as it lifts.",
+                f"Its position is {joint} in rad {signed(arm.zero)} rad: 0 where the arm is level, "
+                "growing as it lifts.",
                 *end_stop(end, "arm"),
                 *reading_comment(robot, k, "gear_ratio"),
             ),
         )
 
 
-def _outside(
-    robot: Manipulator,
-    centers: Sequence[Center],
-    lifts: Sequence[float],
-    zeros: Sequence[float],
-    height: float,
-) -> None:
+def _outside(robot: Manipulator, arms: Sequence[_Arm], height: float) -> None:
     """Refuse a machine whose elbows are not where kin_rotary_delta.c takes them: outside.
 
     The platform is below the shoulders; of the two elbows it takes that of the greater angle.
@@ -112,56 +131,29 @@ def _outside(
             f"{robot.name}: its platform is above the shoulders, and Klipper's rotary_delta has it "
             f"below: turn the model over; or {INSTEAD}"
         )
-    joints = inverse_kinematics(robot, poses)
-    for i, (center, lift, zero) in enumerate(zip(centers, lifts, zeros, strict=True)):
-        out = np.array([*center.at[:2], 0.0]) / np.hypot(*center.at[:2])
-        angle = lift * joints[:, i] + zero
-        wrist = poses - center.at
-        down = np.arctan2(wrist[:, 2], wrist @ out)
-        if (np.sin(angle - down) < 0.0).any():
+    for arm, q in zip(arms, inverse_kinematics(robot, poses).T, strict=True):
+        wrist = poses - arm.shoulder
+        down = np.arctan2(wrist[:, 2], wrist @ arm.out)
+        if (np.sin(arm.lift * q + arm.zero - down) < 0.0).any():
             told = (
                 "its elbow is inside while the platform is below, and Klipper has it outside; turn "
                 "a model over whose platform is above"
             )
-            raise differs(robot, i + 1, told, _TAKER)
+            raise differs(robot, arm.number, told, _TAKER)
 
 
 def _bed(
-    robot: Manipulator,
-    radius: float,
-    height: float,
-    uppers: Sequence[float],
-    arms: Sequence[float],
-    top: float,
+    robot: Manipulator, arms: Sequence[_Arm], radius: float, height: float, top: float
 ) -> tuple[float, tuple[str, ...]]:
     """Return P's z at Klipper's bed, and what is said of it."""
-    lengths = [upper + arm for upper, arm in zip(uppers, arms, strict=True)]
-    for i, length in enumerate(lengths, start=1):
-        if length <= radius:
-            raise differs(robot, i, "its arms do not reach the z axis", _TAKER)
-    reach = math.sqrt(min(lengths) ** 2 - radius**2)
+    for arm in arms:
+        if arm.upper + arm.lower <= radius:
+            raise differs(robot, arm.number, "its arms do not reach the z axis", _TAKER)
+    reach = math.sqrt(min(arm.upper + arm.lower for arm in arms) ** 2 - radius**2)
     # Klipper lets the tool go so far from the axis, whatever the legs reach.
-    most = min(radius + min(uppers), min(arms) - radius)
+    most = min(radius + min(arm.upper for arm in arms), min(arm.lower for arm in arms) - radius)
     level, good = bed(robot, most, height - reach, height + top)
     return level, told_bed(robot, level, good, most)
-
-
-def _rotary_top(
-    limits: tuple[float, float] | None,
-    lift: float,
-    zero: float,
-    radius: float,
-    upper: float,
-    arm: float,
-) -> float | None:
-    """Return z over the shoulder, on the axis, where a crank is as high as its limits let it."""
-    if limits is None:
-        return None
-    angle = zero + lift * limits[1 if lift > 0.0 else 0]
-    across = radius + upper * math.cos(angle)
-    if abs(across) >= arm:
-        return None
-    return upper * math.sin(angle) - math.sqrt(arm**2 - across**2)
 
 
 def _gear(robot: Manipulator, leg: int) -> str | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pteron.arguments import checked_arguments
 from pteron.bodies.inertia import RodInertia, SpatialInertia
 from pteron.bodies.parameters import body_places
 from pteron.errors import ModelError
@@ -36,6 +37,7 @@ class LinearLimits:
         )
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Bounds:
     """Limits that the parameters of real bodies shall keep.
@@ -154,25 +156,18 @@ def _matching(key: str, known: Mapping[str, str], what: str) -> list[str]:
 
 def _box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:
     """Yield rows that are at most 0 for a body inside a box, and what each one says."""
-    if "Izz" in place:
-        yield from _solid_box(place, box)
-        return
-    inertia, least = place["I"], 0.0
-    for axis, (low, high) in zip("xy", box, strict=True):
-        if (moment := place.get(f"mg{axis}")) is not None:
-            yield low * place["m"] - moment, f"centre of mass {axis} >= {low:g}"
-            yield moment - high * place["m"], f"centre of mass {axis} <= {high:g}"
-            inertia = inertia - (low + high) * moment
-            least += low * high
-    yield inertia + least * place["m"], "inertia that mass inside can have"
-
-
-def _solid_box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:
-    """Yield the same for a body that turns about any axis."""
-    moments = SpatialInertia.second_moments(place)
+    solid = SpatialInertia.second_moments(place) if "Izz" in place else None
+    inertia, least = place.get("I"), 0.0
     for k, (axis, (low, high)) in enumerate(zip("xyz", box, strict=False)):
-        moment = moments[k][3]
+        if (moment := place.get(f"mg{axis}")) is None:
+            continue
         yield low * place["m"] - moment, f"centre of mass {axis} >= {low:g}"
         yield moment - high * place["m"], f"centre of mass {axis} <= {high:g}"
-        spread = moments[k][k] - (low + high) * moment + low * high * place["m"]
-        yield spread, f"second moment along {axis} that mass inside can have"
+        if solid is not None:
+            spread = solid[k][k] - (low + high) * moment + low * high * place["m"]
+            yield spread, f"second moment along {axis} that mass inside can have"
+        elif inertia is not None:
+            inertia = inertia - (low + high) * moment
+            least += low * high
+    if inertia is not None:
+        yield inertia + least * place["m"], "inertia that mass inside can have"

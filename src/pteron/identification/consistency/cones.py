@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import ModelError
-from pteron.extras import of_extra
+from pteron.extras import install_command
 from pteron.identification.consistency.bodies import Bodies
 from pteron.kernels import Array
 
@@ -164,7 +164,11 @@ def _solved(
     Of rows @ v + right the first are `equal` to zero, then come those that are not negative, and
     the cones. The caller checks the answer, not the solver.
     """
-    clarabel = of_extra("consistency", "clarabel", "consistency needs Clarabel", MissingSolver)
+    try:
+        import clarabel  # type: ignore[import-untyped]
+    except ImportError:
+        told = "consistency needs Clarabel, which is not installed"
+        raise MissingSolver(f"{told}; {install_command('consistency')}") from None
     cones = [clarabel.SecondOrderConeT(_CONE)] * len(real.bodies.cones[0])
     solids = [clarabel.PSDTriangleConeT(4)] * len(real.bodies.solids[0])
     others = _CONE * len(cones) + _SOLID * len(solids)
@@ -175,9 +179,9 @@ def _solved(
     for tolerance in _TOLERANCES:
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
         found = clarabel.DefaultSolver(
-            sparse.diags(2.0 * squares, format="csc"),
+            scipy.sparse.diags(2.0 * squares, format="csc"),
             linear,
-            sparse.csc_matrix(-rows),
+            scipy.sparse.csc_matrix(-rows),
             right,
             [clarabel.ZeroConeT(equal), positive, *cones, *solids],
             settings,

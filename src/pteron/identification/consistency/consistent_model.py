@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
-from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.errors import DataError, ModelError
 from pteron.identification.consistency.bodies import (
@@ -206,7 +206,9 @@ def consistent_model(
         names=base.names,
         feasible=feasible,
         distance=distance,
-        p_value=float("nan") if root is None else float(chi2.sf(distance**2, base.rank)),
+        p_value=float("nan")
+        if root is None
+        else float(scipy.stats.chi2.sf(distance**2, base.rank)),
         shifts=moved / np.linalg.norm(spread, axis=1),
         metric="relative" if root is None else "covariance",
         at_border=at_border,

@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.signal import lfilter  # type: ignore[import-untyped]
-from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 
@@ -64,7 +63,9 @@ class Noise:
             rows = (matrix[block] * factors[block, :, None])[::-1]
             passed = np.empty(rows.shape)
             for i, one in enumerate(self.polynomials):
-                passed[:, i], states[i] = lfilter([1.0], one, rows[:, i], axis=0, zi=states[i])
+                passed[:, i], states[i] = scipy.signal.lfilter(
+                    [1.0], one, rows[:, i], axis=0, zi=states[i]
+                )
             each = np.einsum("ij,rip->rjp", self.root, passed).reshape(-1, p)
             total += each.T @ each
         return total
@@ -76,7 +77,8 @@ class Noise:
 
     def _filtered(self, matrix: Array) -> Array:
         columns = [
-            lfilter([1.0], one, matrix[:, i], axis=0) for i, one in enumerate(self.polynomials)
+            scipy.signal.lfilter([1.0], one, matrix[:, i], axis=0)
+            for i, one in enumerate(self.polynomials)
         ]
         return np.stack(columns, axis=1)
 
@@ -176,7 +178,9 @@ def _parzen(share: Array) -> Array:
 
 def _shared(noise: Noise, residuals: Array, used: NDArray[np.bool_]) -> Noise:
     """Return the noise with the correlation between actuators of the residuals' innovations."""
-    parts = [lfilter(one, [1.0], residuals[:, i]) for i, one in enumerate(noise.polynomials)]
+    parts = [
+        scipy.signal.lfilter(one, [1.0], residuals[:, i]) for i, one in enumerate(noise.polynomials)
+    ]
     innovations = np.stack(parts, axis=1) * used
     together = used.T.astype(float) @ used
     products = innovations.T @ innovations / np.maximum(together, 1.0)
@@ -190,6 +194,6 @@ def _shared(noise: Noise, residuals: Array, used: NDArray[np.bool_]) -> Noise:
     n = len(size)
     # The likelihood ratio of independence.
     statistic = -float(together.min()) * np.linalg.slogdet(correlation)[1]
-    if n == 1 or statistic < chi2.ppf(1.0 - _LEVEL, n * (n - 1) / 2):
+    if n == 1 or statistic < scipy.stats.chi2.ppf(1.0 - _LEVEL, n * (n - 1) / 2):
         return noise
     return Noise(noise.polynomials, np.diag(noise.root)[:, None] * np.linalg.cholesky(correlation))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.identification.estimators.estimate import Estimate
 from pteron.identification.observation import Observations
@@ -79,7 +79,7 @@ def essential_parameters(
         statistics = [estimate.wald(values[[*gone, k]], [*gone, k]) for k in left]
         least = int(np.argmin(statistics))
         count = len(gone) + 1
-        chance = float(f.sf(statistics[least] / count, count, estimate.degrees))
+        chance = float(scipy.stats.f.sf(statistics[least] / count, count, estimate.degrees))
         if chance < level:
             break
         p_value = chance

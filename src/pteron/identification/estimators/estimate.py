@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2, f  # type: ignore[import-untyped]
 
 from pteron.identification.estimators.covariance import noise_of
 from pteron.identification.estimators.qr import QrFactor
@@ -133,14 +133,12 @@ class Estimate:
         The joint region at 95 % is where it is at least 0.05.
         """
         p = len(self.values)
-        return float(f.sf(self.distance(truth) ** 2 / p, p, self.degrees))
+        return float(scipy.stats.f.sf(self.distance(truth) ** 2 / p, p, self.degrees))
 
     def wald(self, shift: Array, chosen: Sequence[int] | None = None) -> float:
         """Return the square of a shift of values, all or some, in terms of their covariance."""
         rows = range(len(self.values)) if chosen is None else chosen
-        size = np.maximum(self.deviations[list(rows)], np.finfo(float).tiny)
-        scaled = shift / size
-        return float(scaled @ np.linalg.solve(self.correlation[np.ix_(rows, rows)], scaled))
+        return wald(shift, self.covariance[np.ix_(rows, rows)])
 
     def value(self, name: str) -> float:
         """Return one value by name."""
@@ -159,20 +157,35 @@ class Estimate:
         }
 
 
+def wald(shift: Array, covariance: Array) -> float:
+    """Return Wald's statistic of a shift (q,), its square in terms of a covariance (q, q)."""
+    unit = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), 1e-150)
+    standard = shift / unit
+    # Values of a fit without noise may be known alike: least squares, where it is singular.
+    correlation = covariance / np.outer(unit, unit)
+    return float(standard @ np.linalg.lstsq(correlation, standard, rcond=None)[0])
+
+
 def residuals_of(observations: Observations, values: Array) -> Array:
     """Return F - W values (R, n)."""
     return np.asarray(observations.forces - observations.matrix @ values)
 
 
+class Search(NamedTuple):
+    """An estimator's search: its method, how many iterations it took, and whether it settled."""
+
+    method: str
+    iterations: int = 1
+    converged: bool = True
+
+
 def estimate_of(
-    method: str,
+    search: Search,
     observations: Observations,
     factor: QrFactor,
     values: Array,
     *,
     weights: Array,
-    iterations: int = 1,
-    converged: bool = True,
     pull: Array | None = None,
     inverse: Array | None = None,
     instruments: Array | None = None,
@@ -195,20 +208,10 @@ def estimate_of(
     found = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
     middle = found.sum_covariance(rows, weights)
     covariance = bread @ (middle + beside) @ bread.T
-    return Estimate(
-        method,
-        observations.names,
-        observations.units,
-        values,
-        0.5 * (covariance + covariance.T),
-        noise,
-        whiteness(rest, observations.gain > 0.0),
-        factor.condition,
-        factor.rows,
-        iterations,
-        converged,
-        rest,
-    )
+    symmetric, white = 0.5 * (covariance + covariance.T), whiteness(rest, observations.gain > 0.0)
+    told = factor.condition, factor.rows, search.iterations, search.converged, rest
+    names, units = observations.names, observations.units
+    return Estimate(search.method, names, units, values, symmetric, noise, white, *told)
 
 
 def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiteness:
@@ -217,15 +220,27 @@ def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiten
     Those that are not `used` (R, n) take no part: a lag has the pairs of which both are used.
     """
     taken = np.ones(residuals.shape, dtype=bool) if used is None else used
-    count = taken.sum(axis=0)
-    mean = np.where(taken, residuals, 0.0).sum(axis=0) / np.maximum(count, 1)
-    centred = np.where(taken, residuals - mean, 0.0)
-    power = np.maximum((centred**2).sum(axis=0), np.finfo(float).tiny)
-    lags = range(1, min(_LAGS, len(residuals) // 5) + 1)
-    if not lags:
+    found, pairs = autocorrelations(residuals, taken, _LAGS)
+    if not len(found):
         return Whiteness(np.zeros(residuals.shape[1]), np.ones(residuals.shape[1]))
-    found = np.array([(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags])
-    pairs = np.array([(taken[k:] & taken[:-k]).sum(axis=0) for k in lags])
+    count = taken.sum(axis=0)
     statistic = count * (count + 2.0) * (found**2 / np.maximum(pairs, 1)).sum(axis=0)
     degrees = np.maximum((pairs > 0).sum(axis=0), 1)
-    return Whiteness(found[0], np.asarray(chi2.sf(statistic, degrees)))
+    return Whiteness(found[0], np.asarray(scipy.stats.chi2.sf(statistic, degrees)))
+
+
+def autocorrelations(
+    residuals: Array, used: NDArray[np.bool_], most: int
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return the autocorrelations (L, n) at lags from 1 to `most`, and of how many pairs each is.
+
+    Residuals (R, n) that are not used take no part; a lag leaves at least four fifths of the rows.
+    """
+    mean = np.where(used, residuals, 0.0).sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+    centred = np.where(used, residuals - mean, 0.0)
+    power = np.maximum((centred**2).sum(axis=0), np.finfo(float).tiny)
+    lags = range(1, min(most, len(residuals) // 5) + 1)
+    found = [(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags]
+    pairs = [(used[k:] & used[:-k]).sum(axis=0) for k in lags]
+    shape = len(lags), residuals.shape[1]
+    return np.reshape(found, shape), np.reshape(np.array(pairs, dtype=np.int64), shape)

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.identification.estimators.estimate import Estimate, estimate_of
+from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.logs import Log
@@ -17,9 +17,6 @@ from pteron.identification.model import Model
 from pteron.identification.observation import Observations, observations_of
 from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
-
-_NAME = "instrumental"
-"""The method's name in its estimate."""
 
 _SETTLED = 1e-3
 """Change of a value, in standard deviations, and of the noise, relative, that does not matter."""
@@ -72,8 +69,7 @@ def instrumental(
     A. Janot, P.-O. Vandanjon, M. Gautier, "A generic instrumental variable approach for industrial
     robot identification", IEEE Transactions on Control Systems Technology 22(1), 2014.
     """
-    factor = qr_factor(observations)
-    factor.check_seen()
+    factor = qr_factor(observations).check_seen()
     values = factor.values()
     noise = actuator_noise(observations, values)
     converged = False
@@ -91,17 +87,8 @@ def instrumental(
         converged = bool(settled and (np.abs(values - earlier) <= _SETTLED * size).all())
         if converged:
             break
-    return estimate_of(
-        _NAME,
-        both,
-        factor,
-        values,
-        weights=1.0 / before,
-        iterations=iteration,
-        converged=converged,
-        inverse=inverse,
-        instruments=z,
-    )
+    how, weights = Search("instrumental", iteration, converged), 1.0 / before
+    return estimate_of(how, both, factor, values, weights=weights, inverse=inverse, instruments=z)
 
 
 def halves(
@@ -169,6 +156,6 @@ def _every_other(log: Log, start: int) -> Log:
         time, kept = log.time[rows], slice(start, None, 2)
         if len(time) // 2 <= _DEGREE:
             continue  # too short for the filters, too
-        spline = make_interp_spline(time[kept], log.joints[rows][kept], k=_DEGREE)
+        spline = scipy.interpolate.make_interp_spline(time[kept], log.joints[rows][kept], k=_DEGREE)
         joints[rows] = spline(time)
     return replace(log, joints=joints)

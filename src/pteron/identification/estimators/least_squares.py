@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pteron.errors import DataError
-from pteron.identification.estimators.estimate import Estimate, estimate_of, residuals_of
+from pteron.identification.estimators.estimate import Estimate, Search, estimate_of, residuals_of
 from pteron.identification.estimators.qr import actuator_factors, qr_factor
 from pteron.identification.observation import Observations
 from pteron.identification.signals.filters import MEDIAN_SIZE
@@ -34,10 +34,10 @@ def ordinary(observations: Observations) -> Estimate:
     LogError
         If the observations do not determine the values.
     """
-    factor = qr_factor(observations)
-    factor.check_seen()
+    factor = qr_factor(observations).check_seen()
     weights = np.ones(observations.actuators)
-    return estimate_of("ordinary", observations, factor, factor.values(), weights=weights)
+    how = Search("ordinary")
+    return estimate_of(how, observations, factor, factor.values(), weights=weights)
 
 
 def weighted(
@@ -63,8 +63,7 @@ def weighted(
         If the observations do not determine the values.
     """
     triangles = triangles or actuator_factors(observations)
-    factor = qr_factor(triangles)
-    factor.check_seen()
+    factor = qr_factor(triangles).check_seen()
     noise = actuator_noise(observations, factor.values())
     converged = False
     for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
@@ -74,15 +73,8 @@ def weighted(
         converged = bool(np.abs(noise / before - 1.0).max() < _SETTLED_NOISE)
         if converged:
             break
-    return estimate_of(
-        "weighted",
-        observations,
-        factor,
-        values,
-        weights=1.0 / before,
-        iterations=iteration,
-        converged=converged,
-    )
+    how = Search("weighted", iteration, converged)
+    return estimate_of(how, observations, factor, values, weights=1.0 / before)
 
 
 def huber(
@@ -110,8 +102,7 @@ def huber(
     """
     if not threshold > 0.0:
         raise DataError(f"threshold: {threshold} given, a number above 0 expected")
-    factor = qr_factor(observations)
-    factor.check_seen()
+    factor = qr_factor(observations).check_seen()
     values = factor.values()
     converged = False
     for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
@@ -134,16 +125,8 @@ def huber(
     used = observations.gain > 0.0
     slope = float((np.abs(standard)[used] < threshold).mean())
     spent = 1.0 + len(values) / observations.rows * (1.0 - slope) / slope
-    return estimate_of(
-        "huber",
-        observations,
-        plain,
-        values,
-        weights=1.0 / scale,
-        iterations=iteration,
-        converged=converged,
-        pull=spent * pull / slope,
-    )
+    how, pull = Search("huber", iteration, converged), spent * pull / slope
+    return estimate_of(how, observations, plain, values, weights=1.0 / scale, pull=pull)
 
 
 def actuator_noise(observations: Observations, values: Array) -> Array:

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy import sparse  # type: ignore[import-untyped]
-from scipy.sparse.linalg import splu  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.identification.errors import LogError
-from pteron.identification.estimators.estimate import Estimate, estimate_of
+from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
 from pteron.identification.estimators.least_squares import weighted
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, in_motion, observations_of
+from pteron.identification.observation import Observations, assembled, in_motion, observations_of
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import Curve
 from pteron.kernels import Array
+from pteron.shapes import PoseLike
 
 _NAME = "likelihood"
 """The method's name in its estimate."""
@@ -82,8 +82,8 @@ def maximum_likelihood(
             "likelihood fits at once; give a part of the log",
         )
     base = curve.bases[0]
-    precision = sparse.diags(1.0 / preprocessing.joint_noise**2)
-    information = sparse.kron(base.T @ base, precision, format="csc")
+    precision = scipy.sparse.diags(1.0 / preprocessing.joint_noise**2)
+    information = scipy.sparse.kron(base.T @ base, precision, format="csc")
     values = estimate.values
     # The motion can be bent until it explains nearly all of the forces: what is noise on them is
     # known without a model, and they are not to be followed closer than that.
@@ -93,14 +93,15 @@ def maximum_likelihood(
     for iteration in range(1, iterations + 1):
         observations = _sampled(model, log, curve, preprocessing)
         if iteration <= _RENEWED:
-            slopes = _slopes(model, values, curve, observations, preprocessing)
+            used, start = observations.gain, preprocessing.start
+            slopes = _slopes(model, values, log, curve, used, start)
         # Linearised about the present motion
         weights = np.tile(1.0 / noise, (len(observations.time), 1))
         w = (weights[..., None] * observations.matrix).reshape(-1, len(values))
-        s = sparse.diags(weights.ravel()) @ slopes
+        s = scipy.sparse.diags(weights.ravel()) @ slopes
         rest = (weights * (observations.forces - observations.matrix @ values)).ravel()
         # Normal equations; the motion is eliminated, its measurement being its prior.
-        normal = splu((information + s.T @ s).tocsc())
+        normal = scipy.sparse.linalg.splu((information + s.T @ s).tocsc())
         pull = information @ (measured - curve.coefficients).ravel() + s.T @ rest
         coupling = s.T @ w
         solved = normal.solve(np.column_stack([coupling, pull]))
@@ -124,18 +125,10 @@ def maximum_likelihood(
     moved = solved[:, :-1]
     own = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
     observations = _sampled(model, log, curve, preprocessing)
-    return estimate_of(
-        _NAME,
-        observations,
-        qr_factor(observations, 1.0 / noise),
-        values,
-        weights=1.0 / noise,
-        iterations=iteration,
-        converged=converged,
-        inverse=inverse,
-        instruments=own,
-        beside=moved.T @ (information @ moved),
-    )
+    beside, factor = moved.T @ (information @ moved), qr_factor(observations, 1.0 / noise)
+    how, weights = Search(_NAME, iteration, converged), 1.0 / noise
+    found = how, observations, factor, values
+    return estimate_of(*found, weights=weights, inverse=inverse, instruments=own, beside=beside)
 
 
 def _check(log: Log) -> None:
@@ -156,62 +149,37 @@ def _check(log: Log) -> None:
 
 def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing) -> Observations:
     """Return the observations of a motion at the log's own samples, which no filter has touched."""
-    states = States.of_joints(
-        model.robot,
-        curve.motion,
-        log.time,
-        preprocessing.start,
-        payload=log.payload,
-        source=log.source,
-        first_row=log.first_row,
-    )
+    states = States.of_log(model.robot, log, curve.motion, preprocessing.start)
     used = in_motion(states.joint_rates, preprocessing.slow, preprocessing.settling)
     used[: curve.ends] = used[len(used) - curve.ends :] = 0.0
-    return Observations(
-        model.names,
-        model.units,
-        used[..., None] * model.matrix(states),
-        used * log.forces,
-        log.time,
-        used,
-        states.payload,
-        log.source,
-        kinds=model.kinds,
-    )
+    rows = used[..., None] * model.matrix(states), used * log.forces
+    found = assembled(model, *rows, used, log.time, states.payload, 1.0)
+    return replace(found, source=log.source)
 
 
 def _slopes(
-    model: Model,
-    values: Array,
-    curve: Curve,
-    observations: Observations,
-    preprocessing: Preprocessing,
-) -> sparse.csr_matrix:
+    model: Model, values: Array, log: Log, curve: Curve, used: Array, start: PoseLike
+) -> scipy.sparse.csr_matrix:
     """Return the derivatives (T n, C n) of the forces by the motion's coefficients."""
     # Coulomb friction has no slope, but where the rate changes its sign.
     smooth = np.where(np.isin(model.kinds, ("coulomb", "stribeck")), 0.0, values)
-    n = observations.actuators
+    n = used.shape[1]
     motion = curve.motion
-    total = sparse.csr_matrix((len(observations.time) * n, curve.coefficients.size))
+    total = scipy.sparse.csr_matrix((used.size, curve.coefficients.size))
 
     def forces(k: int, shift: Array) -> Array:
         """Return the forces (T, n) with one derivative of the motion shifted."""
         q, dq, ddq = (part + shift if i == k else part for i, part in enumerate(motion))
-        states = States.of_joints(
-            model.robot,
-            (q, dq, ddq),
-            observations.time,
-            preprocessing.start,
-            payload=observations.payload,
-            source=observations.source,
-        )
+        states = States.of_log(model.robot, log, (q, dq, ddq), start)
         return np.asarray(model.matrix(states) @ smooth)
 
     for k, size in enumerate(_STEPS):
-        spread = sparse.kron(curve.bases[k], sparse.csr_matrix(np.ones((n, 1))), format="csr")
+        spread = scipy.sparse.kron(
+            curve.bases[k], scipy.sparse.csr_matrix(np.ones((n, 1))), format="csr"
+        )
         for j, shift in enumerate(size * np.eye(n)):
-            slope = (forces(k, shift) - forces(k, -shift)) / (2.0 * size) * observations.gain
-            placed = sparse.diags(slope.ravel()) @ spread
-            column = sparse.csr_matrix(([1.0], ([0], [j])), shape=(1, n))
-            total = total + sparse.kron(placed, column, format="csr")
+            slope = (forces(k, shift) - forces(k, -shift)) / (2.0 * size) * used
+            placed = scipy.sparse.diags(slope.ravel()) @ spread
+            column = scipy.sparse.csr_matrix(([1.0], ([0], [j])), shape=(1, n))
+            total = total + scipy.sparse.kron(placed, column, format="csr")
     return total

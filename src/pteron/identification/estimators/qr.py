@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.identification.errors import LogError
-from pteron.identification.long_matrices import triangle
-from pteron.identification.observation import Observations
+from pteron.identification.observation import Observations, triangle
 from pteron.kernels import Array
 
 BLOCK = 1 << 14
@@ -56,22 +55,22 @@ class QrFactor:
 
     def values(self) -> Array:
         """Return the values of least squares (p,)."""
-        return np.asarray(solve_triangular(self.factor, self.image) / self.scale)
+        return np.asarray(scipy.linalg.solve_triangular(self.factor, self.image) / self.scale)
 
     def inverse(self) -> Array:
         """Return (W^T W)^-1, (p, p): their covariance for noise of unit variance."""
-        inverse = solve_triangular(self.factor, np.eye(len(self.names)))
+        inverse = scipy.linalg.solve_triangular(self.factor, np.eye(len(self.names)))
         return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
 
     def whitening(self) -> Array | None:
         """Return what makes orthonormal columns of W (p, p); None where it would lose digits."""
         if not self.condition < _PLAIN:
             return None
-        inverse = solve_triangular(self.factor, np.eye(len(self.names)))
+        inverse = scipy.linalg.solve_triangular(self.factor, np.eye(len(self.names)))
         return np.asarray(inverse / self.scale[:, None])
 
-    def check_seen(self) -> None:
-        """Refuse, with a LogError that names them, observations that leave values open."""
+    def check_seen(self) -> QrFactor:
+        """Return it, or raise a LogError that names the values that observations leave open."""
         if self.degrees <= 0:
             raise LogError(
                 "too short",
@@ -91,9 +90,10 @@ class QrFactor:
                 f"({', '.join(names)}); move all coordinates at once, such as along a trajectory "
                 "of pteron excite",
             )
+        return self
 
 
-def actuator_factors(observations: Observations, *, block: int = BLOCK) -> Observations:
+def actuator_factors(observations: Observations) -> Observations:
     """Return observations that stand for others: the triangle of each actuator's [W F].
 
     Whatever weights (n,) actuators have, they have the same `qr_factor`, from p + 1 rows each.
@@ -102,8 +102,8 @@ def actuator_factors(observations: Observations, *, block: int = BLOCK) -> Obser
     triangles = np.empty((p + 1, observations.actuators, p + 1))
     for i in range(observations.actuators):
         own = observations.matrix[:, i], observations.forces[:, i]
-        starts = range(0, len(own[1]), block)
-        pieces = (np.column_stack([part[k : k + block] for part in own]) for k in starts)
+        starts = range(0, len(own[1]), BLOCK)
+        pieces = (np.column_stack([part[k : k + BLOCK] for part in own]) for k in starts)
         triangles[:, i] = triangle(pieces, p + 1)
     return replace(observations, matrix=triangles[..., :p], forces=triangles[..., p])
 
@@ -124,15 +124,8 @@ def qr_factor(
     divisor = np.where(scale > 0.0, scale, 1.0)
     blocks = _blocks(observations, weights, block)
     full = triangle((np.column_stack([rows / divisor, f]) for rows, f in blocks), p + 1)
-    return QrFactor(
-        full[:p, :p],
-        full[:p, p],
-        float(full[p, p] ** 2),
-        scale,
-        observations.rows,
-        observations.names,
-        observations.source,
-    )
+    about = observations.rows, observations.names, observations.source
+    return QrFactor(full[:p, :p], full[:p, p], float(full[p, p] ** 2), scale, *about)
 
 
 def _blocks(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.identification.estimators.qr import qr_factor
@@ -84,12 +84,12 @@ def reduced(observations: Observations, *, tolerance: float = TOLERANCE) -> Redu
     found = qr_factor(observations)
     # Columns that vanish but for rounding would be independent once they are scaled.
     acts = found.scale > _ROUNDING * found.scale.max()
-    _, factor, order = qr(found.factor * acts, mode="economic", pivoting=True)
+    _, factor, order = scipy.linalg.qr(found.factor * acts, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(factor))
     rank = int((sizes > tolerance * sizes[0]).sum())
     if not rank:
         raise DataError(f"{observations.source}: every column of the regressor is zero")
-    shares = solve_triangular(factor[:rank, :rank], factor[:rank, rank:])
+    shares = scipy.linalg.solve_triangular(factor[:rank, :rank], factor[:rank, rank:])
     shares = np.where(np.abs(shares) > 1e2 * tolerance, shares, 0.0)
     scale = np.where(acts, found.scale, 0.0)
     shares = shares * scale[order[rank:]] / scale[order[:rank], None]

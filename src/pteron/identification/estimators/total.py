@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.identification.errors import LogError
-from pteron.identification.estimators.estimate import Estimate, estimate_of
+from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.logs import Log
@@ -79,8 +79,7 @@ def total(
     LogError
         If the observations do not determine the values, or noise explains all there is.
     """
-    plain = qr_factor(observations)
-    plain.check_seen()
+    plain = qr_factor(observations).check_seen()
     noise = actuator_noise(observations, plain.values())
     factor = qr_factor(observations, 1.0 / noise)
     given = errors
@@ -125,16 +124,9 @@ def total(
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)
     normal = normal - float(sizes[-1] ** 2) * np.diag(errors**2)
     lengths = np.outer(factor.scale, factor.scale)
-    return estimate_of(
-        "total",
-        observations,
-        factor,
-        values,
-        weights=1.0 / noise,
-        iterations=iteration,
-        converged=converged,
-        inverse=np.linalg.inv(normal / lengths) / lengths,
-    )
+    inverse = np.linalg.inv(normal / lengths) / lengths
+    how = Search("total", iteration, converged)
+    return estimate_of(how, observations, factor, values, weights=1.0 / noise, inverse=inverse)
 
 
 def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed: Seed = 0) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.identification.excitation.fourier import FourierMotion
-from pteron.identification.long_matrices import triangle
+from pteron.identification.observation import triangle
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.reduction import BaseParameters

@@ -206,22 +206,22 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _near(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:
     """Return the limits that the motion is near to; the platform's place is always watched."""
-    times = motion.uniform_times(_CHECKED * motion.harmonics)
-    found = relative_margins(motion, setting.limits, times)
-    always = ("type_i", "type_ii")
+    found, always = _margins(motion, setting)[0], ("type_i", "type_ii")
     return tuple(name for name, values in found.items() if name in always or values.min() < _NEAR)
 
 
 def _violations(motion: FourierMotion, setting: Setting) -> tuple[tuple[str, ...], Array]:
     """Return the limits that are violated, and the instants (E,) of the least margins."""
-    times = motion.uniform_times(_CHECKED * motion.harmonics)
-    names = []
+    found, times = _margins(motion, setting)
     instants = [np.empty(0)]
-    for name, values in relative_margins(motion, setting.limits, times).items():
-        if (values < 0.0).any():
-            names.append(name)
-        for margin in values.T:
-            # Of a stretch out of reach, all -inf, the first instant counts.
-            dip = (margin < 0.0) & (margin <= np.roll(margin, -1)) & (margin < np.roll(margin, 1))
-            instants.append(times[dip])
-    return tuple(names), np.concatenate(instants)
+    for margin in np.hstack(list(found.values())).T:
+        # Of a stretch out of reach, all -inf, the first instant counts.
+        dip = (margin < 0.0) & (margin <= np.roll(margin, -1)) & (margin < np.roll(margin, 1))
+        instants.append(times[dip])
+    names = tuple(name for name, values in found.items() if (values < 0.0).any())
+    return names, np.concatenate(instants)
+
+
+def _margins(motion: FourierMotion, setting: Setting) -> tuple[dict[str, Array], Array]:
+    times = motion.uniform_times(_CHECKED * motion.harmonics)
+    return relative_margins(motion, setting.limits, times), times

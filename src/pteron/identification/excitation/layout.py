@@ -10,7 +10,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 import polars as pl
 
-from pteron.arguments import expect_to_fit
+from pteron.arguments import expect_one_of, expect_to_fit
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, shown
 from pteron.identification.excitation.movement import Movement
@@ -70,15 +70,10 @@ class Layout:
     decimal: str = "."
 
     def __post_init__(self) -> None:
-        for name, known in (
-            ("contents", Contents),
-            ("length_unit", LengthUnit),
-            ("angle_unit", AngleUnit),
-            ("time_unit", TimeUnit),
-        ):
-            given = getattr(self, name)
-            if given not in get_args(known):
-                raise DataError(f"{name}: {given!r} is not one of {', '.join(get_args(known))}")
+        expect_one_of(get_args(Contents), contents=self.contents)
+        expect_one_of(get_args(LengthUnit), length_unit=self.length_unit)
+        expect_one_of(get_args(AngleUnit), angle_unit=self.angle_unit)
+        expect_one_of(get_args(TimeUnit), time_unit=self.time_unit)
         if self.joint_columns is not None:
             object.__setattr__(self, "joint_columns", tuple(self.joint_columns))
         _ = self.dialect  # which refuses signs that cannot be

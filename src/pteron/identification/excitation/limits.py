@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +27,14 @@ UNITS = {
 
 PER_JOINT = ("speed", "acceleration", "force")
 """Limits that may be given for each joint."""
+
+_SHARES: dict[str, tuple[Callable[[float], bool], str]] = {
+    "type_i": (lambda value: 0.0 < value < 1.0, "between 0 and 1"),
+    "type_ii": (lambda value: 0.0 < value < 1.0, "between 0 and 1"),
+    "joint_clearance": (lambda value: value >= 0.0, "0 or more"),
+    "passive_clearance": (lambda value: 0.0 <= value < 1.0, "at least 0 and below 1"),
+}
+"""Whether a number can be each of the other limits, and what is expected."""
 
 _SPEED = 1.0
 """Speed limit of joints whose drives have none, m/s or rad/s."""
@@ -106,19 +114,10 @@ class Limits:
             if not values or min(values) <= 0.0:
                 raise DataError(f"limits: {name} {given} given, numbers above 0 expected")
             object.__setattr__(self, name, values if several else values[0])
-        for name in ("type_i", "type_ii"):
+        for name, (fits, expected) in _SHARES.items():
             value = _number(name, getattr(self, name))
-            if not 0.0 < value < 1.0:
-                raise DataError(f"limits: {name} {value:g} given, between 0 and 1 expected")
-        if _number("joint_clearance", self.joint_clearance) < 0.0:
-            raise DataError(
-                f"limits: joint_clearance {self.joint_clearance:g} given, 0 or more expected"
-            )
-        if not 0.0 <= _number("passive_clearance", self.passive_clearance) < 1.0:
-            raise DataError(
-                f"limits: passive_clearance {self.passive_clearance:g} given, at least 0 and below "
-                "1 expected"
-            )
+            if not fits(value):
+                raise DataError(f"limits: {name} {value:g} given, {expected} expected")
 
 
 def per_joint(limits: Limits, name: str, robot: Manipulator) -> Array:

@@ -104,22 +104,16 @@ def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
     True
     """
     times, step = np.linspace(0.0, motion.duration, samples, retstep=True)
-    found = []
-    coarse = _margins_of(motion.robot, limits, motion.states(times))
+    found, robot = [], motion.robot
+    coarse = _margins_of(robot, limits, motion.states(times))
     for name, values in coarse.items():
         tightest = times[int(values.min(axis=-1).argmin())]
         near = tightest + np.linspace(-step, step, _REFINED)
-        values = _margins_of(motion.robot, limits, motion.states(near))[name]
+        values = _margins_of(robot, limits, motion.states(near))[name]
         k, leg = np.unravel_index(int(values.argmin()), values.shape)
-        found.append(
-            Margin(
-                name,
-                float(values[k, leg]),
-                None if name == "type_ii" else int(leg) + 1,
-                float(near[k] % motion.duration),
-                unit_of(motion.robot, name, int(leg)),
-            )
-        )
+        owner, unit = None if name == "type_ii" else int(leg) + 1, unit_of(robot, name, int(leg))
+        when = float(near[k] % motion.duration)
+        found.append(Margin(name, float(values[k, leg]), owner, when, unit))
     return Margins(tuple(found), samples)
 
 

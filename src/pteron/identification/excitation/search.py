@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple, get_args
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -149,41 +149,31 @@ def optimal_excitation(
     limits = limits or Limits.of(robot)
     _check(criterion, starts, draws, seconds)
     base = base or base_parameters(robot)
+    motion: dict[str, Any] = {"space": space, "harmonics": harmonics, "period": period}
+    motion["limits"] = limits
     search = _Search(criterion, base, progress or (lambda share: None))
     interrupted = False
     begin = time.monotonic()
     try:
         for k, seeds in enumerate(np.random.SeedSequence(seed).spawn(draws)):
-            drawn = random_excitation(
-                robot,
-                space=space,
-                harmonics=harmonics,
-                period=period,
-                limits=limits,
-                seed=np.random.default_rng(seeds),
-            )
-            search.drawn.append(search.judged(drawn))
+            rng = np.random.default_rng(seeds)
+            search.drawn.append(search.judged(random_excitation(robot, **motion, seed=rng)))
             search.report(_SEEN * (k + 1) / draws)
             if time.monotonic() - begin > _DRAWING * seconds:
                 break
         search.short = _SHORT * search.lengths()
-        setting = Setting(
-            robot,
-            columns_of(base),
-            space,
-            harmonics,
-            period,
-            limits,
-            criterion,
-            tuple(search.short),
+        search.setting = Setting(
+            *(robot, columns_of(base), space, harmonics, period, limits, criterion),
+            short=tuple(search.short),
         )
         processes = min(starts, workers or min(os.cpu_count() or 1, _MOST_WORKERS))
-        search.choose(setting, starts)
-        deadline = begin + seconds
+        search.choose(starts)
+        left = begin + seconds - time.monotonic()
         first, second = ROUNDS[criterion]
-        search.improve(setting, first, _FIRST * (deadline - time.monotonic()), processes)
-        search.keep(math.ceil(starts / _ONE_OF))
-        search.improve(setting, second, deadline - time.monotonic(), processes)
+        search.improve(search.starts, first, _FIRST * left, processes)
+        best = sorted(search.starts, key=lambda one: search.cost(one.best))
+        left = begin + seconds - time.monotonic()
+        search.improve(best[: math.ceil(starts / _ONE_OF)], second, left, processes)
     except KeyboardInterrupt:
         if not search.drawn:
             raise
@@ -198,6 +188,16 @@ class _Candidate(NamedTuple):
 
 
 @dataclass
+class _Started:
+    """A start of the search: the random motion, by its number, and the best made of it."""
+
+    draw: int
+    first: _Candidate
+    best: _Candidate
+    finished: bool = False
+
+
+@dataclass
 class _Search:
     """The state of the search."""
 
@@ -207,11 +207,8 @@ class _Search:
     short: Array = field(default_factory=lambda: np.zeros(1))
     """The lengths of columns (p,) below which a parameter is shown too little."""
     drawn: list[_Candidate] = field(default_factory=list)
-    starts: list[Start] = field(default_factory=list)
-    best: list[_Candidate] = field(default_factory=list)
-    """For each start."""
-    running: list[int] = field(default_factory=list)
-    """The starts that are still worked on."""
+    starts: list[_Started] = field(default_factory=list)
+    setting: Setting = field(init=False)
     seen: float = 0.0
     """The share of the work that is done."""
 
@@ -230,73 +227,54 @@ class _Search:
             return -one.conditioning.logdet
         return condition_of_long(one.root, self.short)
 
-    def choose(self, setting: Setting, starts: int) -> None:
+    def choose(self, starts: int) -> None:
         """Choose the best random motions as starts."""
         order = sorted(range(len(self.drawn)), key=lambda k: self.cost(self.drawn[k]))[:starts]
-        self.best = [self.drawn[k] for k in order]
-        if not math.isfinite(self.cost(self.best[0])):
+        self.starts = [_Started(k, self.drawn[k], self.drawn[k]) for k in order]
+        if not math.isfinite(self.cost(self.starts[0].best)):
             raise DataError(
-                f"harmonics: {setting.harmonics} given, too few to tell {self.base.rank} base "
-                f"parameters of {setting.robot.name} apart; take more"
+                f"harmonics: {self.setting.harmonics} given, too few to tell {self.base.rank} "
+                f"base parameters of {self.setting.robot.name} apart; take more"
             )
-        self.starts = [
-            Start(k, one.conditioning, one.conditioning, False)
-            for k, one in zip(order, self.best, strict=True)
-        ]
-        self.running = list(range(len(order)))
 
-    def keep(self, count: int) -> None:
-        """Go on with the best starts only."""
-        self.running = sorted(self.running, key=lambda k: self.cost(self.best[k]))[:count]
-
-    def improve(self, setting: Setting, plan: Round, seconds: float, workers: int) -> None:
-        """Do a round on the running starts, in so many seconds."""
-        workers = min(workers, len(self.running))
-        each = seconds / math.ceil(len(self.running) / workers)
+    def improve(
+        self, starts: Sequence[_Started], plan: Round, seconds: float, workers: int
+    ) -> None:
+        """Do a round on some starts, in so many seconds."""
+        workers = min(workers, len(starts))
+        each = seconds / math.ceil(len(starts) / workers)
         if each <= 0.0:
             return
-        tasks = [Improvement(k, setting, plan, self.best[k].motion, each) for k in self.running]
-        seen = self.seen
-        share = dict.fromkeys(self.running, 0.0)
+        motions = enumerate(one.best.motion for one in starts)
+        tasks = [Improvement(k, self.setting, plan, motion, each) for k, motion in motions]
+        seen, share = self.seen, [0.0] * len(starts)
         weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
         with closing(improved(tasks, workers)) as stages:
             for one in stages:
                 share[one.number] = 1.0 if one.ended else one.stage / (plan.stages + 1)
-                self.take(one)
-                self.report(seen + weight * sum(share.values()) / len(share))
+                self.take(one, starts[one.number])
+                self.report(seen + weight * sum(share) / len(share))
 
     def report(self, share: float) -> None:
         self.seen = share
         self.progress(share)
 
-    def take(self, one: Improvement) -> None:
-        number = one.number
-        if one.finished and one.plan.thorough:
-            self.starts[number] = replace(self.starts[number], finished=True)
-        if not one.improved:
-            return
-        found = self.judged(one.safe)
-        if self.cost(found) < self.cost(self.best[number]):
-            self.best[number] = found
-            self.starts[number] = replace(self.starts[number], after=found.conditioning)
+    def take(self, one: Improvement, start: _Started) -> None:
+        start.finished = start.finished or (one.finished and one.plan.thorough)
+        if one.improved:
+            start.best = min(start.best, self.judged(one.safe), key=self.cost)
 
     def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:
         random = min(self.drawn, key=self.cost)
-        best = min([*self.best, random], key=self.cost)
-        return Excitation(
-            best.motion,
-            limits,
-            self.criterion,
-            best.conditioning,
-            random.conditioning,
-            margins(best.motion, limits),
-            found_lead(best.motion, limits),
-            tuple(self.starts),
-            len(self.drawn),
-            seed,
-            seconds,
-            interrupted,
+        best = min([*(one.best for one in self.starts), random], key=self.cost)
+        starts = tuple(
+            Start(one.draw, one.first.conditioning, one.best.conditioning, one.finished)
+            for one in self.starts
         )
+        left, lead = margins(best.motion, limits), found_lead(best.motion, limits)
+        how = self.criterion, best.conditioning, random.conditioning, left, lead, starts
+        ended = len(self.drawn), seed, seconds, interrupted
+        return Excitation(best.motion, limits, *how, *ended)
 
 
 def _check(criterion: str, starts: int, draws: int, seconds: float) -> None:

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular  # type: ignore[import-untyped]
-from scipy.optimize import nnls  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 
@@ -165,12 +164,12 @@ def _step(
     sizes, axes = np.linalg.eigh(hessian)
     felt = _FELT * float(np.linalg.norm(here.gradient)) / radius
     factor = np.linalg.cholesky((axes * np.maximum(sizes, felt)) @ axes.T)
-    shift = solve_triangular(factor, here.gradient, lower=True)
+    shift = scipy.linalg.solve_triangular(factor, here.gradient, lower=True)
 
     # Rows of c + A d + t >= 0, of the trust region, and of t >= 0, in y = L' d + L^-1 g, w t + 1
     box = np.vstack([np.eye(count), -np.eye(count)])
     rows = np.vstack([slopes[near], box])
-    rows = solve_triangular(factor, rows.T, lower=True).T
+    rows = scipy.linalg.solve_triangular(factor, rows.T, lower=True).T
     beyond = np.concatenate([-here.margins[near], np.full(2 * count, -radius)]) + rows @ shift
     slack = np.concatenate([np.full(len(near), 1.0 / weight), np.zeros(2 * count)])
     rows = np.vstack([np.column_stack([rows, slack]), np.append(np.zeros(count), 1.0)])
@@ -179,12 +178,12 @@ def _step(
     target = np.zeros(count + 2)
     target[-1] = 1.0
     system = np.vstack([rows.T, beyond])
-    found, _ = nnls(system, target, maxiter=10 * system.shape[1])
+    found, _ = scipy.optimize.nnls(system, target, maxiter=10 * system.shape[1])
     rest = system @ found - target
     if rest[-1] >= 0.0:  # no step within the region is told apart from none, for want of digits
         return np.full(count, np.nan), np.zeros(len(here.margins)), 0.0
     y = -rest[:-1] / rest[-1]
-    step = solve_triangular(factor.T, y[:-1] - shift, lower=False)
+    step = scipy.linalg.solve_triangular(factor.T, y[:-1] - shift, lower=False)
     multipliers = np.zeros(len(here.margins))
     multipliers[near] = found[: len(near)] / -rest[-1]
     return step, multipliers, max(float(y[-1]) - 1.0, 0.0) / weight

@@ -16,7 +16,7 @@ import numpy as np
 from pteron.equations.friction import passive_joints
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
-from pteron.identification.model import Model
+from pteron.identification.model import Model, diagonal
 from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
@@ -77,17 +77,12 @@ def _forces(model: Model) -> Sequence[str]:
     return model.robot.force_names
 
 
-def _each(signal: Array) -> Array:
-    """Return signals (R, n) as columns (R, n, n), one for each actuator."""
-    return np.asarray(signal[..., None] * np.eye(signal.shape[-1]))
-
-
 def _load(m: FittedMotion) -> Array:
     return m.forces(of=["base"])
 
 
 def _stribeck(share: float, m: FittedMotion) -> Array:
-    return _each(m.direction * np.exp(-((m.states.joint_rates / (share * m.usual)) ** 2)))
+    return diagonal(m.direction * np.exp(-((m.states.joint_rates / (share * m.usual)) ** 2)))
 
 
 def _elasticity(m: FittedMotion) -> Array:
@@ -104,7 +99,7 @@ def _elasticity(m: FittedMotion) -> Array:
 
 def _drift(m: FittedMotion) -> Array:
     later = m.along[:, None]
-    return np.concatenate([_each(later * m.direction), _each(later + 0.0 * m.direction)], axis=-1)
+    return np.concatenate([diagonal(later * d) for d in (m.direction, m.direction**0)], axis=-1)
 
 
 def _weight(m: FittedMotion) -> Array:
@@ -157,7 +152,7 @@ _OTHERS = (
     ),
     Family("elasticity", "m/N", _forces, _elasticity, positive=True),
     Family("drift", "N", lambda m: [*_forces(m), *_forces(m)], _drift),
-    Family("load", "", _forces, lambda m: _each(m.direction * np.abs(_load(m))), positive=True),
+    Family("load", "", _forces, lambda m: diagonal(m.direction * np.abs(_load(m))), positive=True),
     Family("passive", "N m s", _passive_legs, _passive, positive=True),
 )
 
@@ -173,7 +168,7 @@ def _scale(i: int) -> Family:
         "scale",
         "",
         lambda model: _forces(model)[one],
-        lambda m: _each(m.forces())[..., one],
+        lambda m: diagonal(m.forces())[..., one],
         of_machine=False,
         largest=1.0,
     )

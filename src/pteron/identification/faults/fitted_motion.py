@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
 
-from pteron.equations.machine import numbers
+from pteron.equations.machine import number_places, numbers
 from pteron.identification.model import Model
 from pteron.identification.signals import States
 from pteron.kernels import Array, Kernel
@@ -26,15 +26,11 @@ _FEWEST = 8
 
 def lengths_of(robot: Manipulator) -> list[tuple[int, int]]:
     """Return leg, from 0, and place in the vector of `numbers`, of each number that is in m."""
-    found, place = [], 0
-    for i, leg in enumerate(robot.legs):
-        for quantity in leg.quantities:
-            size = len(quantity.value)
-            if quantity.role in ("point", "length"):
-                found += [(i, place + k) for k in range(size)]
-            place += size
-        found += [(i, place + k) for k in range(3)]  # the platform point; then the fixed offset
-        place += 6
+    found = []
+    for i, (leg, at) in enumerate(zip(robot.legs, number_places(robot), strict=False)):
+        sizes = {q.name: len(q.value) for q in leg.quantities if q.role in ("point", "length")}
+        for name, size in (sizes | {"platform_point": 3}).items():
+            found += [(i, at[name] + k) for k in range(size)]
     return found
 
 
@@ -129,7 +125,9 @@ class FittedMotion:
         rows = len(self.states)
         if len(self._some) == rows:
             return columns
-        return np.asarray(make_interp_spline(self._some, columns, k=5)(np.arange(rows)))
+        return np.asarray(
+            scipy.interpolate.make_interp_spline(self._some, columns, k=5)(np.arange(rows))
+        )
 
     @cached_property
     def _some(self) -> NDArray[np.int64]:

@@ -202,21 +202,13 @@ def _isolated(
         for a, b in pairwise(fits)
     ]
     step = 1.0 / max(part.how.rate for part in parts)
-    faults = [
-        IsolatedFault(
-            one.family.name,
-            tuple(one.family.sizes(model)),
-            one.sizes,
-            one.deviations,
-            one.chance,
-            shift,
-            spoils,
-            None if one.family.speed is None else one.family.speed * columns.usual,
-            step,
-        )
-        for one, shift, spoils in zip(found, shifts, each, strict=True)
-        if not (spoils < _NAMED).all()
-    ]
+    faults = []
+    for one, shift, spoils in zip(found, shifts, each, strict=True):
+        if not (spoils < _NAMED).all():
+            family, seen = one.family, (one.sizes, one.deviations, one.chance, shift, spoils)
+            speeds = None if family.speed is None else family.speed * columns.usual
+            labels = tuple(family.sizes(model))
+            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step))
 
     # The scales of all forces and of time, which the residuals cannot show
     tried = tuple(dict.fromkeys(family.name for family in columns.families))
@@ -228,16 +220,9 @@ def _isolated(
         if factor.wrong and all(factor.times(s).wrong for s in slow):
             off = factor.value - 1.0
             wrong = np.full(len(nothing), 100.0 * abs(1.0 - 1.0 / factor.value))
-            gain = IsolatedFault(
-                "gain",
-                tuple(known),
-                np.array([off]),
-                np.array([factor.deviation]),
-                factor.chance,
-                abs(off) / factor.deviation,
-                wrong,
-            )
-            faults.insert(0, gain)
+            size, error = np.array([off]), np.array([factor.deviation])
+            told = factor.chance, abs(off) / factor.deviation, wrong
+            faults.insert(0, IsolatedFault("gain", tuple(known), size, error, *told))
             spoiled = np.hypot(spoiled, wrong)
     if factor is None or not factor.told:
         left_open.insert(0, "gain")
@@ -282,16 +267,9 @@ def _parts(
     found = []
     for (log, how, part), blocks in zip(chosen, states, strict=True):
         fastest = max(how.cutoff or 0.0, how.band)
-        columns = FaultColumns(
-            model,
-            estimate.values,
-            usual,
-            float(log.time[0]),
-            float(log.time[-1]),
-            families,
-            max(int(how.rate / (_POINTS * fastest)), 1),
-            _MOTION * how.band,
-        )
+        ends, stride = log.time[[0, -1]].tolist(), max(int(how.rate / (_POINTS * fastest)), 1)
+        about = families, stride, _MOTION * how.band
+        columns = FaultColumns(model, estimate.values, usual, ends[0], ends[1], *about)
         found.append(_Part(columns, part, how, blocks))
     return found
 

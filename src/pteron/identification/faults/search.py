@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import chi2  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.identification.estimators import Estimate, weighted
+from pteron.identification.estimators.estimate import wald
 from pteron.identification.estimators.qr import actuator_factors
 from pteron.identification.faults.columns import Family, FaultColumns
 from pteron.identification.faults.fault import FaultName
-from pteron.identification.long_matrices import scaled
-from pteron.identification.observation import Observations
+from pteron.identification.observation import Observations, scaled
 from pteron.identification.plausibility import CLEAR, WANTED
 from pteron.kernels import Array
 
@@ -108,10 +108,10 @@ def searched(
         for k, family in enumerate(model.families):
             if family not in wanted or family.name in (one.family.name for one in found):
                 continue
-            one, wald = _taken_in(model, observations, triangles, found, k)
+            one, statistic = _taken_in(model, observations, triangles, found, k)
             if one is not None and one.chance < _CHANCE and _is_possible(one, model):
-                clear.append((wald, one))
-        best = max((wald for wald, _ in clear), default=0.0)
+                clear.append((statistic, one))
+        best = max((statistic for statistic, _ in clear), default=0.0)
         first = first or best
         # What is left beside a clear fault may be its own shape, which no column has exactly.
         if not best > _BESIDE * first:
@@ -188,8 +188,8 @@ def _taken_in(
         return fit, fit.values[last], fit.covariance[last, last]
 
     fit, size, covariance = fitted(mix)
-    wald = _wald(size, covariance)
-    chance = float(chi2.sf(wald, q))
+    statistic = wald(size, covariance)
+    chance = float(scipy.stats.chi2.sf(statistic, q))
     clear = np.abs(size) > _CLEAR * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if chance < _CHANCE and clear.any() and not clear.all():
         mix = mix[:, clear]
@@ -203,7 +203,8 @@ def _taken_in(
     variances = np.einsum("ij,jk,ik->i", mix, covariance, mix)
     deviations = np.sqrt(np.maximum(variances, 0.0))
     usual = _likely(size, covariance, mix, model) if family.unit == "m" else 1.0
-    return FoundFault(family, mix, mix @ size, deviations, chance, fit, usual, tuple(others)), wald
+    one = FoundFault(family, mix, mix @ size, deviations, chance, fit, usual, tuple(others))
+    return one, statistic
 
 
 def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
@@ -213,16 +214,7 @@ def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> 
     both = back @ back.T + covariance
     # The most likely sizes leave C (C0 + C)^-1 of what was found.
     left = np.linalg.solve(both, size)
-    return 1.0 - float(left @ covariance @ left) / _wald(size, covariance)
-
-
-def _wald(size: Array, covariance: Array) -> float:
-    """Return Wald's statistic of sizes (q,) that may all be zero."""
-    unit = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), 1e-300)
-    standard = size / unit
-    # Two mixtures of a fit without noise may be known alike: least squares, where it is singular.
-    correlation = covariance / np.outer(unit, unit)
-    return float(standard @ np.linalg.lstsq(correlation, standard, rcond=None)[0])
+    return 1.0 - float(left @ covariance @ left) / wald(size, covariance)
 
 
 def _is_possible(one: FoundFault, model: FaultColumns) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,35 +43,9 @@ class _Run:
     least: Values
     greatest: Values
 
-
-@dataclass
-class _Tally:
-    """A count of an event, with the row and values of the first."""
-
-    count: int = 0
-    row: int = 0
-    first: tuple[float, ...] = ()
-
-    def add(self, count: int, row: int, *first: float) -> None:
-        if count and not self.count:
-            self.row, self.first = row, first
-        self.count += count
-
-
-@dataclass
-class _Extreme:
-    """A count of the runs that hold the greatest value so far, or the least."""
-
-    word: str
-    sign: float
-    value: float = -np.inf
-    runs: int = 0
-    rows: _Tally = field(default_factory=_Tally)
-
-    def look(self, values: Values) -> None:
-        greatest = float((self.sign * values).max())
-        if greatest > self.value:
-            self.value, self.runs, self.rows = greatest, 0, _Tally()
+    @property
+    def rows(self) -> int:
+        return self.stop - self.start
 
 
 class Channel:
@@ -94,38 +68,39 @@ class Channel:
         if joint is not None:
             self._moved[joint] = np.inf
         self._is_force, self._limits = joint is None, limits
-        self._rows = 0
-        self._run: _Run | None = None
-        self._extremes = (_Extreme("greatest", 1.0), _Extreme("least", -1.0))
-        self._frozen, self._beyond = _Tally(), _Tally()
+        self._rows = self._beyond = self._first_beyond = 0
+        self._least, self._greatest = np.inf, -np.inf
+        self._runs: list[_Run] = []
 
     def take(self, values: Values, joints: Values) -> None:
         """Look at the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
-        for extreme in self._extremes:
-            extreme.look(values)
+        self._least = min(self._least, float(values.min()))
+        self._greatest = max(self._greatest, float(values.max()))
         if self._limits is not None:
             low, high = self._limits
             rounding = _ROUNDING * max(abs(low), abs(high))
             beyond = (values <= low + rounding) | (values >= high - rounding)
-            self._beyond.add(int(beyond.sum()), self._rows + int(np.argmax(beyond)))
+            if not self._beyond:
+                self._first_beyond = self._rows + int(np.argmax(beyond))
+            self._beyond += int(beyond.sum())
         starts = np.flatnonzero(np.diff(values, prepend=np.nan))
         lengths = np.diff(starts, append=len(values))
         held = values[starts]
-        extreme_held = np.isin(held, [one.sign * one.value for one in self._extremes])
-        telling = (lengths > _FROZEN_ROWS) | extreme_held & (lengths >= _CLIPPED_ROWS)
-        # The first may go on with the run of the piece before, the last is still open.
+        extreme = np.isin(held, [self._least, self._greatest])
+        telling = (lengths > _FROZEN_ROWS) | extreme & (lengths >= _CLIPPED_ROWS)
+        # The first may go on with the run of the piece before, and the last in the next one.
         telling[[0, -1]] = True
         for i in np.flatnonzero(telling):
-            start, stop, last = int(starts[i]), int(starts[i] + lengths[i]), self._run
+            start, stop = int(starts[i]), int(starts[i] + lengths[i])
             least, greatest = joints[start:stop].min(axis=0), joints[start:stop].max(axis=0)
             run = _Run(float(held[i]), self._rows + start, self._rows + stop, least, greatest)
-            if last is not None and i == 0 and last.value == run.value:
-                run.start = last.start
-                run.least = np.minimum(last.least, least)
-                run.greatest = np.maximum(last.greatest, greatest)
-            elif last is not None:
-                self._close(last)
-            self._run = run
+            last = self._runs[-1] if self._runs else run
+            if i == 0 and last is not run and last.value == run.value:
+                last.stop = run.stop
+                last.least = np.minimum(last.least, least)
+                last.greatest = np.maximum(last.greatest, greatest)
+            else:
+                self._runs.append(run)
         self._rows += len(values)
 
     def finish(self) -> tuple[Finding, ...]:
@@ -136,56 +111,42 @@ class Channel:
         DataError
             If the channel held one value throughout.
         """
-        if self._run is not None:
-            if self._run.start == 0:
-                raise DataError(
-                    f"{self._source}: column {self._column} holds {self._run.value:g} in all "
-                    f"{self._rows} rows: dead channel; record it again, or correct which columns "
-                    "are read"
-                )
-            self._close(self._run, last=True)
-            self._run = None
-        column = f"column {self._column}"
-        found = []
-        if self._frozen.count:
-            stop, value = self._frozen.first
-            message = (
-                f"{column} holds {value:g} in rows {self._frozen.row + 1} to {stop:.0f} while "
-                f"other joints move: frozen channel{_more(self._frozen, 'stretches')}"
+        runs, column, found = self._runs, f"column {self._column}", []
+        if runs and runs[0].rows == self._rows:
+            raise DataError(
+                f"{self._source}: {column} holds {runs[0].value:g} in all {self._rows} rows: dead "
+                "channel; record it again, or correct which columns are read"
             )
-            found.append(self._finding("frozen", message, self._frozen))
-        if self._limits is not None and self._beyond.count:
+        frozen = [run for run in runs if run.rows > _FROZEN_ROWS and self._is_frozen(run)]
+        if frozen:
+            first, more = frozen[0], f" ({len(frozen)} such stretches in all)"
+            message = (
+                f"{column} holds {first.value:g} in rows {first.start + 1} to {first.stop} while "
+                f"other joints move: frozen channel{more * (len(frozen) > 1)}"
+            )
+            found.append(self._finding("frozen", message, first.start, len(frozen)))
+        if self._limits is not None and self._beyond:
             low, high = self._limits
             message = (
                 f"{column} is at or beyond its limits {low:g} and {high:g} in "
-                f"{self._beyond.count} rows, first in row {self._beyond.row + 1}: clipped"
+                f"{self._beyond} rows, first in row {self._first_beyond + 1}: clipped"
             )
-            found.append(self._finding("clipped", message, self._beyond))
-        if self._limits is None and self._is_force:
-            for one in self._extremes:
-                if one.runs >= _CLIPPED_RUNS:
-                    message = (
-                        f"{column} holds its {one.word} value {one.sign * one.value:g} in "
-                        f"{one.runs} stretches, {one.rows.count} rows in all, first from row "
-                        f"{one.rows.row + 1}: clipped"
-                    )
-                    found.append(self._finding("clipped", message, one.rows))
+            found.append(self._finding("clipped", message, self._first_beyond, self._beyond))
+        for word, value in (("greatest", self._greatest), ("least", self._least)):
+            held = [run for run in runs if run.value == value and run.rows >= _CLIPPED_ROWS]
+            if self._limits is None and self._is_force and len(held) >= _CLIPPED_RUNS:
+                rows, start = sum(run.rows for run in held), held[0].start
+                message = (
+                    f"{column} holds its {word} value {value:g} in {len(held)} stretches, "
+                    f"{rows} rows in all, first from row {start + 1}: clipped"
+                )
+                found.append(self._finding("clipped", message, start, rows))
         return tuple(found)
 
-    def _close(self, run: _Run, *, last: bool = False) -> None:
-        moved = self._moved * (_RESTED if last or run.start == 0 else 1.0)
-        rows = run.stop - run.start
-        for extreme in self._extremes:
-            if rows >= _CLIPPED_ROWS and run.value == extreme.sign * extreme.value:
-                extreme.runs += 1
-                extreme.rows.add(rows, run.start)
-        if rows > _FROZEN_ROWS and (run.greatest - run.least > moved).any():
-            self._frozen.add(1, run.start, run.stop, run.value)
+    def _is_frozen(self, run: _Run) -> bool:
+        at_the_end = run.start == 0 or run.stop == self._rows
+        moved = self._moved * (_RESTED if at_the_end else 1.0)
+        return bool((run.greatest - run.least > moved).any())
 
-    def _finding(self, kind: Kind, message: str, tally: _Tally) -> Finding:
-        message = f"{self._source}: {message}"
-        return Finding(kind, message, tally.row + 1, self._column, tally.count)
-
-
-def _more(tally: _Tally, what: str) -> str:
-    return f" ({tally.count} such {what} in all)" if tally.count > 1 else ""
+    def _finding(self, kind: Kind, message: str, start: int, count: int) -> Finding:
+        return Finding(kind, f"{self._source}: {message}", start + 1, self._column, count)

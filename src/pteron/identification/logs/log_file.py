@@ -28,7 +28,7 @@ from pteron.identification.logs.description_file import (
     read_description,
     told_at_once,
 )
-from pteron.identification.logs.log import Finding, Log, joined
+from pteron.identification.logs.log import Finding, Log, TimeStamps, joined
 from pteron.identification.logs.recorded import check_forces
 from pteron.identification.logs.sizes import (
     check_bounds,
@@ -39,7 +39,6 @@ from pteron.identification.logs.sizes import (
     standstill,
 )
 from pteron.identification.logs.spikes import MARGIN, Spikes
-from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings, reading_scales
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
@@ -96,6 +95,7 @@ class LogFile:
         self._names = tuple(name for group in self._groups for name in group.names)
         self._again = RepeatedTimes(file.repeated, c, source)
         self._bounds = joint_bounds(robot), pose_bounds(robot)
+        self._mass: float | None = None
         self._clock, self._step = self._usual_step()
         self._read = (
             *as_read(source, file.found, c, description, self._clock, self._again),
@@ -236,6 +236,7 @@ class LogFile:
             forces=forces,
             pose=pose if c.pose.names else None,
             payload=self._phases(payload[:, 0], first) if c.payload.names else None,
+            payload_mass=self._mass,
             description=self.description,
             first_row=first,
             step=self._step,
@@ -245,14 +246,19 @@ class LogFile:
         )
 
     def _phases(self, values: Values, first: int) -> NDArray[np.int64]:
-        bad = (values != 0.0) & (values != 1.0)
+        """Return 1 where a payload is carried: where the column is not 0, but 1 or its mass."""
+        carried = values[values != 0.0]
+        if self._mass is None and len(carried):
+            self._mass = float(carried[0])
+        bad = (values != 0.0) & ((values != self._mass) | ~(values > 0.0))
         if bad.any():
             i = int(np.argmax(bad))
             raise DataError(
                 f"{self.source}: row {first + i + 1}, column {self._columns.payload.shown[0]}: "
-                f"{values[i]:g} given; 0 (without payload) or 1 (with) was expected"
+                f"{values[i]:g} given; 0 (without payload) or 1 (with) was expected, or one "
+                "mass in kg; give each payload its own log"
             )
-        return values.astype(np.int64)
+        return np.asarray(values != 0.0, dtype=np.int64)
 
     def _usual_step(self) -> tuple[Clock, float]:
         """Return how times are written, and their median step, s."""

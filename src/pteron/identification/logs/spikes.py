@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, median_filter  # type: ignore[import-untyped]
 
 from pteron.identification.logs.log import Finding
 
@@ -58,7 +58,7 @@ def joint_spikes(values: Values) -> Mask:
     if len(values) < 2 * _WINDOW:
         return np.zeros(len(values), dtype=bool)
     steps = np.diff(values)
-    nearby = median_filter(np.abs(steps), _WINDOW, mode="nearest")
+    nearby = scipy.ndimage.median_filter(np.abs(steps), _WINDOW, mode="nearest")
     return _groups(values, _SHARE_OF_JOINT, _FASTER * nearby)
 
 
@@ -78,7 +78,7 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     low, high = np.percentile(values, _SPAN)
     far = _BEYOND * (high - low)
     usual = (values > low - far) & (values < high + far)
-    turns = maximum_filter1d(turns.astype(np.int8), 5) > 0
+    turns = scipy.ndimage.maximum_filter1d(turns.astype(np.int8), 5) > 0
     motion = _JointMotion(joints)
     for start, stop in runs(found):
         group = slice(start, stop)
@@ -130,7 +130,7 @@ def _pushes(steps: Values, length: int) -> Values:
 def _groups(values: Values, share: float, least: Values | float) -> Mask:
     """Return the samples between a jump and the jump back."""
     steps = np.diff(values)
-    jumps = steps - median_filter(steps, _WINDOW, mode="nearest")
+    jumps = steps - scipy.ndimage.median_filter(steps, _WINDOW, mode="nearest")
     usual = _USUAL * float(np.percentile(np.abs(jumps), 95.0))
     large = np.abs(jumps) > np.maximum(
         max(usual, share * np.ptp(np.percentile(values, _SPAN))), least
@@ -168,9 +168,7 @@ class Spikes:
 
     def __init__(self, columns: tuple[str, ...], source: str) -> None:
         self._columns, self._source = columns, source
-        self._counts = dict.fromkeys(columns, 0)
-        self._rows: dict[str, list[tuple[int, int]]] = {name: [] for name in columns}
-        self._first: dict[str, float] = {}
+        self._found: dict[str, list[tuple[int, int, float]]] = {name: [] for name in columns}
         self._too_many = False
 
     def find(self, joints: Values, forces: Values, inner: slice, first_row: int) -> Mask:
@@ -181,23 +179,15 @@ class Spikes:
         """
         n = joints.shape[1]
         out = np.zeros(inner.stop - inner.start, dtype=bool)
-        for j, name in enumerate(self._columns):
-            whole = (
-                joint_spikes(joints[:, j])
-                if j < n
-                else force_spikes(forces[:, j - n], joints, j - n)
-            )
-            mask = whole[inner]
-            if not mask.any():
-                continue
-            out |= mask
-            groups = runs(mask)
-            start = groups[0][0]
-            channel = joints[:, j] if j < n else forces[:, j - n]
-            self._first.setdefault(name, float(channel[inner][start]))
-            self._counts[name] += int(mask.sum())
-            known = self._rows[name]
-            known += [(first_row + a, first_row + b) for a, b in groups[: _TOLD + 1 - len(known)]]
+        for j, (name, channel) in enumerate(
+            zip(self._columns, np.hstack([joints, forces]).T, strict=True)
+        ):
+            whole = joint_spikes(channel) if j < n else force_spikes(channel, joints, j - n)
+            out |= whole[inner]
+            self._found[name] += [
+                (first_row + a, first_row + b, float(channel[inner][a]))
+                for a, b in runs(whole[inner])
+            ]
         if out.mean() > _MOST:
             self._too_many = True
             out[:] = False
@@ -209,18 +199,18 @@ class Spikes:
         fate = "left out like a gap, not repaired"
         if self._too_many:
             fate = f"left in, for over {_MOST:.0%} of the rows are spikes; record it again"
-        for name in self._columns:
-            rows, count = self._rows[name], self._counts[name]
+        for name, groups in self._found.items():
+            count = sum(b - a for a, b, _ in groups)
             if not count:
                 continue
-            named = [f"{a + 1} to {b}" if b - a > 1 else f"{b}" for a, b in rows[:_TOLD]]
-            more = ", ..." if len(rows) > _TOLD else ""
+            named = [f"{a + 1} to {b}" if b - a > 1 else f"{b}" for a, b, _ in groups[:_TOLD]]
+            more = ", ..." if len(groups) > _TOLD else ""
             plural = "s" * (count > 1)
             what = "spikes" if plural else "a spike"
             message = (
                 f"{self._source}: row{plural} {', '.join(named)}{more}, column {name}: {what} of "
                 f"{count} sample{plural} that jump away and back (the first is "
-                f"{self._first[name]:g}); {fate}"
+                f"{groups[0][2]:g}); {fate}"
             )
-            found.append(Finding("spike", message, rows[0][0] + 1, name, count))
+            found.append(Finding("spike", message, groups[0][0] + 1, name, count))
         return tuple(found)

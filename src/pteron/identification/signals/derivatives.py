@@ -14,14 +14,8 @@ from math import ceil
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy import sparse  # type: ignore[import-untyped]
-from scipy.interpolate import (  # type: ignore[import-untyped]
-    BSpline,
-    make_interp_spline,
-    make_lsq_spline,
-)
-from scipy.ndimage import maximum_filter1d  # type: ignore[import-untyped]
 
 from pteron.identification.logs import Log
 from pteron.identification.signals.filters import SETTLING, smoothed
@@ -83,7 +77,7 @@ class Curve:
     """
 
     coefficients: Array
-    bases: tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]
+    bases: tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]
     ends: int
 
     @property
@@ -191,7 +185,9 @@ class FourierFit:
     def curve(self, log: Log) -> Curve:
         """Return the series at the log's samples."""
         series = self.series(log)
-        q, dq, ddq = map(sparse.csr_matrix, fourier_bases(log.time, series.harmonics, self.period))
+        q, dq, ddq = map(
+            scipy.sparse.csr_matrix, fourier_bases(log.time, series.harmonics, self.period)
+        )
         return Curve(series.coefficients, (q, dq, ddq), 0)
 
     def fastest(self, band: float) -> float | None:
@@ -201,7 +197,7 @@ class FourierFit:
 
 def _earlier(time: Array, signal: Array, delay: float) -> Array:
     """Return smooth signals (T, k) at times (T,) less a delay, s."""
-    return np.asarray(make_interp_spline(time, signal, k=5)(time - delay))
+    return np.asarray(scipy.interpolate.make_interp_spline(time, signal, k=5)(time - delay))
 
 
 Differentiator = CentralDifferences | SmoothingSpline | FourierFit
@@ -216,7 +212,7 @@ def uniform(time: Array, signal: Array) -> tuple[Array, Array]:
     step = (time[-1] - time[0]) / (len(time) - 1)
     if np.abs(time - even).max() <= EVEN * step:
         return even, signal
-    return even, make_interp_spline(time, signal, k=5)(even)
+    return even, scipy.interpolate.make_interp_spline(time, signal, k=5)(even)
 
 
 def central_differences(signal: Array, rate: float) -> tuple[Array, Array]:
@@ -234,7 +230,7 @@ def central_differences(signal: Array, rate: float) -> tuple[Array, Array]:
     return first * rate, second * rate**2
 
 
-def fitted_spline(time: Array, signal: Array, cutoff: float | None) -> BSpline:
+def fitted_spline(time: Array, signal: Array, cutoff: float | None) -> scipy.interpolate.BSpline:
     """Return the spline of degree 7 that is nearest to samples (T, k), or through them all.
 
     Its knots are half a period of the cut-off (Hz) apart: what is faster is taken for noise.
@@ -244,8 +240,8 @@ def fitted_spline(time: Array, signal: Array, cutoff: float | None) -> BSpline:
         if pieces + _DEGREE < len(time) // 2:
             inner = np.linspace(time[0], time[-1], pieces + 1)
             knots = np.r_[[time[0]] * _DEGREE, inner, [time[-1]] * _DEGREE]
-            return make_lsq_spline(time, signal, knots, k=_DEGREE, method="qr")
-    return make_interp_spline(time, signal, k=_DEGREE)
+            return scipy.interpolate.make_lsq_spline(time, signal, knots, k=_DEGREE, method="qr")
+    return scipy.interpolate.make_interp_spline(time, signal, k=_DEGREE)
 
 
 def spline_motion(
@@ -257,14 +253,20 @@ def spline_motion(
     return spline(at), spline(at, 1), spline(at, 2)
 
 
-def _design(spline: BSpline, time: Array, derivative: int) -> sparse.csr_matrix:
+def _design(
+    spline: scipy.interpolate.BSpline, time: Array, derivative: int
+) -> scipy.sparse.csr_matrix:
     """Return a spline's basis functions (T, C) at times, or their derivatives."""
     if derivative == 0:
-        return sparse.csr_matrix(BSpline.design_matrix(time, spline.t, spline.k))
+        return scipy.sparse.csr_matrix(
+            scipy.interpolate.BSpline.design_matrix(time, spline.t, spline.k)
+        )
     # A derivative is a spline of lower degree, whose coefficients are differences of these.
-    slopes = BSpline(spline.t, np.eye(len(spline.c)), spline.k).derivative(derivative)
-    design = BSpline.design_matrix(time, slopes.t, slopes.k)
-    return sparse.csr_matrix(design @ sparse.csr_matrix(slopes.c[: design.shape[1]]))
+    slopes = scipy.interpolate.BSpline(spline.t, np.eye(len(spline.c)), spline.k).derivative(
+        derivative
+    )
+    design = scipy.interpolate.BSpline.design_matrix(time, slopes.t, slopes.k)
+    return scipy.sparse.csr_matrix(design @ scipy.sparse.csr_matrix(slopes.c[: design.shape[1]]))
 
 
 def _without_jumps(time: Array, joints: Array) -> NDArray[np.bool_]:
@@ -280,5 +282,5 @@ def _without_jumps(time: Array, joints: Array) -> NDArray[np.bool_]:
     # samples are apart it is for another reason, such as the rounding of the stamps.
     if apart.mean() > _FEW:
         return np.ones(len(time), dtype=bool)
-    apart = maximum_filter1d(np.pad(apart, LOST).astype(int), 2 * _SMEARED + 1) > 0
+    apart = scipy.ndimage.maximum_filter1d(np.pad(apart, LOST).astype(int), 2 * _SMEARED + 1) > 0
     return np.asarray(~apart)

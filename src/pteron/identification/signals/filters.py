@@ -7,13 +7,8 @@ from functools import cached_property
 from math import comb
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.signal import (  # type: ignore[import-untyped]
-    butter,
-    firwin,
-    sosfiltfilt,
-    upfirdn,
-)
 
 from pteron.kernels import Array
 
@@ -134,9 +129,9 @@ def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:
     """
     if cutoff is None:
         return signal
-    sections = butter(_ORDER, cutoff, fs=rate, output="sos")
+    sections = scipy.signal.butter(_ORDER, cutoff, fs=rate, output="sos")
     padding = min(round(SETTLING * rate / cutoff), len(signal) - 1)
-    return np.asarray(sosfiltfilt(sections, signal, axis=0, padlen=padding))
+    return np.asarray(scipy.signal.sosfiltfilt(sections, signal, axis=0, padlen=padding))
 
 
 def cutoff_of(
@@ -237,7 +232,9 @@ class Decimation:
         """The filter's coefficients, which sum to one."""
         if self.factor == 1:
             return np.ones(1)
-        return np.asarray(firwin(2 * self.margin + 1, 1.0 / self.factor, window=("kaiser", 5.0)))
+        return np.asarray(
+            scipy.signal.firwin(2 * self.margin + 1, 1.0 / self.factor, window=("kaiser", 5.0))
+        )
 
     def noise(self, used: Array) -> Array:
         """Return the noise left of unit white noise on the samples (T, n) that are 1, not 0."""
@@ -256,5 +253,7 @@ class Decimation:
         flat = signal.reshape(len(signal), -1)
         # Sample k of the full convolution belongs to the centre k - margin, and the margin is a
         # multiple of the factor.
-        filtered = upfirdn(taps, flat, down=self.factor, axis=0)[2 * _HALF : 2 * _HALF + count]
+        filtered = scipy.signal.upfirdn(taps, flat, down=self.factor, axis=0)[
+            2 * _HALF : 2 * _HALF + count
+        ]
         return np.asarray(filtered.reshape(count, *signal.shape[1:]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -42,7 +42,8 @@ class Projection:
     def _normal(self) -> tuple[Array, bool]:
         bases = (self.basis(rows) for rows in row_blocks(len(self.time)))
         size = 2 * self.harmonics + 1
-        return cho_factor(sum((basis.T @ basis for basis in bases), np.zeros((size, size))))  # type: ignore[no-any-return]
+        normal = sum((basis.T @ basis for basis in bases), np.zeros((size, size)))
+        return scipy.linalg.cho_factor(normal)  # type: ignore[no-any-return]
 
     @cached_property
     def _first(self) -> Array:
@@ -61,11 +62,13 @@ class Projection:
         right = np.zeros((2 * self.harmonics + 1, size))
         for rows in row_blocks(len(self.time)):
             right += self.basis(rows).T @ signal(rows)
-        return np.asarray(cho_solve(self._normal, right))
+        return np.asarray(scipy.linalg.cho_solve(self._normal, right))
 
     def noise(self, used: Array, kept: Array) -> Array:
         """Return what is left at times `kept` of unit white noise on samples (T, n) that are 1."""
-        at = cho_solve(self._normal, fourier_basis(kept, self.harmonics, self.period).T)
+        at = scipy.linalg.cho_solve(
+            self._normal, fourier_basis(kept, self.harmonics, self.period).T
+        )
         variance = np.zeros((len(kept), used.shape[1]))
         for rows in row_blocks(len(self.time)):
             variance += ((self.basis(rows) @ at) ** 2).T @ used[rows]

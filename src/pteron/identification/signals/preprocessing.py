@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from pteron.arguments import expect_one_of
 from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
@@ -111,11 +112,8 @@ class Processing:
     delay: float | Literal["auto"] = 0.0
 
     def __post_init__(self) -> None:
-        if self.derivatives is not None and self.derivatives not in get_args(Derivatives):
-            raise DataError(
-                f"derivatives: {self.derivatives!r} is not one of "
-                f"{', '.join(get_args(Derivatives))}"
-            )
+        if self.derivatives is not None:
+            expect_one_of(get_args(Derivatives), derivatives=self.derivatives)
         for name in ("cutoff", "band", "period"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0.0):

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
-from scipy.ndimage import binary_closing  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.identification.logs.spikes import runs
 from pteron.identification.signals.filters import position_noise
@@ -60,12 +59,12 @@ def repeating_rows(time: Array, joints: Array, period: float) -> slice | None:
     if last < 2:
         return None
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    after = make_interp_spline(time, joints, k=5)(time[:last] + period)
+    after = scipy.interpolate.make_interp_spline(time, joints, k=5)(time[:last] + period)
     span = np.ptp(joints, axis=0)
     near = np.maximum(_NOISE * position_noise(joints), _ROUNDING * span)
     same = (np.abs(after - joints[:last]) <= near).all(axis=1)
     ends = np.pad(same, _SPIKES, mode="edge")
-    same = binary_closing(ends, np.ones(_SPIKES + 1))[_SPIKES:-_SPIKES]
+    same = scipy.ndimage.binary_closing(ends, np.ones(_SPIKES + 1))[_SPIKES:-_SPIKES]
 
     best: tuple[float, float] | None = None
     for start, stop in runs(same):

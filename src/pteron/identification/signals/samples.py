@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -77,15 +77,8 @@ def samples(
     part, pose = None, preprocessing.start
     for part in parts:
         found = differentiator.differentiated(part, edge)
-        states = States.of_joints(
-            robot,
-            found.motion,
-            found.time,
-            pose,
-            payload=None if part.payload is None else part.payload[edge : part.rows - edge],
-            source=part.source,
-            first_row=part.first_row + edge,
-        )
+        inner = replace(part.part(edge, part.rows - edge), time=found.time)
+        states = States.of_log(robot, inner, found.motion, pose)
         # The next block overlaps this one by its margins.
         pose = tuple(states.pose[-1 - 2 * margin].tolist())
         fresh = slice(margin, len(states) - margin)

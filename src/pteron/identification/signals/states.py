@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,14 @@ class States:
         _check_regular(robot, pose, source, first_row)
         velocity, acceleration = unchecked(robot, "platform_motion", pose, rates, accelerations)
         return cls.of(time, FullMotion(pose, velocity, acceleration, *motion), payload)
+
+    @classmethod
+    def of_log(
+        cls, robot: Manipulator, log: Log, motion: tuple[Array, Array, Array], start: PoseLike
+    ) -> States:
+        """Return the states at a log's samples of joints that move so; see `of_joints`."""
+        about: dict[str, Any] = {"source": log.source, "first_row": log.first_row}
+        return cls.of_joints(robot, motion, log.time, start, payload=log.payload, **about)
 
     def __len__(self) -> int:
         return len(self.time)

@@ -1,19 +1,28 @@
-"""The loop of a simulation: at each sample forces are asked for, limited, delayed, integrated."""
+"""The run of a simulation: the arrays of a machine's control loop, filled, run, and read."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Protocol, runtime_checkable
+from itertools import pairwise
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from pteron.dynamics import drive_accelerations
-from pteron.kernels import Array, numeric
+from pteron.errors import DataError
+from pteron.kernels import Array, Program
+from pteron.kernels.loops import loop, machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion, told_pose
-from pteron.motion.simulation.plant import Plant
+from pteron.motion.simulation.exported import ExportedLaw
+from pteron.motion.simulation.plant import Adaptive, Method, motor_states
+from pteron.motion.simulation.sensors import (
+    Sensors,
+    encoder_arrays,
+    encoder_noise,
+    expect_sensed,
+)
 from pteron.motion.simulation.simulation import Simulation
 from pteron.motion.simulation.stops import (
     first_beyond_limits,
@@ -26,6 +35,9 @@ from pteron.motion.trajectories.limits import limits_of
 
 _WHOLE = 1e-9
 """Part of a sample, from rounding, by which a delay of whole samples may miss them."""
+
+_ASKED, _MOVED = 1.0, 2.0
+"""Why a run ended: no forces were asked for, or the machine could not go on."""
 
 
 @runtime_checkable
@@ -47,9 +59,20 @@ class ControlLaw(Protocol):
         """Return forces (n,) and the next memory, from the reference and the measured joints."""
 
 
-ForceSource = Callable[[int, Array, Array, Array], tuple[Array, Array]]
-"""Gives the forces asked of the drives, (n,), and the next memory, from the sample's number, the
-joints' coordinates and rates, and the memory."""
+@runtime_checkable
+class ProgramLaw(Protocol):
+    """A controller's law that is an expression, and runs in the loop's C."""
+
+    @property
+    def program(self) -> Program:
+        """Forces, and the next memory, of readings, reference, memory and its own numbers."""
+
+    @property
+    def numbers(self) -> dict[str, Array]:
+        """Its numbers, as `pteron.kernels.loops.Loop.run` takes them."""
+
+    def memory(self, pose: Array, velocity: Array) -> Array:
+        """Return its memory at the start, (K,)."""
 
 
 @dataclass(frozen=True)
@@ -59,91 +82,191 @@ class Loads:
     masses: Array
     machines: Mapping[float, Manipulator]
     """The machine with each of the masses."""
-    wrench: Callable[[float], Array]
+    wrench: Array
+
+
+@dataclass(frozen=True)
+class Timing:
+    """The delays of forces and of readings, and how steps between samples are made."""
+
+    delay: float
+    method: Method
+    step: float
+    tolerance: float
+    sensing: float = 0.0
+
+    def parts(self, period: float, samples: int) -> tuple[list[float], list[int]]:
+        """Return what `pteron.kernels.loops.Loop.run` takes: times and counts, without the last."""
+        (late, whole), (old, behind) = (
+            _divided(min(delay, period * samples), period)  # later than the end is never
+            for delay in (self.delay, self.sensing)
+        )
+        look = period - old
+        look = late if abs(look - late) < _WHOLE * period else look
+        bounds = [0.0, min(late, look), max(late, look), period]
+        spans, step = np.diff(bounds), min(self.step, period)
+        counts = [int(np.ceil(span / step - _WHOLE)) for span in spans]
+        lengths = [float(span) / max(n, 1) for span, n in zip(spans, counts, strict=True)]
+        before = 0 if late == 0.0 else 2 if late > look else 1
+        return [*lengths, period], [*counts, before, int(look > late), whole, behind]
+
+
+def _divided(delay: float, period: float) -> tuple[float, int]:
+    """Return a delay's part of a sample, and its whole samples."""
+    whole = int(delay / period + _WHOLE)
+    part = max(delay - whole * period, 0.0)
+    return (part if part > _WHOLE * period else 0.0), whole
 
 
 def run(
     robot: Manipulator,
-    plant: Plant,
-    source: ForceSource,
-    memory: Array,
+    start: tuple[Array, Array],
     reference: Motion,
+    source: ControlLaw | ProgramLaw | Array,
     loads: Loads,
-    delay: float,
+    sensors: Sensors,
+    timing: Timing,
     *,
     limits: bool,
 ) -> Simulation:
-    """Simulate; `limits` says whether joints' limits and singularities of type II end it."""
-    time = reference.time
-    joints_of, rates_of = numeric(robot, "joint_coordinates"), numeric(robot, "joint_rates")
-    most = limits_of(robot).force
-    # A command acts `whole` samples and a part of one after it was asked for; before there are any,
-    # the first one holds the machine.
-    period = float(time[1] - time[0])
-    delay = min(delay, period * len(time))  # later than the end is never
-    whole = int(delay / period + _WHOLE)
-    late = max(delay - whole * period, 0.0)
-    late = late if late > _WHOLE * period else 0.0
-    commands: deque[Array] = deque(maxlen=whole + 2)
-    rows: list[tuple[Array, ...]] = []
-    why = None
-    for k, now in enumerate(time):
-        joints = joints_of(plant.pose)[0]
-        rates = rates_of(plant.pose, plant.velocity)[0]
-        asked, memory = source(k, joints, rates, memory)
-        commands.append(np.clip(asked, -most, most))
-        while len(commands) < whole + 2:
-            commands.append(commands[0])
-        before, after = commands[0], commands[1]
-        forces = before if late else after
-        rows.append((plant.pose, plant.velocity, joints, rates, forces, asked, memory))
-        if not np.isfinite(asked).all():
-            why = (
-                f"no forces are asked for at the joints {told_pose(joints)}: they have no pose "
-                "near the last one, or the wanted pose is out of the controller's reach"
-            )
+    """Simulate; `limits` says whether joints' limits and singularities of type II end it.
+
+    The source of forces is a controller's law, or forces at each sample.
+    """
+    time, m, n = reference.time, robot.freedom, robot.joint_count
+    count, period = len(time), float(time[1] - time[0])
+    times, counts = timing.parts(period, count)
+    linked = source.linked if isinstance(source, ExportedLaw) else None
+    law = source if isinstance(source, ProgramLaw) else None
+    if law is not None:
+        expect_sensed(robot, law.program)
+    made = loop(robot, None if law is None else law.program, linked)
+    memory = np.empty(0) if isinstance(source, np.ndarray) else source.memory(*start)
+    arrays = loop_arrays(robot, start, reference, law, sensors, counts)
+    arrays |= {"wrench": loads.wrench[None], **encoder_noise(sensors, robot, count)}
+    if isinstance(source, np.ndarray):
+        arrays["given"] = source[None]
+    kept = arrays["memory"].shape[2]
+    sizes = {"states": arrays["state"].shape[2], "acceleration": m, "memories": kept}
+    sizes |= dict.fromkeys(("joints", "rates", "forces", "asked"), n)
+    found = {name: np.full((1, count, size), np.nan) for name, size in sizes.items()}
+    if timing.method == "dop853":
+        if linked is not None:
+            raise DataError('method: "dop853" given, but a controller\'s C runs with "rk4" alone')
+        del found["acceleration"]
+    ask, memories = None, [memory]
+    if isinstance(source, ControlLaw) and law is None:
+        ask = _callback(source, reference, n, memories)
+    changes = np.flatnonzero(np.diff(loads.masses)) + 1
+    for first, stop in pairwise([0, *changes.tolist(), count]):
+        loaded = loads.machines[float(loads.masses[first])]
+        here = arrays | machine_numbers(loaded, made.plant, "plant") | found
+        here |= {
+            name: here[name][:, first:stop]
+            for name in (*found, "reference", "given", "noise", "wrench")
+            if here[name].shape[1] > 1
+        }
+        go = Adaptive(loaded, timing.tolerance).go if timing.method == "dop853" else None
+        how = [*counts, first, int(stop == count)]
+        made.run(here, stop - first, times, how, ask, go=go)
+        if arrays["fault"].any():
             break
-        if k + 1 < len(time):
-            loaded = loads.machines[float(loads.masses[k])]
-            span, wrench = float(time[k + 1] - now), loads.wrench(float(now))
-            if not (
-                plant.go(loaded, late, before, wrench)
-                and plant.go(loaded, span - late, after, wrench)
-            ):
-                why = why_not_further(robot, plant.pose, plant.velocity)
-                break
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    end = len(rows)
+    done, fault = int(arrays["done"].item()), arrays["fault"].item()
+    columns = {name: value[0, :done] for name, value in found.items()}
+    pose, velocity = columns["states"][:, :m], columns["states"][:, m : 2 * m]
+    why = None
+    if fault == _ASKED:
+        why = (
+            f"no forces are asked for at the joints {told_pose(columns['joints'][-1])}: they have "
+            "no pose near the last one, or the wanted pose is out of the controller's reach"
+        )
+    elif fault == _MOVED:
+        why = why_not_further(robot, *np.split(arrays["state"].ravel(), [m, 2 * m])[:2])
+    end = done
     if limits:
         ends = {
-            first_beyond_limits(robot, columns[0], columns[2]): told_limit,
-            first_singular(robot, columns[0]): told_singular,
+            first_beyond_limits(robot, pose, columns["joints"]): told_limit,
+            first_singular(robot, pose): told_singular,
         }
-        first = min((k for k in ends if k is not None), default=None)
-        if first is not None:
-            end, why = first + 1, ends[first](robot, columns[0][first])
-    stopped = None if why is None else f"at {min(plant.time, time[end - 1]):.4g} s: {why}"
-    pose, velocity, joints, rates, forces, asked, known = (part[:end] for part in columns)
-    acceleration = np.empty_like(pose)
-    wrenches = np.array([loads.wrench(float(t)) for t in time[:end]])
-    for mass, loaded in loads.machines.items():
-        at = loads.masses[:end] == mass
-        acceleration[at] = drive_accelerations(
-            loaded, pose[at], velocity[at], forces[at], wrenches[at], on_failure="nan"
-        )
+        at = min((k for k in ends if k is not None), default=None)
+        if at is not None:
+            end, why = at + 1, ends[at](robot, pose[at])
+    clock = float(arrays["clock"].item())
+    stopped = None if why is None else f"at {min(clock, time[end - 1]):.4g} s: {why}"
+    if timing.method == "dop853":
+        columns["acceleration"] = _accelerations(loads, pose, velocity, columns["forces"])
     return Simulation(
         robot,
         time[:end],
-        pose,
-        velocity,
-        acceleration,
-        joints,
-        rates,
-        forces,
-        asked,
+        pose[:end],
+        velocity[:end],
+        columns["acceleration"][:end],
+        columns["joints"][:end],
+        columns["rates"][:end],
+        columns["forces"][:end],
+        columns["asked"][:end],
         Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),
         loads.masses[:end],
-        known,
-        min(plant.step, period),
+        np.array(memories[1 : end + 1]) if ask is not None else columns["memories"][:end],
+        min(timing.step, period) if timing.method == "rk4" else float("nan"),
         stopped,
     )
+
+
+def loop_arrays(
+    robot: Manipulator,
+    start: tuple[Array, Array],
+    reference: Motion,
+    law: ProgramLaw | None,
+    sensors: Sensors,
+    counts: Sequence[int],
+) -> dict[str, Array]:
+    """Return what `pteron.kernels.loops.Loop.run` takes of a machine under a law, or without.
+
+    `counts` are those of `Timing.parts`.
+    """
+    period = float(reference.time[1] - reference.time[0])
+    parts = reference.pose, reference.velocity, reference.acceleration
+    state = dict(zip(("pose", "velocity"), start, strict=True))
+    state |= motor_states(robot, *start, reference.acceleration[0])
+    whole, behind = counts[-2:]
+    arrays = {
+        "state": np.concatenate(list(state.values())).reshape(1, 1, -1),
+        "side": np.zeros((1, 1, robot.joint_count)),
+        "memory": np.zeros((1, 1, 0)),
+        "queue": np.zeros((1, whole + 2, robot.joint_count)),
+        "most": limits_of(robot).force.reshape(1, 1, -1),
+        "reference": np.hstack(parts)[None],
+        "given": np.zeros((1, 1, robot.joint_count)),
+        **{name: np.zeros((1, 1, 1)) for name in ("clock", "done", "fault")},
+        **encoder_arrays(sensors, robot, period, state, behind),
+    }
+    if law is not None:
+        arrays |= {**law.numbers, "memory": np.array(law.memory(*start)).reshape(1, 1, -1)}
+    return arrays
+
+
+def _callback(
+    law: ControlLaw, reference: Motion, joints: int, memories: list[Array]
+) -> Callable[[int, int, Array], Array]:
+    """Return what asks a controller in Python; `memories` grows by its memory."""
+
+    def ask(_: int, sample: int, measured: Array) -> Array:
+        parts = reference.pose, reference.velocity, reference.acceleration
+        pose, velocity, acceleration = (part[sample] for part in parts)
+        told = measured[:joints], measured[joints:]
+        forces, memory = law(pose, velocity, acceleration, *told, memories[-1])
+        memories.append(memory)
+        return forces
+
+    return ask
+
+
+def _accelerations(loads: Loads, pose: Array, velocity: Array, forces: Array) -> Array:
+    """Return the accelerations of states whose friction is smooth."""
+    found, masses = np.empty_like(pose), loads.masses[: len(pose)]
+    for mass, loaded in loads.machines.items():
+        at: Any = masses == mass
+        given = pose[at], velocity[at], forces[at], loads.wrench[: len(pose)][at]
+        found[at] = drive_accelerations(loaded, *given, on_failure="nan")
+    return found

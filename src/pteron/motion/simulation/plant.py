@@ -1,28 +1,32 @@
-"""The plant of a simulation: a machine's equations of motion, integrated under its drives' forces.
-
-`Plant` steps one machine, `advance` many states at once, `longest_step` says how long a step may be
-where there is friction.
-"""
+"""Integration of machines' motion under their drives' forces, and how long its steps may be."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
-from scipy.integrate import DOP853  # type: ignore[import-untyped]
 
-from pteron.dynamics import mass_matrix
+from pteron.dynamics import inverse_dynamics, mass_matrix
 from pteron.equations.drives import drives_of
+from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError, PteronError, shown
 from pteron.kernels import Array, as_array, numeric
-from pteron.kernels.steps import steps
-from pteron.kinematics import jacobian
+from pteron.kernels.kernel import broadcast_lead
+from pteron.kernels.loops import loop, machine_numbers
+from pteron.kinematics import inverse_kinematics, jacobian, joint_rates
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.simulation.machines import Machines
 from pteron.shapes import PoseLike
 
 Method = Literal["rk4", "dop853"]
 """Runge and Kutta's method with fixed steps, or SciPy's DOP853, which chooses its steps."""
+
+Loads = Mapping[str, Array]
+"""Forces of the drives and wrench on the platform, (B, size)."""
 
 _STABLE = 2.0
 """Greatest decay rate times step; Runge and Kutta's method of fourth order is stable to 2.78."""
@@ -39,12 +43,15 @@ def advance(
     step: float,
     count: int,
     wrench: PoseLike | None = None,
-) -> tuple[Array, Array, Any]:
+    machines: Machines | None = None,
+    drives: ArrayLike | None = None,
+) -> tuple[Array, Array, Array, Any]:
     """Return the states of machines after some steps of Runge and Kutta's method of fourth order.
 
-    The equations are those of `drive_accelerations`: friction and the motors' inertia count. Where
-    there is a C compiler the steps are one loop of machine code, which is compiled when it is first
-    asked for, and several states of a batch are computed by one instruction.
+    Friction and the motors' inertia count; a joint at rest sticks while its drive and its loads are
+    less than its dry friction. Where there is a C compiler the steps are one loop of machine code,
+    which is compiled when it is first asked for, and several states of a batch are computed by one
+    instruction.
 
     Parameters
     ----------
@@ -61,11 +68,19 @@ def advance(
     wrench : array, shape (..., m), optional
         Load on the platform at P all the while: a force in N and, where it turns, a moment about k
         in N m; of a platform that tilts a force and a moment, (..., 6).
+    machines : Machines, optional
+        The machine of each state, where they are several; their `robot` is the one that is given.
+    drives : array, shape (..., K), optional
+        The state of drives that bend or lag, as a call before returned it; by default such as holds
+        the machine there.
 
     Returns
     -------
     pose, velocity : array, shape (..., m)
         At the end; of a machine that cannot go on, its last state.
+    drives : array, shape (..., K)
+        Coordinates of the motors at the joints and their rates, (n,) each, where a transmission
+        bends, and forces of the currents, (n,), where one lags; empty where all are rigid.
     status : array of bool, shape (...)
         Whether all steps were made: not where a leg is out of reach or singular (type I).
 
@@ -79,7 +94,8 @@ def advance(
     >>> import numpy as np, pteron
     >>> from pteron.motion import advance
     >>> robot = pteron.load("tripteron")
-    >>> pose, velocity, status = advance(robot, np.zeros(3), np.zeros(3), np.zeros(3), 1e-4, 100)
+    >>> rest = np.zeros(3)
+    >>> pose, velocity, _, status = advance(robot, rest, rest, rest, 1e-4, 100)
     >>> bool(status), bool(np.allclose(velocity, [0.0, 0.0, -0.0981], atol=0.1))
     (True, True)
     """
@@ -89,26 +105,199 @@ def advance(
         raise DataError(f"step: {shown(step)} given, a time in s expected")
     if not span[1] >= 0.0 or span[1] % 1.0:
         raise DataError(f"count: {shown(count)} given, a whole number of 0 or more expected")
-    given = [pose, velocity, forces, *([] if wrench is None else [wrench])]
-    found = steps(robot, wrench=wrench is not None)(*given, span)
-    return found[0], found[1], found[2] == count
+    ones = {"pose": pose, "velocity": velocity, "forces": forces}
+    sizes = dict.fromkeys(ones, robot.freedom) | {"forces": robot.joint_count}
+    columns = robot.column_names
+    if wrench is not None:
+        ones["wrench"] = wrench
+    sizes["wrench"] = len(columns["wrench"])
+    parts = {
+        name: as_array(value, name, (sizes[name],), columns=columns.get(name, ()))
+        for name, value in ones.items()
+    }
+    lead = broadcast_lead({name: part.shape[:-1] for name, part in parts.items()})
+    batch = math.prod(lead)
+    whole = {
+        name: np.broadcast_to(part, (*lead, sizes[name])).reshape(batch, 1, -1)
+        for name, part in parts.items()
+    }
+    made, n, kind = loop(robot), robot.joint_count, DriveKind.of(robot)
+    count_drives, encoders = n * len(kind.more), n * (2 if kind.bends else 1)
+    if drives is None:
+        drives = drive_states(robot, whole["pose"], whole["velocity"]).reshape(*lead, count_drives)
+    begun = as_array(drives, "drives", (count_drives,))
+    begun = np.broadcast_to(begun, (*lead, count_drives)).reshape(batch, 1, count_drives)
+    arrays = {
+        "state": np.concatenate([whole["pose"], whole["velocity"], begun], axis=-1),
+        "side": np.zeros((batch, 1, n)),
+        "memory": np.zeros((batch, 1, 0)),
+        "encoders": np.zeros((batch, 1, 4 * encoders)),
+        "queue": np.zeros((batch, 2, n)),
+        "told": np.zeros((batch, 1, 2 * encoders)),
+        **{name: np.zeros((batch, 1, 1)) for name in ("clock", "done", "fault")},
+        "given": np.ascontiguousarray(whole["forces"]),
+        "wrench": np.ascontiguousarray(whole.get("wrench", np.zeros((1, 1, sizes["wrench"])))),
+        "most": np.full((1, 1, n), np.inf),
+        **dict.fromkeys(("steps", "noises", "round", "noise"), np.zeros((1, 1, encoders))),
+        "at_motor": np.zeros((1, 1, 2 * n)),
+        "share": np.ones((1, 1, 1)),
+        **machine_numbers(robot, made.plant, "plant"),
+    }
+    arrays["seen"] = arrays["state"].copy()
+    if machines is not None:
+        if len(machines) != batch or machines.robot != robot:
+            raise DataError(
+                f"machines: {len(machines)} of {machines.robot.name} given, {batch} of "
+                f"{robot.name} expected, one for each state"
+            )
+        arrays["plant_parameters"] = np.ascontiguousarray(machines.loaded[:, None])
+        arrays["plant_drives"] = np.ascontiguousarray(machines.drives[:, None])
+    if batch:
+        times = [step, 0.0, 0.0, step * count]
+        made.run(arrays, 1, times, [int(count), 0, 0, 0, 0, 0, 0, 0, 0])
+    m = robot.freedom
+    state = arrays["state"].reshape(*lead, 2 * m + count_drives)
+    served = (arrays["fault"] == 0.0).reshape(lead)
+    return state[..., :m], state[..., m : 2 * m], state[..., 2 * m :], served
+
+
+def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
+    """Return the state (..., K) of drives that bend or lag and hold the machine without haste."""
+    found = motor_states(robot, pose, velocity, np.zeros_like(pose))
+    return np.concatenate([np.empty((*pose.shape[:-1], 0)), *found.values()], axis=-1)
+
+
+def motor_states(
+    robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
+) -> dict[str, Array]:
+    """Return the states of drives that bend or lag, (..., n) each, as a motion needs them."""
+    kind = DriveKind.of(robot)
+    if not kind.more:
+        return {}
+    force = inverse_dynamics(robot, pose, velocity, acceleration, on_failure="nan")
+    force, motor = np.nan_to_num(force), inverse_kinematics(robot, pose)
+    for i, leg in enumerate(robot.legs):
+        if leg.drive and leg.drive.elastic:
+            bends, held = leg.drive.elastic, force[..., i]
+            motor[..., i] += held / bends.stiffness + np.sign(held) * bends.backlash / 2.0
+    found = {"motor": motor, "current": force}
+    found["motor_rate"] = rates = joint_rates(robot, pose, velocity).actuated
+    slid = [leg.drive.coulomb / leg.drive.lugre.stiffness if leg.drive and leg.drive.lugre else 0.0
+            for leg in robot.legs]  # fmt: skip
+    found["bristle"] = np.sign(rates) * np.array(slid)
+    return {name: found[name] for name, _ in kind.more}
 
 
 def longest_step(robot: RobotLike, poses: PoseLike) -> float:
-    """Return the longest step that friction allows, s: infinite for a machine without friction.
+    """Return the longest stable step, s: infinite for a machine whose drives have no such rates.
 
-    Next to rest a drive's dry friction is like a damper of coulomb / rest_speed, which makes a rate
-    decay fast; the steps must follow that. The poses, (..., m), are where it may come to rest.
+    Viscous friction makes rates decay, transmissions that bend make motors and joints vibrate,
+    and currents lag behind: steps must follow the fastest of these. Dry friction asks for no short
+    steps. The poses, (..., m), are those where the machine may be.
+    """
+    return _fastest(as_manipulator(robot), poses)[0]
+
+
+def _fastest(robot: Manipulator, poses: PoseLike) -> tuple[float, str]:
+    """Return the longest stable step, and what asks for it, as the beginning of a sentence."""
+    own, kind = drives_of(robot), DriveKind.of(robot)
+    found = float("inf"), ""
+    if own.viscous.any() or kind.bends:
+        rates, vectors = modes(robot, poses)
+        fastest = int(np.abs(rates).argmax())
+        rate = float(np.abs(rates.flat[fastest]))
+        if rate > 0.0:
+            found = _STABLE / rate, "viscous friction"
+            if kind.bends:
+                shapes = np.moveaxis(vectors, -1, -2).reshape(-1, robot.joint_count)
+                at = int(np.abs(shapes[fastest]).argmax())
+                found = found[0], f"leg {at + 1}: the stiffness of its transmission"
+    if any(kind.lugre):
+        rows, rotors = jacobian(robot, poses), np.diag(np.where(kind.elastic, 0.0, own.inertia))
+        mass = mass_matrix(robot, poses) + rows.mT @ rotors @ rows
+        moved = np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT))
+        for i, leg in enumerate(robot.legs):
+            if leg.drive and leg.drive.lugre:
+                ease = float(1.0 / own.inertia[i] if kind.elastic[i] else moved[..., i].max())
+                # A bound on the eigenvalue of a spring with a damper.
+                bristle = leg.drive.lugre
+                rate = np.sqrt(bristle.stiffness * ease) + bristle.damping * ease
+                if _STABLE / rate < found[0]:
+                    found = float(_STABLE / rate), f"leg {i + 1}: the stiffness of its bristles"
+    for i, leg in enumerate(robot.legs, start=1):
+        lag = leg.drive and leg.drive.current_time
+        if lag and _STABLE * lag < found[0]:
+            found = _STABLE * lag, f"leg {i}: the current's time constant"
+    return found
+
+
+def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
+    """Return the eigenvalues of a machine with its drives, linear about rest at poses.
+
+    The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d what each
+    transmission is bent; play, dry friction and gravity's change with the pose are left out.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    poses : array, shape (..., m)
+        m and rad.
+
+    Returns
+    -------
+    eigenvalues : array of complex, shape (..., K)
+        1/s, K twice the number of coordinates and of motors that move by themselves.
+    bent : array of complex, shape (..., n, K)
+        What each transmission is bent in each mode.
+
+    Raises
+    ------
+    UnreachablePose, SingularPose
+        If a leg does not reach a pose, or is singular there.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from dataclasses import replace
+    >>> from pteron.motion import modes
+    >>> robot = pteron.load("tripteron")
+    >>> bends = pteron.legs.Drive(rotor_inertia=0.5, elastic=pteron.legs.Elastic(stiffness=2e5))
+    >>> robot = replace(robot, legs=tuple(replace(leg, drive=bends) for leg in robot.legs))
+    >>> np.sort(modes(robot, np.zeros(3))[0].imag)[-3:].round()  # rad/s
+    array([686., 686., 699.])
     """
     robot = as_manipulator(robot)
     own = drives_of(robot)
-    damping = own.viscous + (own.coulomb + own.stribeck) / own.rest_speed
-    if not damping.any():
-        return float("inf")
+    bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
+    stiffness, damping = (
+        np.array([getattr(one, name) if one else 0.0 for one in bends])
+        for name in ("stiffness", "damping")
+    )
+    soft = np.array([one is not None for one in bends])
     rows = jacobian(robot, poses)
-    mass = mass_matrix(robot, poses) + rows.mT @ (own.inertia[:, None] * rows)
-    decay = np.linalg.eigvals(np.linalg.solve(mass, rows.mT @ (damping[:, None] * rows)))
-    return _STABLE / float(np.abs(decay).max())
+    m, n = robot.freedom, robot.joint_count
+    every = np.eye(n)[soft]
+    bent = np.concatenate([-rows, np.broadcast_to(every.T, (*rows.shape[:-2], n, len(every)))], -1)
+    rigid = np.where(soft, 0.0, 1.0)
+
+    def whole(joints: Array, motors: Array, springs: Array) -> Array:
+        found: Array = bent.mT @ (springs[:, None] * bent)
+        found[..., :m, :m] += rows.mT @ (joints[:, None] * rows)
+        found[..., m:, m:] += np.diag(motors[soft])
+        return found
+
+    mass = whole(rigid * own.inertia, own.inertia, np.zeros(n))
+    mass[..., :m, :m] += mass_matrix(robot, poses)
+    drag = whole(rigid * own.viscous, own.viscous, damping)
+    pull = whole(np.zeros(n), np.zeros(n), stiffness)
+    size = m + len(every)
+    system = np.zeros((*rows.shape[:-2], 2 * size, 2 * size))
+    system[..., :size, size:] = np.eye(size)
+    system[..., size:, :size] = -np.linalg.solve(mass, pull)
+    system[..., size:, size:] = -np.linalg.solve(mass, drag)
+    rates, vectors = np.linalg.eig(system)
+    return rates, np.where(soft[:, None], bent @ vectors[..., :size, :], 0.0)
 
 
 _FINEST = 100.0 * float(np.finfo(float).eps)
@@ -118,46 +307,33 @@ _LEAST = 1e-9
 """Adaptive steps shorter than this share of a span count as stuck."""
 
 
-class Plant:
-    """A machine's state, integrated from sample to sample."""
+class Adaptive:
+    """DOP853 in place of fixed steps, for a machine whose friction is smooth at rest."""
 
-    def __init__(
-        self, pose: Array, velocity: Array, method: Method, step: float, tolerance: float
-    ) -> None:
-        self.pose, self.velocity, self.time = pose, velocity, 0.0
-        self.step = step if method == "rk4" else float("nan")
+    def __init__(self, robot: Manipulator, tolerance: float) -> None:
+        self._accelerations = numeric(robot, "drive_accelerations", wrench=True)
         self._tolerance = tolerance
-        self._go = self._fixed if method == "rk4" else self._adaptive
 
-    def go(self, robot: Manipulator, span: float, forces: Array, wrench: Array) -> bool:
-        """Go on by a span, as the machine is now; return whether it was made whole."""
-        return span <= 0.0 or self._go(robot, span, forces, wrench)
-
-    def _fixed(self, robot: Manipulator, span: float, forces: Array, wrench: Array) -> bool:
-        count = int(np.ceil(span / self.step - 1e-9))
-        how = np.array([span / count, count])
-        moved = steps(robot, wrench=True)(self.pose, self.velocity, forces, wrench, how)
-        self.pose, self.velocity, done = moved
-        self.time += float(done) * span / count
-        return bool(done == count)
-
-    def _adaptive(self, robot: Manipulator, span: float, forces: Array, wrench: Array) -> bool:
-        accelerations = numeric(robot, "drive_accelerations", wrench=True)
-        m = len(self.pose)
+    def go(
+        self, steps: int, step: float, held: Loads, arrays: Mapping[str, Array], alive: Array
+    ) -> None:
+        """Go on by so many steps, as `pteron.kernels.samples.Plant.go` does."""
+        state, clock, span = arrays["state"][0, 0], arrays["clock"][0, 0], steps * step
+        m, loads = len(state) // 2, (held["forces"][0], held["wrench"][0])
 
         def rates(_: float, state: Array) -> Array:
             velocity = state[m:]
-            found, status = accelerations(state[:m], velocity, forces, wrench)
+            found, status = self._accelerations(state[:m], velocity, *loads)
             return np.concatenate([velocity, found if status else np.full(m, np.nan)])
 
-        state = np.concatenate([self.pose, self.velocity])
         if not np.isfinite(rates(0.0, state)).all():
-            return False
-        solver = DOP853(
+            alive[:] = 0.0
+            return
+        solver = scipy.integrate.DOP853(
             rates,
-            self.time,
-            state,
-            self.time + span,
+            0.0,
+            state.copy(),
+            span,
             first_step=span,  # its own choice goes on forever where the machine cannot be
             rtol=max(self._tolerance, _FINEST),
             atol=1e-3 * self._tolerance,
@@ -166,19 +342,28 @@ class Plant:
             solver.step()
             if solver.step_size < _LEAST * span:
                 break
-        self.time, self.pose, self.velocity = float(solver.t), solver.y[:m], solver.y[m:]
-        return bool(solver.status == "finished")
+        clock += solver.t
+        state[:] = solver.y
+        alive[:] = solver.status == "finished"
 
 
-def allowed_step(robot: Manipulator, poses: Array, step: float) -> float:
-    """Return the given step, or the longest that friction allows, or refuse a drive's numbers."""
+def allowed_step(robot: Manipulator, poses: Array, step: float, *, usual: bool = True) -> float:
+    """Return the given step, or the longest that is stable, or refuse it.
+
+    The `usual` step, and any that only viscous friction forbids, is made shorter.
+    """
     try:
-        longest = longest_step(robot, poses)
+        longest, why = _fastest(robot, poses)
     except PteronError:
         return step  # the first sample says what is wrong with the pose
     if longest < _SHORTEST:
         raise DataError(
-            f"drives: their friction at rest asks for steps below {_SHORTEST:g} s; make rest_speed "
-            "larger, or coulomb smaller"
+            f"drives: {why} asks for steps below {_SHORTEST:g} s; make "
+            + ("viscous smaller" if why.startswith("viscous") else "it softer, or slower")
+        )
+    if step > longest and why.startswith("leg") and not usual:
+        raise DataError(
+            f"step: {step:g} s given, but {why} asks for {longest:.2g} s at most; give a shorter "
+            "one, or none"
         )
     return min(step, longest)

@@ -1,20 +1,23 @@
-"""Simulated encoders of the joints: rounded coordinates, and rates from their differences."""
+"""Simulated encoders of joints and motors: rounded, delayed, rates from differences."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from pteron.errors import DataError
-from pteron.kernels import Array, as_array
-from pteron.shapes import PerJoint
+from pteron.equations.transmissions import DriveKind
+from pteron.errors import DataError, shown
+from pteron.kernels import Array, Program, as_array
+from pteron.kinematics import inverse_kinematics, joint_rates
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """The encoders of the actuated joints.
+    """The encoders of the actuated joints, and of motors whose transmissions bend.
 
     Parameters
     ----------
@@ -24,64 +27,121 @@ class Sensors:
         rates are exact.
     cutoff : float, optional
         Cut-off of a filter of first order on the rates, Hz; without effect on exact ones.
+    noise : float or array, shape (n,)
+        Standard deviation of the coordinates' noise before they are rounded, m or rad.
+    seed : int
+        Of the noise.
+    motor_encoder : float or array, shape (n,), optional
+        Step of encoders at the motors, counted at the joints; by default that of `encoder`.
+    delay : float
+        How old a reading is when the controller gets it, s.
+    samples : int
+        The same in whole samples, in addition.
     """
 
     encoder: float | tuple[float, ...] = 0.0
     cutoff: float | None = None
+    noise: float | tuple[float, ...] = 0.0
+    seed: int = 0
+    motor_encoder: float | tuple[float, ...] | None = None
+    delay: float = 0.0
+    samples: int = 0
 
     def __post_init__(self) -> None:
-        steps = as_array(self.encoder, "encoder", ())
-        if not (np.isfinite(steps).all() and (steps >= 0.0).all()):
-            raise DataError(f"encoder: {self.encoder} given, steps of 0 or more expected")
+        for name in ("encoder", "noise", "motor_encoder", "delay"):
+            given = getattr(self, name)
+            values = as_array(0.0 if given is None and name == "motor_encoder" else given, name, ())
+            scalar = name == "delay" and values.ndim
+            if scalar or not (np.isfinite(values).all() and (values >= 0.0).all()):
+                wanted = "0 s or more" if name == "delay" else "0 or more"
+                raise DataError(f"{name}: {given} given, {wanted} expected")
+        for name in ("seed", "samples"):
+            whole: object = getattr(self, name)
+            if not isinstance(whole, int) or isinstance(whole, bool) or whole < 0:
+                raise DataError(
+                    f"{name}: {shown(whole)} given, a whole number of 0 or more expected"
+                )
         cutoff = 1.0 if self.cutoff is None else as_array(self.cutoff, "cutoff", ())
         if np.ndim(cutoff) or not (np.isfinite(cutoff) and cutoff > 0.0):
             raise DataError(f"cutoff: {self.cutoff} given, a frequency above 0 Hz expected")
 
 
-class Encoders:
-    """Encoders during a simulation: they compute rates from their last readings.
+def encoder_arrays(
+    sensors: Sensors, robot: Manipulator, period: float, state: Mapping[str, Array], behind: int
+) -> dict[str, Array]:
+    """Return what a control loop takes of encoders that begin in a state: numbers and memory.
 
-    The angle of a crank that may go all the way round jumps by a turn: of such ones, `round_ones`
-    (n,), readings go on by the shorter way.
+    Readings are so many samples `behind`. The angle of a crank that may go all the way round jumps
+    by a turn: its readings go on by the shorter way.
     """
+    pose, velocity = state["pose"], state["velocity"]
+    joints = inverse_kinematics(robot, pose)
+    rates = joint_rates(robot, pose, velocity).actuated
+    at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
+    numbers = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
+    steps, noises, fine = (_per_joint(value, key, len(joints)) for key, value in numbers.items())
+    round_ = np.array([float(leg.goes_round) for leg in robot.legs])
+    if "motor" in state:
+        soft = DriveKind.of(robot).elastic
+        joints = np.concatenate([joints, np.where(soft, state["motor"], joints)])
+        rates = np.concatenate([rates, np.where(soft, state["motor_rate"], rates)])
+        steps, noises = np.concatenate([steps, fine]), np.tile(noises, 2)
+        round_ = np.concatenate([round_, np.where(soft, 0.0, round_)])
+    share = 1.0
+    if sensors.cutoff is not None:
+        share = -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
+    before = joints - period * rates
+    widths = np.where(steps > 0.0, steps, 1.0)
+    before = np.where(steps > 0.0, steps * np.round(before / widths), before)
+    at = [encoder_of(leg.drive) for leg in robot.legs]
+    found = {
+        "encoders": np.concatenate([joints, np.zeros(len(joints)), before, rates]),
+        "seen": np.concatenate(list(state.values())),
+        "steps": steps,
+        "noises": noises,
+        "round": round_,
+        "share": np.array([share]),
+        "at_motor": np.array(
+            [*(float(e == "motor") for e in at), *(float(e in ("motor", "both")) for e in at)]
+        ),
+    }
+    told = np.zeros((1, behind + 1, 2 * len(joints)))
+    return {name: value.reshape(1, 1, -1) for name, value in found.items()} | {"told": told}
 
-    def __init__(
-        self,
-        sensors: Sensors,
-        period: float,
-        joints: PerJoint,
-        rates: PerJoint,
-        round_ones: Array | None = None,
-    ) -> None:
-        steps = np.asarray(sensors.encoder, dtype=float)
-        if steps.shape not in ((), joints.shape):
-            raise DataError(
-                f"encoder: shape {steps.shape} given, one step or {len(joints)} expected, one for "
-                "each joint"
-            )
-        self._steps = np.broadcast_to(steps, joints.shape)
-        self._period = period
-        self._share = 1.0
-        if sensors.cutoff is not None:
-            self._share = -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
-        self._round_ones = np.zeros(joints.shape) if round_ones is None else round_ones
-        self._turns, self._joints = np.zeros(joints.shape), joints
-        self._last = self._rounded(joints - period * rates)
-        self._rates = np.array(rates)
 
-    def read(self, joints: PerJoint, rates: PerJoint) -> tuple[Array, Array]:
-        """Return coordinates and rates (n,) as the controller is told them, of the true ones."""
-        if not self._steps.any():
-            return joints, rates
-        jumps = np.round((joints - self._joints) / (2.0 * np.pi))
-        self._turns = self._turns - self._round_ones * jumps
-        self._joints, gone = joints, 2.0 * np.pi * self._turns
-        told = self._rounded(joints + gone)
-        self._rates = self._rates + self._share * ((told - self._last) / self._period - self._rates)
-        self._last = told
-        return told - gone, np.where(self._steps > 0.0, self._rates, rates)
+def encoder_noise(
+    sensors: Sensors, robot: Manipulator, samples: int, machines: range | None = None
+) -> dict[str, Array]:
+    """Return the noise of the samples over its deviation: of one machine, or of numbered ones."""
+    count = robot.joint_count * (2 if DriveKind.of(robot).bends else 1)
+    if not np.any(sensors.noise):
+        return {"noise": np.zeros((1, 1, count))}
+    seeds = [sensors.seed] if machines is None else [(sensors.seed, i) for i in machines]
+    drawn = [np.random.default_rng(seed).standard_normal((samples, count)) for seed in seeds]
+    return {"noise": np.array(drawn)}
 
-    def _rounded(self, joints: ArrayLike) -> Array:
-        steps = np.where(self._steps > 0.0, self._steps, 1.0)
-        rounded: Array = np.where(self._steps > 0.0, steps * np.round(joints / steps), joints)
-        return rounded
+
+def encoder_of(drive: Drive | None) -> str:
+    """Return where a drive's encoder is: "motor", "joint" or "both"; a rigid one has both."""
+    return drive.elastic.encoder if drive and drive.elastic else "rigid"
+
+
+def expect_sensed(robot: Manipulator, law: Program) -> None:
+    """Refuse a controller that needs readings of motors where there is no encoder."""
+    asked = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
+    without = [str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"]
+    if asked and without:
+        raise DataError(
+            f"controller: needs {' and '.join(asked)}, which no sensor gives: the encoder of leg "
+            f"{', '.join(without)} of {robot.name} is at the joint; take joints and joint_rates, "
+            'or give its drive.elastic encoder = "both"'
+        )
+
+
+def _per_joint(value: float | tuple[float, ...], name: str, count: int) -> Array:
+    given = np.asarray(value, dtype=float)
+    if given.shape not in ((), (count,)):
+        raise DataError(
+            f"{name}: shape {given.shape} given, one number or {count} expected, one for each joint"
+        )
+    return np.broadcast_to(given, (count,)).copy()

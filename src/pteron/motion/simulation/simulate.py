@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Protocol, get_args, runtime_checkable
 
 import numpy as np
 
+from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
 from pteron.kernels.named_columns import by_name
-from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.kinematics.evaluate import checked, checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
-from pteron.motion.simulation.loop import ControlLaw, Loads, run
-from pteron.motion.simulation.plant import Method, Plant, allowed_step
-from pteron.motion.simulation.sensors import Encoders, Sensors
+from pteron.motion.simulation.loop import ControlLaw, Loads, Timing, run
+from pteron.motion.simulation.plant import Method, allowed_step
+from pteron.motion.simulation.sensors import Sensors
 from pteron.motion.simulation.simulation import Simulation
 from pteron.shapes import JointsLike, PoseLike
 
@@ -28,10 +29,13 @@ PERIOD = 1e-3
 """Time between two samples, s, where no controller sets it."""
 
 _POSES = 64
-"""Poses of a motion at which the longest stable step under friction is computed."""
+"""Poses of a motion at which the longest stable step is computed."""
 
 _MOST = 10_000_000
 """Most samples of a simulation; a longer one is refused."""
+
+_HALVINGS = 12
+"""Most times that steps are halved for a stated error."""
 
 _STATE = ("start, pose", "start, velocity")
 """Names in messages of the two parts of the start state."""
@@ -67,15 +71,17 @@ def simulate(
     step: float = STEP,
     method: Method = "rk4",
     tolerance: float = 1e-10,
+    error: float | None = None,
 ) -> Simulation:
     """Simulate a machine with its drives under a controller, or under given forces, or free.
 
-    The rigid bodies, the drives' friction (smooth at rest, by `rest_speed`) and the motors' inertia
-    move by `drive_accelerations`; no drive gives more than its `max_force`. At each sample the
-    controller sees the reference and the measured joints; what it asks for is held until the next,
-    as a digital drive does. The simulation ends, and says why, where a leg comes to the edge of its
-    reach; and under a controller, unless told otherwise, where a joint comes to its limits or the
-    platform to a singularity of type II.
+    The rigid bodies and the motors' inertia move under the drives' forces and friction. Dry
+    friction sticks: a joint at rest does not move until it is pulled by more than its friction
+    (with "dop853" it is smooth at rest, by `rest_speed`, and such a joint creeps). No drive gives
+    more than its `max_force`. At each sample the controller sees the reference and the measured
+    joints; what it asks for is held until the next, as a digital drive does. The simulation ends,
+    and says why, where a leg comes to the edge of its reach; and under a controller, unless told
+    otherwise, where a joint comes to its limits or the platform to a singularity of type II.
 
     Parameters
     ----------
@@ -108,12 +114,17 @@ def simulate(
     period : float
         Between two samples where there is no controller, s.
     step : float
-        Length of the integration's steps, s; shorter where friction at rest needs it.
+        Length of the integration's steps, s; shorter where viscous friction needs it;
+        refused where a transmission's stiffness or a current needs a shorter one.
     method : {"rk4", "dop853"}
-        Fixed steps of Runge and Kutta's method of fourth order, compiled; or SciPy's method of
-        Dormand and Prince of eighth order, of which `tolerance` bounds the error of each step.
+        Fixed steps of Runge and Kutta's method of fourth order, compiled, of second order across a
+        joint's stop or start; or SciPy's method of Dormand and Prince of eighth order, of which
+        `tolerance` bounds the error of each step.
     tolerance : float
         For "dop853", relative to the state; absolutely a thousandth of it.
+    error : float, optional
+        Greatest error of the poses that the steps may cause at any sample, m and rad: the steps are
+        halved, from `step` on, until the last halving changes no pose by more. For "rk4".
 
     Returns
     -------
@@ -145,43 +156,62 @@ def simulate(
     if motion is not None and controller is None:
         raise DataError("motion given, but no controller that follows it")
     period = period if controller is None else controller.period
-    _check(period=period, step=step, tolerance=tolerance)
-    if not _is_number(delay) or delay < 0.0:
-        raise DataError(f"delay: {shown(delay)} given, 0 s or more expected")
+    check_positive(period=period, step=step, tolerance=tolerance)
+    check_delay(delay)
     if method not in get_args(Method):
         raise DataError(f'method: {method!r} given, "rk4" or "dop853" expected')
 
-    reference = _reference(robot, motion, start, duration, period)
+    if method == "dop853" and not DriveKind.of(robot).plain:
+        raise DataError(
+            f'method: "dop853" given, but the drives of {robot.name} bend, lag or ripple; "rk4" '
+            "has them"
+        )
+
+    reference = reference_of(robot, motion, start, duration, period)
     pose, velocity = reference.pose[0], reference.velocity[0]
     if start is not None:
         pose, velocity = _state(robot, start)
-    joints, rates = inverse_kinematics(robot, pose), joint_rates(robot, pose, velocity).actuated
     masses = _masses(payload, reference.time)
     loaded = {mass: with_payload(robot, mass) for mass in dict.fromkeys(masses.tolist())}
-    round_ones = np.array([float(leg.goes_round) for leg in robot.legs])
-    encoders = Encoders(sensors or Sensors(), period, joints, rates, round_ones)
-
+    source: ControlLaw | Array
     if controller is None:
-        memory, given = np.empty(0), _of_time(forces, robot, "forces")
-
-        def source(k: int, joints: Array, rates: Array, memory: Array) -> tuple[Array, Array]:
-            return given(float(reference.time[k])), memory
-
+        source = _of_time(forces, robot, "forces", reference.time)
     else:
         believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
-        law = controller.law(believed)
-        memory = law.memory(pose, velocity)
-        wanted = reference.pose, reference.velocity, reference.acceleration
-
-        def source(k: int, joints: Array, rates: Array, memory: Array) -> tuple[Array, Array]:
-            measured = encoders.read(joints, rates)
-            return law(wanted[0][k], wanted[1][k], wanted[2][k], *measured, memory)
-
+        source = controller.law(believed)
     about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
-    plant = Plant(pose, velocity, method, allowed_step(robot, about, step), tolerance)
-    loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench"))
-    ends = limits and controller is not None
-    return run(robot, plant, source, memory, reference, loads, delay, limits=ends)
+    sensors = sensors or Sensors()
+    sensing = sensors.delay + sensors.samples * period
+    length = allowed_step(robot, about, step, usual=step == STEP)
+    timing = Timing(delay, method, length, tolerance, sensing)
+    loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench", reference.time))
+
+    def made(timing: Timing) -> Simulation:
+        given = (pose, velocity), reference, source, loads, sensors, timing
+        return run(robot, *given, limits=limits and controller is not None)
+
+    return made(timing) if error is None else _within(made, timing, error)
+
+
+def _within(made: Callable[[Timing], Simulation], timing: Timing, error: float) -> Simulation:
+    """Return a simulation whose steps are halved until no pose changes by more than the error."""
+    check_positive(error=error)
+    if timing.method != "rk4":
+        raise DataError('error: goes with method "rk4"; the steps of "dop853" have `tolerance`')
+    coarse, changes = made(timing), []
+    for _ in range(_HALVINGS):
+        timing = replace(timing, step=min(timing.step, coarse.step) / 2.0)
+        fine = made(timing)
+        both = min(len(fine.time), len(coarse.time))
+        changes.append(float(np.abs(fine.pose[:both] - coarse.pose[:both]).max()))
+        if changes[-1] <= error and len(fine.time) == len(coarse.time):
+            return fine
+        coarse = fine
+    raise DataError(
+        f"error: {error:g} asked for, but halving steps to {timing.step:.2g} s still changes poses "
+        f"by {changes[-1]:.2g}, {min(changes):.2g} at best: encoders that round, or a loop that is "
+        "unstable, make much of the smallest difference; ask for less"
+    )
 
 
 def _expect_controller(controller: object) -> None:
@@ -192,11 +222,18 @@ def _expect_controller(controller: object) -> None:
         )
 
 
+def check_delay(delay: float) -> None:
+    """Refuse what is no delay."""
+    if not _is_number(delay) or delay < 0.0:
+        raise DataError(f"delay: {shown(delay)} given, 0 s or more expected")
+
+
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float | np.number) and bool(np.isfinite(value))
 
 
-def _check(**positive: float) -> None:
+def check_positive(**positive: float) -> None:
+    """Refuse what is no number above 0."""
     for name, value in positive.items():
         if not _is_number(value) or value <= 0.0:
             raise DataError(f"{name}: {shown(value)} given, a number above 0 expected")
@@ -210,7 +247,7 @@ def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array,
     return pose, velocity
 
 
-def _reference(
+def reference_of(
     robot: Manipulator,
     motion: Motion | None,
     start: tuple[PoseLike, PoseLike] | None,
@@ -224,7 +261,7 @@ def _reference(
         if motion is None:
             raise DataError("duration: not given, nor a motion that has one; give it in s")
         duration = motion.duration
-    _check(duration=duration)
+    check_positive(duration=duration)
     if duration < period:
         raise DataError(f"duration: {duration:g} s given, at least a sample of {period:g} s")
     if duration > _MOST * period:
@@ -260,9 +297,12 @@ def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Arra
 
 
 def _of_time(
-    given: PoseLike | Callable[[float], PoseLike] | None, robot: Manipulator, name: str
-) -> Callable[[float], Array]:
-    """Return what gives a machine's forces or a wrench at a time: what was given, or zeros."""
+    given: PoseLike | Callable[[float], PoseLike] | None,
+    robot: Manipulator,
+    name: str,
+    time: Array,
+) -> Array:
+    """Return a machine's forces or a wrench at each of the times, or once if they stay."""
     columns = robot.column_names[name]
     size = len(columns)
 
@@ -275,6 +315,6 @@ def _of_time(
         return found
 
     if callable(given):
-        return lambda now: numbers(given(now), f"{name}({now:g})")
+        return np.array([numbers(given(now), f"{name}({now:g})") for now in time.tolist()])
     held = np.zeros(size) if given is None else numbers(given, name)
-    return lambda _: held
+    return np.tile(held, (len(time), 1))

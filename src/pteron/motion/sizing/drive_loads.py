@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.html_table import Column, html_table
 from pteron.json_values import picked
@@ -359,7 +359,7 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     if most - least <= _SAME * most:
         return most
     # The greatest of convex functions of i^2.
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda log: float(mean_squares(sizing, leg, math.exp(log), rotor_inertia).max()),
         bounds=(math.log(least), math.log(most)),
         method="bounded",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,9 @@ from typing import Any
 import polars as pl
 from pydantic import create_model
 
+from pteron.arguments import checked_arguments
 from pteron.bodies.tables import Number, Table
-from pteron.errors import DataError, UnlikelyValue
+from pteron.errors import DataError, warn_unlikely
 from pteron.renamed import former_attribute
 from pteron.tables import read_table
 from pteron.toml import read_toml, told, validated
@@ -29,6 +29,7 @@ _NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
 """Names of the numbers of a motor, in the columns of a file too."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Motor:
     """A rotary motor; everything is at its own shaft.
@@ -127,7 +128,7 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
         if motor.name in names:
             raise DataError(f"{place}: motor {motor.name} is listed twice; give each its own name")
         for text in motor.warnings:
-            warnings.warn(text, UnlikelyValue, stacklevel=2)
+            warn_unlikely(text)
         names.add(motor.name)
         found.append(motor)
     if not found:

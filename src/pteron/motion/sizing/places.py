@@ -1,8 +1,8 @@
 """Places of a cycle in a workspace: where its middle is, and how it is turned about the vertical.
 
 A cycle that is moved keeps its shape and its time: the path of the tool is turned about the
-vertical through its middle, and the middle is put elsewhere. The platform's angles are not turned
-with it; a place may shift them.
+vertical through its middle, and the middle is put elsewhere. The platform's angles are shifted by
+a place: by nothing, or by as much as the path is turned.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
+from pteron.arguments import checked_arguments
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -31,6 +32,9 @@ TURNS = 12
 _COUNTS = {0: 1, 1: 9, 2: 7, 3: 5, 4: 3}
 """Places along each coordinate, by the number of those that vary; 2, the ends, of more."""
 
+_SPREAD = 300
+"""Places tried beside those of the grid, of which the corners leave many workspaces."""
+
 _TILT = np.pi / 2.0
 """Largest angle, rad, tried of a platform that moves along fewer than two directions."""
 
@@ -38,6 +42,7 @@ _ROUNDING = 1e-9
 """Distance from a region's border that is rounding, m and rad."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class Place:
     """A place of a cycle.
@@ -74,12 +79,16 @@ class Course:
         Of each motion its poses less the middle, and two derivatives, (T, m).
     axis : array, shape (3,), or None
         What they may be turned about; None where they may not.
+    yaw : array, shape (m,)
+        By how much the pose grows where the platform turns about that, too, by 1 rad; zero where
+        it has no such angle.
     """
 
     robot: Manipulator
     middle: Array
     curves: tuple[Curve, ...]
     axis: Array | None
+    yaw: Array
 
     @classmethod
     def of(cls, robot: Manipulator, motions: Sequence[Motion]) -> Course:
@@ -88,7 +97,9 @@ class Course:
         curves = [tool_motion(platform, m.pose, m.velocity, m.acceleration) for m in motions]
         ends = Box.around(np.vstack([curve[0] for curve in curves])).box
         middle = ends.mean(axis=0)
-        return cls(robot, middle, tuple((c[0] - middle, *c[1:]) for c in curves), _axis(robot))
+        axis = _axis(robot)
+        around = tuple((c[0] - middle, *c[1:]) for c in curves)
+        return cls(robot, middle, around, axis, _yaw(robot, axis))
 
     def at(self, places: Sequence[Place]) -> Iterator[Curve]:
         """Yield each motion's poses and their derivatives (T, W, m) at places."""
@@ -109,7 +120,7 @@ class Course:
         directions = self.robot.platform.directions
         if self.axis is None:
             return np.eye(len(directions))
-        matrix = Rotation.from_rotvec(turn * self.axis).as_matrix()
+        matrix = scipy.spatial.transform.Rotation.from_rotvec(turn * self.axis).as_matrix()
         return np.asarray(directions @ matrix @ directions.T)
 
     def around(self, turn: float) -> Array:
@@ -124,13 +135,14 @@ Fits = Callable[[Array], bool]
 """Function that says whether poses (K, m) lie in a region."""
 
 
-def within(robot: Manipulator, region: Region | None) -> tuple[Array, Fits]:
+def within(course: Course, region: Region | None) -> tuple[Array, Fits]:
     """Return the box (2, m) of a region, and the function that says whether it holds poses.
 
     Without a region it is the workspace: poses that keep `least_margin` to singularities and the
-    joints within their limits, at the home pose's angles. Of a platform that moves along fewer than
-    two directions the angles vary, too.
+    joints within their limits, about the home pose's angles: its box has room for those that the
+    course goes through. Of a platform that moves along fewer than two directions they vary, too.
     """
+    robot = course.robot
     if region is not None:
         box = region.box
         return box, lambda poses: bool((region.holds(poses) | _inside(region, poses)).all())
@@ -139,6 +151,7 @@ def within(robot: Manipulator, region: Region | None) -> tuple[Array, Fits]:
     count = len(platform.lengths)
     if count:
         box[:, :count] = bounding_box(robot, home)
+    box[:, count:] += course.around(0.0)[:, count:]
     if count < 2:
         box[:, count:] += [[-_TILT], [_TILT]]
     return box, partial(keeps_margin, robot, least=least_margin(robot, home))
@@ -147,7 +160,9 @@ def within(robot: Manipulator, region: Region | None) -> tuple[Array, Fits]:
 def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
     """Return places at which the whole of a course lies in a region.
 
-    They are on a grid that goes to the ends of the region's box, for turns by 30 degrees.
+    They are on a grid that goes to the ends of the region's box, for turns by 30 degrees; the
+    platform is turned as the path is, too, unless the box has a range of that. Where the region
+    leaves out some of them, others are spread over all of the box.
     """
     turns = np.linspace(0.0, 2.0 * np.pi, TURNS, endpoint=False) if course.axis is not None else [0]
     found = []
@@ -158,9 +173,33 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
         varies = high - low > 2.0 * _ROUNDING
         low, high = low + _ROUNDING * varies, high - _ROUNDING * varies
         counts = np.where(varies, _COUNTS.get(int(varies.sum()), 2), 1)
-        grid = map(np.linspace, low, high, counts)
-        found += [Place(tuple(map(float, pose)), turn) for pose in product(*grid)]
-    return tuple(place for place in found if stays(course, place, fits))
+        grid = [Place(pose, turn) for pose in product(*map(np.linspace, low, high, counts))]
+        if turn and course.yaw.any() and not (varies & (course.yaw != 0.0)).any():
+            found += [with_platform(place, course.yaw, turn) for place in grid]
+        found += grid
+    kept = [place for place in found if stays(course, place, fits)]
+    others = _spread(course, box) if len(kept) < len(found) else ()
+    return (*kept, *(place for place in others if stays(course, place, fits)))
+
+
+def _spread(course: Course, box: Array) -> Iterator[Place]:
+    """Yield places evenly spread over a box and all turns, each other with its platform turned.
+
+    They are the quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
+    sequences" (2018): multiples of powers of a generalised golden ratio.
+    """
+    count = len(box[0]) + 1
+    ratio = 2.0
+    for _ in range(32):
+        ratio = (1.0 + ratio) ** (1.0 / (count + 1))
+    steps = ratio ** -np.arange(1.0, count + 1.0)
+    for k, (*units, part) in enumerate((0.5 + np.arange(_SPREAD)[:, None] * steps) % 1.0):
+        turn = 2.0 * np.pi * part if course.axis is not None else 0.0
+        low, high = box - course.around(turn)
+        if (low <= high + _ROUNDING).all():
+            place = Place(tuple(map(float, low + units * np.maximum(high - low, 0.0))), turn)
+            turns = k % 2 and not (high - low > 2.0 * _ROUNDING)[course.yaw != 0.0].any()
+            yield with_platform(place, course.yaw, turn) if turns else place
 
 
 def stays(course: Course, place: Place, fits: Fits) -> bool:
@@ -168,15 +207,35 @@ def stays(course: Course, place: Place, fits: Fits) -> bool:
     return all(fits(poses[:, 0]) for poses, *_ in course.at([place]))
 
 
-def near(place: Place, steps: Array, turn: float) -> Iterator[Place]:
-    """Yield a place's neighbours: a step (m,) along each coordinate, and a turn, to both sides."""
+def with_platform(place: Place, yaw: Array, turn: float) -> Place:
+    """Return a place whose platform is turned by at most half a turn, as `Course.yaw` has it."""
+    pose = np.array(place.pose) + yaw * np.angle(np.exp(1j * turn))
+    return Place(tuple(map(float, pose)), place.turn)
+
+
+def near(place: Place, steps: Array, turn: float, yaw: Array, *, oblique: bool) -> Iterator[Place]:
+    """Yield a place's neighbours: a step (m,) along each coordinate, and a turn, to both sides.
+
+    A turn is that of the path alone, and that of the platform, too. In a region whose boundary is
+    oblique come steps along all coordinates and turns at once.
+    """
     for side in (1.0, -1.0):
         if turn:
-            yield Place(place.pose, place.turn + side * turn)
+            turned = Place(place.pose, place.turn + side * turn)
+            yield turned
+            if yaw.any():
+                yield with_platform(turned, yaw, side * turn)
         for i in np.flatnonzero(steps):
             moved = list(place.pose)
             moved[i] += side * float(steps[i])
             yield Place(tuple(moved), place.turn)
+    moving = np.flatnonzero(steps)
+    for signs in product((1.0, -1.0), repeat=len(moving)) if oblique and len(moving) < 4 else ():
+        pose = np.array(place.pose)
+        pose[moving] += signs * steps[moving]
+        for side in (0.0, 1.0, -1.0) if turn else (0.0,):
+            moved_all = Place(tuple(map(float, pose)), place.turn + side * turn)
+            yield with_platform(moved_all, yaw, side * turn) if yaw.any() else moved_all
 
 
 def _axis(robot: Manipulator) -> Array | None:
@@ -188,6 +247,22 @@ def _axis(robot: Manipulator) -> Array | None:
         return moves(robot, None, 1)[0][1]
     level = not (np.abs(platform.directions @ np.array(robot.gravity)) > _ROUNDING).any()
     return np.array(platform.axis) if level else None
+
+
+def _yaw(robot: Manipulator, axis: Array | None) -> Array:
+    """Return by how much a pose grows where the platform turns by 1 rad about an axis."""
+    platform, found = robot.platform, np.zeros(robot.freedom)
+    last = len(found) - 1
+    if (
+        axis is None
+        or not platform.angles
+        or (platform.tilts and platform.coordinates[-1] != "yaw")
+    ):
+        return found
+    about = platform.frame[2] if platform.tilts else platform.axis
+    along = float(np.dot(about, axis))
+    found[last] = np.sign(along) if abs(along) > 1.0 - _ROUNDING else 0.0
+    return found
 
 
 def _inside(region: Region, poses: Array) -> NDArray[np.bool_]:

@@ -21,16 +21,20 @@ from pteron.motion.motion import Motion, told_pose
 from pteron.motion.sizing.drive_loads import Sizing
 from pteron.motion.sizing.duty import DutyCycle
 from pteron.motion.sizing.places import TURNS, Place, checked, near, places_in, stays, within
-from pteron.workspace import Region
+from pteron.workspace import Box, Region
 
 _AT_REST = 1e-6
 """Share of the motion's greatest speed below which its end is at rest."""
 
+_ROUNDING = 2e-9
+"""Width of a range that is none but for rounding, m and rad."""
+
 _SOUGHT = "peak_force", "rms_force", "peak_speed"
 """Quantities whose worst places are sought."""
 
-_ROUNDS = 5
-"""Halvings of the grid about the worst places."""
+_NEARER = {True: (0.5,) * 5, False: (0.65,) * 8}
+"""Shares by which each round about the worst places is nearer than the one before, in a box or
+in another region."""
 
 
 def size(
@@ -58,8 +62,9 @@ def size(
     places : Region, sequence of Place or "workspace", optional
         Where else the cycle is done, as a whole: at all places and turns about the vertical at
         which it stays in a region of poses, or in the workspace (with `least_margin` to
-        singularities, at the home pose's angles). A grid of places by 30 degrees of turn is looked
-        at, and then ever nearer about the worst of each drive. By default it is as it stands. Of a
+        singularities, at the home pose's angles), the platform turned as the path is, or not. A
+        grid of places by 30 degrees of turn is looked at, and then ever nearer about the worst of
+        each drive. By default it is as it stands. Of a
         motion with more than 241 samples as many moments are looked at.
     friction : float
         Dry friction of a drive that has none in the machine's file, as a share of the largest force
@@ -115,7 +120,7 @@ def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["wor
     if not (isinstance(places, Region) or places == "workspace"):
         return cycle.sized(checked(cycle.robot, places))
     robot, course = cycle.robot, cycle.course
-    box, fits = within(robot, places if isinstance(places, Region) else None)
+    box, fits = within(course, places if isinstance(places, Region) else None)
     known = dict.fromkeys(places_in(course, box, fits))
     itself = Place(tuple(course.middle.tolist()))
     if not isinstance(places, Region) or stays(course, itself, fits):
@@ -128,21 +133,31 @@ def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["wor
         )
     found = cycle.sized(tuple(known))
     worst: dict[tuple[str, int], tuple[float, Place]] = {}
-    steps, turn = np.ptp(box, axis=0) / 8.0, np.pi / TURNS if course.axis is not None else 0.0
-    for _ in range(_ROUNDS):
+    free = np.ptp(box, axis=0) > np.ptp(course.around(0.0), axis=0) + _ROUNDING
+    steps, turn = (
+        free * np.ptp(box, axis=0) / 8.0,
+        np.pi / TURNS if course.axis is not None else 0.0,
+    )
+    yaw = course.yaw * (steps == 0.0)
+    boxed = isinstance(places, Box)
+    for nearer in _NEARER[boxed]:
         for quantity in _SOUGHT:
             most = getattr(found, f"{quantity}s")
             for leg, i in enumerate(found.worst(quantity)):
                 value = float(most[leg])
                 if (quantity, leg) not in worst or value > worst[quantity, leg][0]:
                     worst[quantity, leg] = value, found.places[i]
-        around = (n for place in {p for _, p in worst.values()} for n in near(place, steps, turn))
+        around = (
+            n
+            for place in {p for _, p in worst.values()}
+            for n in near(place, steps, turn, yaw, oblique=not boxed)
+        )
         new = [place for place in dict.fromkeys(around) if place not in known]
         new = [place for place in new if stays(course, place, fits)]
         if new:
             found = cycle.sized(tuple(new))
             known.update(dict.fromkeys(new))
-        steps, turn = steps / 2.0, turn / 2.0
+        steps, turn = nearer * steps, nearer * turn
     return cycle.sized(tuple(known))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import checked_arguments
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
@@ -20,6 +21,7 @@ _BLOCK = 1 << 14
 """Rows of a basis that are held at a time."""
 
 
+@checked_arguments
 @dataclass(frozen=True)
 class FourierSeries:
     """x(t) = center + sum over h of a_h cos(h w t) + b_h sin(h w t), with w = 2 pi / period.

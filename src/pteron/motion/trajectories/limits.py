@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pteron.arguments import checked_arguments
 from pteron.errors import DataError, shown
 from pteron.kernels import Array
 from pteron.legs import Drive
@@ -17,6 +18,7 @@ PerJointLimit = float | Sequence[float] | Array | None
 """One number for every joint, or one for each; None for the drives' own, or none."""
 
 
+@checked_arguments
 @dataclass(frozen=True, eq=False)
 class MotionLimits:
     """Largest speeds, accelerations and forces, infinite without a limit. Made by `limits_of`.

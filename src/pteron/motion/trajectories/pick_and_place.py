@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError
@@ -183,7 +183,7 @@ def _peak_acceleration(cycle: Cycle, radius: float) -> float:
 
     tau = np.linspace(0.0, 0.5, 1001)
     highest = int(size(tau).argmax())
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda t: -float(size(np.array([t]))[0]),
         bounds=(tau[max(highest - 1, 0)], tau[min(highest + 1, 1000)]),
         method="bounded",

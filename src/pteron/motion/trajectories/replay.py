@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
+import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -138,7 +138,7 @@ def _turned_on(robot: Manipulator, poses: Array) -> Array:
 def _spline(time: Array, values: Array) -> tuple[Array, Array, Array]:
     """Return values (T, K) and two derivatives, of the spline through them."""
     degree = min(_DEGREE, len(time) - 1)
-    spline = make_interp_spline(time, values, k=degree)
+    spline = scipy.interpolate.make_interp_spline(time, values, k=degree)
     orders = (
         np.asarray(spline.derivative(k)(time)) if k <= degree else 0.0 * values for k in (1, 2)
     )

@@ -13,8 +13,8 @@ from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.sampling import type_ii_sizes
 from pteron.kinematics.singularities import best_type_ii
-from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike

@@ -6,7 +6,7 @@ from typing import Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
-from pteron.errors import DataError
+from pteron.arguments import expect_one_of
 from pteron.kernels import Array
 
 PolynomialLaw = Literal["quintic", "seventh"]
@@ -34,8 +34,7 @@ def polynomial(law: PolynomialLaw) -> Progress:
     >>> [float(v[0]) for v in polynomial("seventh")(np.array([0.5]))]
     [0.5, 2.1875, 0.0]
     """
-    if law not in get_args(PolynomialLaw):
-        raise DataError(f"law: {law!r} is not one of {', '.join(get_args(PolynomialLaw))}")
+    expect_one_of(get_args(PolynomialLaw), law=law)
     factors = {
         "quintic": [0.0, 0.0, 0.0, 10.0, -15.0, 6.0],
         "seventh": [0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0],

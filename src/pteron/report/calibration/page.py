@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-import pteron
 from pteron.calibration import Calibration
 from pteron.errors import ModelError, PteronError
 from pteron.kernels import Array
@@ -22,7 +21,7 @@ from pteron.plots import (
 )
 from pteron.plots.canvas import nice_step
 from pteron.report.calibration.values import notes, value_rows
-from pteron.report.typeset import resource, significant, template
+from pteron.report.typeset import significant, template
 from pteron.workspace import home_pose, reach_slice
 from pteron.workspace.reach_slices import slice_planes
 
@@ -60,8 +59,6 @@ def page(result: Calibration) -> str:
         maps=error_maps(result),
         figures=_figures(result),
         notes=notes(result),
-        version=pteron.__version__,
-        style=resource("page.css") + resource("identification/page.css"),
     )
 
 

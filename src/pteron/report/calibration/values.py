@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.calibration import Calibration, Value
+from pteron.calibration import Calibration
 from pteron.calibration.result import Origin
 from pteron.report.typeset import measured
 
@@ -33,25 +33,17 @@ class Row:
 
 def value_rows(result: Calibration) -> tuple[Row, ...]:
     """Return the values of a calibration, in its order."""
-    return tuple(_row(value) for value in result.values)
-
-
-def _row(value: Value) -> Row:
-    factor, unit = _UNITS[value.unit]
-    half = factor * 0.5 * (value.interval[1] - value.interval[0])
-    change = value.found - value.drawn
-    texts = [measured(factor * one, half)[0] for one in (value.drawn, value.found, change)]
-    drawn, found, changed = texts
-    return Row(
-        value.name,
-        drawn,
-        found,
-        changed,
-        measured(0.0, half)[1],
-        unit,
-        value.origin,
-        abs(change) / _ORDINARY[value.unit],
-    )
+    rows = []
+    for value in result.values:
+        factor, unit = _UNITS[value.unit]
+        half = factor * 0.5 * (value.interval[1] - value.interval[0])
+        change = value.found - value.drawn
+        drawn, found, changed = (
+            measured(factor * one, half)[0] for one in (value.drawn, value.found, change)
+        )
+        size, error = abs(change) / _ORDINARY[value.unit], measured(0.0, half)[1]
+        rows.append(Row(value.name, drawn, found, changed, error, unit, value.origin, size))
+    return tuple(rows)
 
 
 def notes(result: Calibration) -> tuple[str, ...]:

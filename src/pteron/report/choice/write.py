@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
-import pteron
 from pteron.atomic import write_texts
 from pteron.design import Choice
+from pteron.design.choosing.candidate import Candidate
 from pteron.design.choosing.job import OBJECTIVES
 from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
+from pteron.json_values import json_text
 from pteron.plots import fronts_figure, svg
-from pteron.report.typeset import resource, template
+from pteron.report.typeset import template
 
 
 def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
@@ -24,9 +24,37 @@ def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
     OutputError
         If the folder cannot be written.
     """
-    data = json.dumps(choice.data(), indent=1, allow_nan=False) + "\n"
-    texts = {"choose.html": page(choice), "choose.json": data, **choice.robots()}
-    return write_texts(folder, texts)
+    texts = {"choose.html": page(choice), "choose.json": json_text(choice.data())}
+    return write_texts(folder, texts | choice.robots())
+
+
+def reasons(choice: Choice, serving: list[Candidate]) -> list[str]:
+    """Return the verdict on a choice, a sentence each."""
+    first, tried = choice.job.objectives[0].replace("_", " "), len(choice.candidates)
+    if not serving:
+        return [f"None of the {tried} kinds of machines that were tried does what is asked."]
+    best = serving[0]
+    return [
+        f"{len(serving)} of the {tried} kinds of machines that were tried do what is asked; "
+        f"{best.kind} has the least {first}.",
+        f"Drives: {drives(best)}. Margins over what is asked: {margins(best)}.",
+    ]
+
+
+def next_steps(choice: Choice, serving: list[Candidate]) -> list[str]:
+    """Return what to do after a choice, a sentence each."""
+    if not serving:
+        return [
+            "See below what each kind misses by how much: ask for less of that, or give stronger "
+            "motors under [motors]; then run the command again in another folder.",
+        ]
+    file = f"{serving[0].kind}.toml"
+    own = [] if choice.job.motors.list else ["Put motors that you can buy under [motors]."]
+    return [
+        *own,
+        f"pteron report {file} --out report shows the machine, pteron view {file} moves it.",
+        f"pteron size {file} sizes its drives over your own cycles.",
+    ]
 
 
 def page(choice: Choice) -> str:
@@ -43,6 +71,8 @@ def page(choice: Choice) -> str:
     return template("choice/page.html.j2").render(
         choice=choice,
         serving=serving,
+        reasons=reasons(choice, serving),
+        steps=next_steps(choice, serving),
         others=[one for one in choice.candidates if not one.serves],
         headings=headings,
         cells={one.kind: cells(one) for one in serving},
@@ -52,6 +82,4 @@ def page(choice: Choice) -> str:
         asked=asked(choice.job),
         assumed=assumed(choice),
         figure=figure,
-        version=pteron.__version__,
-        style=resource("page.css"),
     )

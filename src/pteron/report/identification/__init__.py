@@ -3,17 +3,21 @@
 The file is that of the machine with bodies that can exist, where the values allow any.
 """
 
+from typing import TYPE_CHECKING
+
 from pteron.public import publish as _publish
-from pteron.report.identification.values import (
-    Parameter as Parameter,
-    parameter_rows as parameter_rows,
-)
-from pteron.report.identification.write import (
-    Written as Written,
-    model_path as model_path,
-    numbers as numbers,
-    write_identification as write_identification,
-)
-from pteron.report.typeset import measured as measured
+
+if TYPE_CHECKING:
+    from pteron.report.identification.values import (
+        Parameter as Parameter,
+        parameter_rows as parameter_rows,
+    )
+    from pteron.report.identification.write import (
+        Written as Written,
+        model_path as model_path,
+        numbers as numbers,
+        write_identification as write_identification,
+    )
+    from pteron.report.typeset import measured as measured
 
 _publish(__name__)

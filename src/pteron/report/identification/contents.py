@@ -7,12 +7,13 @@ bodies, findings about the logs, residuals and their autocorrelations.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 import numpy as np
 
-from pteron.identification import Identification, Prediction, Preprocessing
+from pteron.identification import Identification, Prediction
+from pteron.identification.estimators.estimate import autocorrelations
 from pteron.kernels import Array
 from pteron.report.identification.values import Body, Parameter, body_rows, parameter_rows
 
@@ -51,25 +52,20 @@ class PageRecording:
 class Contents:
     """The contents of the page of an identification; n is the number of actuators.
 
-    `drawn` are the worst of the held-out
+    The messages of `result` call recordings as the page does. `drawn` are the worst of the held-out
     recordings; `repeats` says whether these are no logs of their own, but the ends of the fitted
-    ones. A finding is a tuple: kind, row, column and message. The residuals (R, n), N or N m, are
+    ones. The residuals (R, n), N or N m, are
     NaN where an equation is not used; `correlations` (L, n) are their autocorrelations at lags of 1
     to L samples, whose size white noise keeps below `bound` (n,) nineteen times in twenty.
     """
 
     result: Identification
-    reasons: tuple[str, ...]
-    steps: tuple[str, ...]
-    notes: tuple[str, ...]
     held_out: tuple[PageRecording, ...]
     fitted: tuple[PageRecording, ...]
     drawn: tuple[PageRecording, ...]
     repeats: bool
     parameters: tuple[Parameter, ...]
     bodies: tuple[Body, ...]
-    treated: tuple[tuple[str, Preprocessing], ...]
-    findings: tuple[tuple[str, str, str, str], ...]
     residuals: Array
     correlations: Array
     bound: Array
@@ -113,17 +109,27 @@ def shortened(texts: Iterable[str], sources: Mapping[str, str]) -> tuple[str, ..
 
 def contents(result: Identification) -> Contents:
     """Return the contents of the page of an identification."""
-    names = short_sources(result)
-    held = tuple(_shown(prediction, names) for prediction in result.held_out)
-    fitted = tuple(_shown(prediction, names) for prediction in result.fitted)
+    names, verdict = short_sources(result), result.verdict
+    said = [one.message for one in result.findings]
+    reasons, steps, notes, messages = (
+        shortened(texts, names)
+        for texts in (verdict.reasons, verdict.next_steps, result.notes, said)
+    )
+    found = zip(result.findings, messages, strict=True)
+    held, fitted = (
+        tuple(_shown(prediction, names) for prediction in predictions)
+        for predictions in (result.held_out, result.fitted)
+    )
     worst = sorted(held, key=lambda one: -float(one.prediction.nrms.max()))
     residuals = _residuals(result)
-    correlations, bound = _correlations(residuals)
+    used = np.isfinite(residuals)
     return Contents(
-        result=result,
-        reasons=shortened(result.verdict.reasons, names),
-        steps=shortened(result.verdict.next_steps, names),
-        notes=shortened(result.notes, names),
+        result=replace(
+            result,
+            verdict=replace(verdict, reasons=reasons, next_steps=steps),
+            notes=notes,
+            findings=tuple(replace(one, message=text) for one, text in found),
+        ),
         held_out=held,
         fitted=fitted,
         # A single sample is nothing to draw.
@@ -131,21 +137,9 @@ def contents(result: Identification) -> Contents:
         repeats={one.name for one in held} <= {one.name for one in fitted},
         parameters=parameter_rows(result),
         bodies=body_rows(result),
-        treated=tuple(
-            (names[one.source], treatment)
-            for one, treatment in zip(result.fitted, result.preprocessing, strict=True)
-        ),
-        findings=tuple(
-            (one.kind, "" if one.row is None else str(one.row), one.column or "", text)
-            for one, text in zip(
-                result.findings,
-                shortened((one.message for one in result.findings), names),
-                strict=True,
-            )
-        ),
         residuals=residuals,
-        correlations=correlations,
-        bound=bound,
+        correlations=autocorrelations(residuals, used, _LAGS)[0],
+        bound=np.asarray(1.96 / np.sqrt(np.maximum(used.sum(axis=0), 1))),
     )
 
 
@@ -165,15 +159,3 @@ def _residuals(result: Identification) -> Array:
     if not found.size:
         return np.full((0, len(result.robot.legs)), np.nan)
     return np.where(found == 0.0, np.nan, found)
-
-
-def _correlations(residuals: Array) -> tuple[Array, Array]:
-    """Return the autocorrelations at lags 1 to L, over pairs of finite residuals, and the bound."""
-    there = np.isfinite(residuals)
-    count = np.maximum(there.sum(axis=0), 1)
-    mean = np.where(there, residuals, 0.0).sum(axis=0) / count
-    centred = np.where(there, residuals - mean, 0.0)
-    power = np.maximum((centred**2).sum(axis=0), np.finfo(float).tiny)
-    lags = range(1, min(_LAGS, len(residuals) // 5) + 1)
-    found = [(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags]
-    return np.array(found).reshape(-1, residuals.shape[1]), np.asarray(1.96 / np.sqrt(count))

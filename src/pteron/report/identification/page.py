@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-import pteron
 from pteron.equations.machine import closure_of
 from pteron.identification import Identification
 from pteron.identification.verdict import AT_THE_FLOOR, CYCLE, LARGE, SMALL
@@ -25,7 +24,7 @@ from pteron.plots import (
 )
 from pteron.report.identification.contents import Contents, PageRecording, contents
 from pteron.report.quantities import force, nouns
-from pteron.report.typeset import measured, resource, significant, template
+from pteron.report.typeset import measured, template
 
 
 def page(result: Identification, model_file: str | None = None) -> str:
@@ -33,13 +32,12 @@ def page(result: Identification, model_file: str | None = None) -> str:
     made = template(
         "identification/page.html.j2",
         measured=lambda row: measured(row.value, row.half),
-        percent=_percent,
     )
     found = contents(result)
     joints = [leg.joint for leg in result.robot.legs]
     return made.render(
         found=found,
-        result=result,
+        result=found.result,
         robot=result.robot,
         estimate=result.estimate,
         bodies=result.consistency,
@@ -51,14 +49,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
         limits=(AT_THE_FLOOR, SMALL, LARGE, CYCLE),
         figures=figures(found),
         model_file=model_file,
-        version=pteron.__version__,
-        style=resource("page.css") + resource("identification/page.css"),
     )
-
-
-def _percent(share: float) -> str:
-    """Return a share in percent; what is nothing to speak of has no digits."""
-    return "less than 0.01 %" if 0.0 <= share < 1e-4 else f"{significant(100.0 * share, 2)} %"
 
 
 def figures(found: Contents) -> dict[str, Any]:
@@ -84,6 +75,7 @@ def figures(found: Contents) -> dict[str, Any]:
             correlation_figure(names, found.result.estimate.correlation),
             name="correlation",
             title="Correlations of the identified values",
+            widest=np.inf,  # it scrolls
         ),
     }
     if np.isfinite(found.residuals).any():

@@ -1,0 +1,45 @@
+"""The result of a command: the data that `--json` prints, and what a person reads in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from typer import Exit
+
+from pteron.cli.terminal import show, show_json, written
+
+
+@dataclass(frozen=True)
+class Result:
+    """The result of a command.
+
+    Attributes
+    ----------
+    data : object
+        For a program.
+    told : callable or sequence of str and Table
+        For a person: lines and tables, or what prints them.
+    files : sequence
+        The files that were written, told after the rest.
+    code : int
+        The exit code.
+    """
+
+    data: Any
+    told: Callable[[], None] | Sequence[Any] = ()
+    files: Sequence[object] = ()
+    code: int = 0
+
+    def tell(self, *, as_json: bool) -> None:
+        """Print it for a program or for a person, and end with its exit code."""
+        if as_json:
+            show_json(self.data)
+        elif callable(self.told):
+            self.told()
+            show(*written(*self.files))
+        else:
+            show(*self.told, *written(*self.files))
+        if self.code:
+            raise Exit(self.code)

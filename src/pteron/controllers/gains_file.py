@@ -1,0 +1,121 @@
+"""Gains in a file: `write_gains` and `read_gains`, a controller as TOML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from pteron.atomic import write_text
+from pteron.controllers.adaptive import Adaptive
+from pteron.controllers.computed_torque import ComputedTorque
+from pteron.controllers.controller import Controller
+from pteron.controllers.feed_forward_pd import FeedForwardPD
+from pteron.controllers.pd_gravity import PDGravity
+from pteron.errors import DataError, shown
+from pteron.manipulator import RobotLike, as_manipulator
+from pteron.toml import read_toml
+
+_KINDS: dict[str, type[Controller]] = {
+    "pd": PDGravity,
+    "feed-forward": FeedForwardPD,
+    "computed-torque": ComputedTorque,
+    "adaptive": Adaptive,
+}
+"""Names of the controllers in files, as on the command line."""
+
+_ABOUT = ("controller", "robot", "joints", "margins")
+"""Keys that are no numbers of the controller."""
+
+
+def gains_text(
+    robot: RobotLike, controller: Controller, margins: Mapping[str, float] | None = None
+) -> str:
+    """Return a controller for a machine as TOML, for `read_gains`; margins are for the reader."""
+    import tomlkit  # slow to load
+
+    robot = as_manipulator(robot)
+    kinds = {kind: name for name, kind in _KINDS.items()}
+    told: dict[str, Any] = {"controller": kinds[type(controller)], "robot": robot.name}
+    told["joints"] = list(robot.joint_names)
+    numbers = {name: getattr(controller, name) for name in _numbers(type(controller))}
+    if not isinstance(controller, Adaptive):
+        n = robot.joint_count
+        found = controller.gains(robot)
+        numbers |= {"proportional": found[:n].tolist(), "derivative": found[n : 2 * n].tolist()}
+    told |= {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in numbers.items()
+        if value is not None
+    }
+    lines = [f"{name} = {tomlkit.item(value).as_string()}" for name, value in told.items()]
+    if margins:
+        lines += ["", "[margins]  # the least anywhere: factor, rad, s and the disk margin"]
+        lines += [f"{name} = {tomlkit.item(value).as_string()}" for name, value in margins.items()]
+    return "\n".join(lines) + "\n"
+
+
+def write_gains(robot: RobotLike, controller: Controller, path: str | Path) -> Path:
+    """Write a controller for a machine as a TOML file, for `read_gains`.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    text = gains_text(as_manipulator(robot), controller)
+    return write_text(Path(path), text)
+
+
+def read_gains(robot: RobotLike, path: str | Path) -> Controller:
+    """Return the controller of a file that `pteron tune`, `write_gains` or a person wrote.
+
+    Its keys are `controller`, one of pd, feed-forward, computed-torque and adaptive, and what the
+    class takes: `period`, `bandwidth`, `damping`, `proportional`, `derivative`.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine that it is for.
+    path : str or path
+        The file.
+
+    Returns
+    -------
+    Controller
+
+    Raises
+    ------
+    DataError
+        If the file is not there, has other keys or numbers, or is for a machine of other joints.
+    """
+    robot = as_manipulator(robot)
+    found = read_toml(path, DataError, "there is no such file; pteron tune writes one")
+    kind = _KINDS.get(str(found.get("controller")))
+    if kind is None:
+        raise DataError(
+            f"{path}: controller: {shown(found.get('controller'))} given, one of "
+            f"{', '.join(_KINDS)} expected"
+        )
+    joints = found.get("joints", list(robot.joint_names))
+    if joints != list(robot.joint_names):
+        raise DataError(
+            f"{path}: its joints are {shown(joints)}, of {robot.name} they are "
+            f"{' '.join(robot.joint_names)}; tune this machine"
+        )
+    numbers = {key: value for key, value in found.items() if key not in _ABOUT}
+    allowed = _numbers(kind)
+    unknown = [key for key in numbers if key not in allowed]
+    if unknown:
+        raise DataError(f"{path}: {', '.join(unknown)}: unknown; {', '.join(allowed)} expected")
+    try:
+        made = kind(**numbers)
+        made.gains(robot)
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from None
+    return made
+
+
+def _numbers(kind: type[Controller]) -> list[str]:
+    return [field.name for field in fields(kind) if field.name != "motion"]

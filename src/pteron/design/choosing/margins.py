@@ -1,0 +1,100 @@
+"""The margins of a design's drives at the worst places and in the worst directions of its job."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pteron.design.choosing.drives import in_duty
+from pteron.design.choosing.rating import Case
+from pteron.design.choosing.samples import Places, sample_poses
+from pteron.design.worst_cases import worst_forces, worst_speeds
+from pteron.dynamics import drive_forces
+from pteron.kernels import Array
+from pteron.kinematics import jacobian
+from pteron.manipulator import Manipulator
+
+DENSE = 7
+"""Poses along each side of a box at which a design is looked at last."""
+
+_NOTHING = 1e-9
+"""Least force, speed or torque by which a limit is divided."""
+
+
+@dataclass
+class Margins:
+    """Margins of drives: their limits over their loads.
+
+    Attributes
+    ----------
+    figures : dict
+        The least of rated torque, peak torque and speed.
+    least : float
+        That of all.
+    worst : str
+        Where it is, in words.
+    place : tuple of Places and int, or None
+        The cycle's place at which its margin is least, and its number.
+    """
+
+    figures: dict[str, float] = field(default_factory=dict)
+    least: float = np.inf
+    worst: str = ""
+    place: tuple[Places, int] | None = None
+
+    def take(self, name: str, limits: Array, asked: Array) -> Array:
+        """Take limits (n,) over what is asked (B, n); return the margins (B,)."""
+        found = np.asarray((limits / np.maximum(asked, _NOTHING)).min(axis=-1))
+        self.figures[name] = min(self.figures.get(name, np.inf), float(found.min()))
+        return found
+
+
+def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None) -> Margins:
+    """Return the margins of a machine that carries the payload and has its drives.
+
+    Friction and rotors count, and cycles at all their outermost places.
+    """
+    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
+    most, rated, fastest = (
+        np.array([getattr(drive, name) or np.inf for drive in drives])
+        for name in ("max_force", "rated_force", "max_speed")
+    )
+    found, squares, shares = Margins(), [], case.shares(time)
+    for cycle in case.every_cycle:
+        duration = cycle.duration or time or 1.0
+        states = case.states(cycle, middle, duration)
+        forces = drive_forces(robot, *states)
+        rates = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
+        means = np.trapezoid(forces**2, axis=1) / (forces.shape[1] - 1) * duration
+        means = (means + cycle.dwell * forces[:, -1] ** 2) / (duration + cycle.dwell)
+        squares.append(means.max(axis=0))
+        every = np.minimum(
+            found.take("peak_margin", most, np.abs(forces).max(axis=1)),
+            found.take("speed_margin", fastest, np.abs(rates).max(axis=1)),
+        )
+        if not len(shares):
+            every = np.minimum(every, found.take("rated_margin", rated, np.sqrt(means)))
+        if every.min() < found.least:
+            k = int(every.argmin())
+            found.least, found.worst, found.place = float(every[k]), cycle.words(k), (cycle, k)
+    if len(shares):
+        load = np.sqrt(in_duty(np.array(squares), shares))
+        least = float(found.take("rated_margin", rated, load[None])[0])
+        if least < found.least:
+            found.least, found.worst = least, "the rated torque of the whole duty cycle"
+    asked = case.job.motion
+    if asked.acceleration or asked.speed:
+        places = sample_poses(case.job, robot, DENSE)
+        speed = max(asked.speed, _NOTHING)
+        forces = worst_forces(robot, middle + places, speed, asked.acceleration)
+        every = np.minimum(
+            found.take("peak_margin", most, forces),
+            found.take("speed_margin", fastest, worst_speeds(robot, middle + places, speed)),
+        )
+        if every.min() < found.least:
+            corner = places[int(every.argmin())][: len(robot.platform.lengths)]
+            at = ", ".join(f"{1e3 * x:+.0f}" for x in corner)
+            found.least = float(every.min())
+            found.worst = f"the motion in any direction, at ({at}) mm"
+    return found

@@ -1,0 +1,153 @@
+"""Proofs of a design's workspace, by intervals: every pose reaches, and no two bodies touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.design.choosing.rating import Case, Rating
+from pteron.design.choosing.samples import orientations, with_tool_in_the_middle
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator, Radii
+from pteron.motion.trajectories.tool import arm_motion, carries, tool_motion
+from pteron.platforms import Platform
+from pteron.workspace import Box, Cylinder, Proof, Region, interference, prove
+
+_BOXES, _BOXES_CLEAR = 60_000, 1_000
+"""Boxes after which a proof is given up; one that no two bodies touch, which takes longer."""
+
+_LONGER = 0.05
+"""Share of its travel by which a guide or ram goes further where a proof meets its end."""
+
+
+@dataclass(frozen=True)
+class TurnedTool:
+    """Poses whose tool is in a box while the platform turns about its axis, the tool off that.
+
+    Parameters
+    ----------
+    of_tool : Box
+        The tool's places, as `tool_motion` has them, and the turn, the last coordinate.
+    platform : Platform
+        What carries the tool.
+    """
+
+    of_tool: Box
+    platform: Platform
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose (2, m)."""
+        low, high = self.of_tool.box
+        at, away = self._arm(low[None], high[None])
+        return np.array([low - at[0] - away[0], high - at[0] + away[0]])
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which poses (..., m) lie in it."""
+        rest = np.zeros_like(poses)
+        return self.of_tool.holds(tool_motion(self.platform, poses, rest, rest)[0])
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which boxes with corners (B, m) surely have no pose of it."""
+        at, away = self._arm(low, high)
+        return self.of_tool.misses(low + at - away, high + at + away)
+
+    def _arm(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the arm (B, m) from P to the tool at the middle turn, and how far it may be off.
+
+        The arm's end goes no further than its length times the turn.
+        """
+        platform, angular = self.platform, self.platform.angular
+        middle, half = 0.5 * (low + high)[:, angular], 0.5 * (high - low)[:, -1:]
+        rest = np.zeros_like(middle)
+        at, away = np.zeros_like(low), np.zeros_like(low)
+        at[:, ~angular] = arm_motion(platform, middle, rest, rest)[0]
+        away[:, ~angular] = (1.0 + 1e-12) * np.hypot(*platform.tool[:2]) * half
+        return at, away
+
+
+def proofs_of(case: Case, one: Rating) -> tuple[list[Proof], Manipulator]:
+    """Return proofs of the workspace, and the machine, its guides and rams longer if need be."""
+    robot, floors = one.robot, case.job.floors
+    assert robot is not None  # it keeps all that is asked
+    found: list[Proof] = []
+    for _ in range(4):
+        found = [
+            prove(robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_BOXES)
+            for region in regions(case, robot, one.middle)
+        ]
+        causes = {c.leg for proof in found if not proof.holds for c in proof.causes}
+        ended = {i for i in causes if i and robot.legs[i - 1].joint.unit == "m"}
+        if not ended:
+            break
+        legs = list(robot.legs)
+        for i in ended:
+            low, high = legs[i - 1].limits or (0.0, 0.0)
+            spare = _LONGER * (high - low)
+            travel = low - spare, high + spare
+            legs[i - 1] = case.kind.with_travel(legs[i - 1], travel, one.values)
+        robot = replace(robot, legs=tuple(legs))
+    return found, robot
+
+
+def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
+    """Return the workspace as regions: each pose of a list, else a body at each orientation.
+
+    A range of turns without tilts is part of a box.
+    """
+    space, count = case.job.workspace, len(robot.platform.lengths)
+    if space.poses is not None:
+        return [Box(tuple(pose), tuple(pose)) for pose in middle + case.poses]
+    if space.turn is not None and not space.tilts and space.radius is None:
+        return [_turning(case, robot, middle)]
+    found: list[Region] = []
+    half = np.zeros(robot.freedom)
+    half[:count] = case.half[:count]
+    for pose in middle + with_tool_in_the_middle(robot, orientations(case.job, robot)):
+        if space.radius is not None and space.height is not None:
+            found.append(Cylinder(tuple(pose.tolist()), space.radius, space.height))
+        else:
+            found.append(Box(tuple((pose - half).tolist()), tuple((pose + half).tolist())))
+    return found
+
+
+def _turning(case: Case, robot: Manipulator, middle: Array) -> Region:
+    """Return the box of a workspace with its range of turns."""
+    platform, count = robot.platform, len(robot.platform.lengths)
+    assert case.job.workspace.turn is not None  # who asks has some
+    rest = np.zeros((1, robot.freedom))
+    level = tool_motion(platform, middle[None], rest, rest)[0][0]
+    low, high = level.copy(), level.copy()
+    low[:count] -= case.half[:count]
+    high[:count] += case.half[:count]
+    low[-1], high[-1] = case.job.workspace.turn
+    box = Box(tuple(low.tolist()), tuple(high.tolist()))
+    return TurnedTool(box, platform) if carries(platform) and any(platform.tool[:2]) else box
+
+
+def told(case: Case, proofs: Sequence[Proof]) -> str:
+    """Return what is proved of the workspace, in words."""
+    space, boxes = case.job.workspace, sum(proof.boxes for proof in proofs)
+    if not all(proof.holds for proof in proofs):
+        return (
+            f"kept at {len(case.poses)} sample poses; intervals over {boxes} boxes do not decide "
+            "of all"
+        )
+    if space.poses is not None:
+        return f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+    one = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
+    found = f"proved: every {one} keeps reach, limits and floors, by intervals over {boxes} boxes"
+    return f"{found}; not proved between the sampled tilts" if space.tilt else found
+
+
+def is_clear(case: Case, robot: Manipulator, middle: Array) -> bool:
+    """Say whether it is proved that no two bodies come nearer than is asked."""
+    radii, least = robot.radii or Radii(), case.job.floors.clearance / 2.0
+    parts = (radii.guide, radii.upper, radii.lower, radii.platform)
+    asked = interference(robot, Radii(*(part + least for part in parts)))
+    whole = regions(case, robot, middle)
+    most = _BOXES_CLEAR // len(whole)
+    return all(prove(robot, region, given=asked, most=most).holds for region in whole)

@@ -1,0 +1,234 @@
+"""The C of a control loop, compiled: sensors, controller, delay, drives and plant in one function.
+
+It is a library without Python in it, so that threads may run it beside each other.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pteron.equations.transmissions import DriveKind
+from pteron.kernels.blocks import Block
+from pteron.kernels.c import FLAGS, LINKED, SUFFIX, c_compiler, compiler_version
+from pteron.kernels.cache import digest, entry
+from pteron.kernels.code import arithmetic, rendered
+from pteron.kernels.compilers import built
+from pteron.kernels.kept import Program
+from pteron.kernels.kernel import Array
+
+ROUNDS = 200
+"""Most changes of sides in a step; six joints have 729 sets of them, and a few changes do."""
+
+PARTS = 3
+"""Parts of a period: the sensors' look and a late command divide it."""
+
+STATE = ("state", "side", "memory", "encoders", "seen", "told", "queue", "clock", "done", "fault")
+"""State that a run changes, for each machine."""
+
+GIVEN = (
+    *("reference", "given", "noise", "wrench", "most", "steps", "noises", "round", "share"),
+    "at_motor",
+)
+"""Arguments beside the numbers of plant and controller."""
+
+RESULTS = (*("states", "acceleration", "joints", "rates", "forces", "asked", "memories"),)
+"""Quantities recorded at each sample, where there is an array for them."""
+
+TOLD = {
+    "pose": "wanted",
+    "velocity": "wanted + M",
+    "acceleration": "wanted + 2 * M",
+    "joints": "measured",
+    "joint_rates": "measured + N",
+    "motors": "measured + 2 * N",
+    "motor_rates": "measured + 3 * N",
+    "memory": "memory",
+}
+"""What a controller may be told, and where the loop's C has it."""
+
+_RIGID = {"motors": TOLD["joints"], "motor_rates": TOLD["joint_rates"]}
+"""The same where no transmission bends."""
+
+_ASK = ctypes.CFUNCTYPE(
+    None,
+    ctypes.c_long,
+    ctypes.c_long,
+    ctypes.POINTER(ctypes.c_double),
+    ctypes.POINTER(ctypes.c_double),
+)
+
+_LIBRARY = "pteron_loop" + SUFFIX
+
+
+class _Port(ctypes.Structure):
+    _fields_ = (("numbers", ctypes.c_void_p), ("machine", ctypes.c_long), ("sample", ctypes.c_long))
+
+
+@dataclass(frozen=True)
+class LinkedLaw:
+    """A controller's C, as `pteron.export_c` writes it, that is compiled into the loop.
+
+    Attributes
+    ----------
+    source : str
+        Its header and source.
+    function : str
+        The function's name.
+    tables : tuple of (str, str)
+        For each input that is the machine's own, the array in the source that is passed.
+    """
+
+    source: str
+    function: str
+    tables: tuple[tuple[str, str], ...]
+
+    def arguments(self, block: Block) -> list[str]:
+        """Return the arguments of its call that go in."""
+        tables = dict(self.tables)
+        return [
+            tables[port.name] if port.shared else f"given + {block.at[port.name]}"
+            for port in block.program.inputs
+        ]
+
+
+@dataclass(frozen=True)
+class LoopCode:
+    """The C of a loop for some machines side by side.
+
+    Attributes
+    ----------
+    plant, sensed : Program
+        The accelerations in a state under forces; the joints and their rates in it.
+    law : Program or None
+        The controller; None where forces are given.
+    kind : DriveKind
+        What the drives have.
+    lanes : int
+        How many machines go side by side.
+    linked : LinkedLaw, optional
+        C in place of the controller's own.
+    """
+
+    plant: Program
+    sensed: Program
+    law: Program | None
+    kind: DriveKind
+    lanes: int
+    linked: LinkedLaw | None = None
+
+    @cached_property
+    def _blocks(self) -> list[Block]:
+        parts = {"plant": self.plant, "sensed": self.sensed, "law": self.law}
+        return [Block(name, part) for name, part in parts.items() if part is not None]
+
+    @cached_property
+    def source(self) -> str:
+        """The C code."""
+        plant, _, *laws = self._blocks
+        law = laws[0] if laws else None
+        sizes = {port.name: port.size for port in plant.varying}
+        freedom = sizes["pose"]
+        rates = [("in", plant.at["velocity"] + j) for j in range(freedom)]
+        rates += [("out", plant.out["acceleration"] + j) for j in range(freedom)]
+        more = []
+        for name, growth in self.kind.more:
+            more.append((name, len(rates), sizes[name]))
+            given = growth in plant.at
+            start = plant.at[growth] if given else plant.out[growth]
+            rates += [("in" if given else "out", start + j) for j in range(sizes[name])]
+        memory = 0
+        if law is not None:
+            memory = {port.name: port.size for port in law.varying}.get("memory", 0)
+        return rendered(
+            "pteron.kernels",
+            "loop.c.j2",
+            name=self.plant.name,
+            real="double",
+            **arithmetic(),
+            blocks=self._blocks,
+            plant=plant,
+            law=law,
+            linked=self.linked,
+            lanes=self.lanes,
+            freedom=freedom,
+            joints=sizes["forces"],
+            wrench=sizes["wrench"],
+            memory=memory,
+            rates=rates,
+            more=more,
+            dry=self.kind.dry,
+            bends=self.kind.bends,
+            elastic=[int(soft) for soft in self.kind.elastic],
+            encoders=sizes["forces"] * (2 if self.kind.bends else 1),
+            parts=PARTS,
+            told=TOLD if self.kind.bends else TOLD | _RIGID,
+            rounds=ROUNDS,
+            ports=self._names,
+        )
+
+    @cached_property
+    def _names(self) -> list[str]:
+        numbers = (f"{block.name}_{port.name}" for block in self._blocks for port in block.fixed)
+        return [*STATE, *GIVEN, *RESULTS, *numbers]
+
+    @cached_property
+    def _library(self) -> ctypes.CDLL:
+        command = c_compiler()
+        assert command is not None  # whoever runs it has asked
+        name = f"loop-{digest(self.source, *command, compiler_version(command), *FLAGS)}"
+        return ctypes.CDLL(str(entry(name, _LIBRARY, self._build)))
+
+    def _build(self, folder: Path) -> None:
+        advice = "set CC to another compiler, or PTERON_KERNELS=vm"
+        flags, sources = [*FLAGS, *LINKED], {"loop.c": self.source}
+        what = "the simulation's loop"
+        built(c_compiler() or (), flags, sources, folder / _LIBRARY, what, advice)
+
+    def run(
+        self,
+        arrays: Mapping[str, Array],
+        samples: int,
+        times: Sequence[float],
+        counts: Sequence[int],
+        ask: Callable[[int, int, Array], Array] | None = None,
+    ) -> None:
+        """Run some samples; arrays (B or 1, T or 1, size) are read and filled in place."""
+        table = (_Port * len(self._names))()
+        for port, name in zip(table, self._names, strict=True):
+            optional = name in (*RESULTS, "reference", "given")
+            array = arrays.get(name) if optional else arrays[name]
+            if array is not None:
+                machine, sample = (
+                    array.strides[axis] // 8 if array.shape[axis] > 1 else 0 for axis in (0, 1)
+                )
+                port.numbers, port.machine, port.sample = array.ctypes.data, machine, sample
+        failures: list[BaseException] = []
+        joints = arrays["most"].shape[2]
+
+        def asked(machine: int, sample: int, measured: Any, forces: Any) -> None:
+            into = np.ctypeslib.as_array(forces, (joints,))
+            into[:] = np.nan
+            if not failures:
+                told = np.ctypeslib.as_array(measured, (2 * joints,)).copy()
+                try:
+                    into[:] = ask(machine, sample, told)  # type: ignore[misc]
+                except BaseException as error:
+                    failures.append(error)
+
+        self._library.run(
+            ctypes.c_long(len(arrays["state"])),
+            ctypes.c_long(samples),
+            (ctypes.c_double * len(times))(*times),
+            (ctypes.c_long * len(counts))(*counts),
+            table,
+            _ASK(asked) if ask is not None else _ASK(),
+        )
+        if failures:
+            raise failures[0]

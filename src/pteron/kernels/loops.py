@@ -1,0 +1,133 @@
+"""`Loop`: a machine's control loop by samples, in C where there is a compiler, else in NumPy."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+
+from pteron.equations.transmissions import DriveKind
+from pteron.errors import ModelError
+from pteron.kernels.c import c_compiler
+from pteron.kernels.choice import VARIABLE
+from pteron.kernels.kept import Program
+from pteron.kernels.kernel import Array
+from pteron.kernels.loop_code import LinkedLaw, LoopCode
+from pteron.kernels.programs import bare, motion_program, program
+from pteron.kernels.samples import Ask, Evaluated, Plant, run_samples
+from pteron.kernels.targets import FIXED
+from pteron.manipulator import Manipulator
+
+LANES = 8
+"""Machines that share a vector."""
+
+_FEW = 4
+"""Machines that go one by one."""
+
+
+class Loop:
+    """The control loop of machines of one layout; its numbers are given in a call.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        A machine; others may have other inertial parameters and other drives, which have no dry
+        friction and no Stribeck friction where its drives have none.
+    law : Program, optional
+        The controller.
+    linked : LinkedLaw, optional
+        Its C as it runs on the machine, in place of the program's.
+    """
+
+    def __init__(
+        self, robot: Manipulator, law: Program | None = None, linked: LinkedLaw | None = None
+    ) -> None:
+        self.kind = DriveKind.of(robot)
+        self.plant = _plant(bare(robot), self.kind)
+        self.sensed = program(robot, "sensed")
+        self.law, self.linked = law, linked
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether C makes the steps."""
+        return os.environ.get(VARIABLE) != "vm" and c_compiler() is not None
+
+    def run(
+        self,
+        arrays: Mapping[str, Array],
+        samples: int,
+        times: Sequence[float],
+        counts: Sequence[int],
+        ask: Ask | None = None,
+        threads: int = 1,
+        go: Callable[..., None] | None = None,
+    ) -> None:
+        """Run some samples, and change and fill `arrays`, each (B or 1, T or 1, size), in place.
+
+        Parameters
+        ----------
+        arrays : dict
+            What `LoopCode` names: `STATE`, `GIVEN` and, of `RESULTS`, those that are wanted.
+        samples : int
+            How many.
+        times : sequence
+            Length of a step in each of a period's parts, and the period, s.
+        counts : sequence
+            Steps in each part; how many parts have the command before; the part at whose end the
+            sensors look; samples that commands, and that readings, are late; the number of the
+            first sample; whether the last one is the end.
+        ask : callable, optional
+            The controller, where it is no program.
+        threads : int
+            How many share a batch.
+        go : callable, optional
+            In place of `Plant.go`.
+        """
+        if self.linked is not None and c_compiler() is None:
+            raise ModelError("a controller's C needs a C compiler, which is not here; install one")
+        if go is not None or not (self.is_compiled or self.linked):
+            plant = Plant(self.plant, self.kind)
+            if go is not None:
+                plant.go = go  # type: ignore[method-assign]
+            law = None if self.law is None else Evaluated("law", self.law)
+            given = plant, Evaluated("sensed", self.sensed), law
+            run_samples(*given, arrays, samples, times, counts, ask)
+            return
+        batch = len(arrays["state"])
+        code = self.code(1 if batch < _FEW else LANES)
+        shares = max(1, min(threads, batch // LANES))
+        bounds = [batch * k // shares for k in range(shares + 1)]
+
+        def part(start: int, stop: int) -> None:
+            cut = {n: a[start:stop] if len(a) == batch else a for n, a in arrays.items()}
+            code.run(cut, samples, times, counts, ask)
+
+        if shares == 1:
+            part(0, batch)
+            return
+        with ThreadPoolExecutor(shares) as pool:
+            list(pool.map(part, bounds[:-1], bounds[1:]))
+
+    def code(self, lanes: int) -> LoopCode:
+        """Return its C for some machines side by side."""
+        return _code(self.plant, self.sensed, self.law, self.kind, lanes, self.linked)
+
+
+@lru_cache(maxsize=64)
+def loop(robot: Manipulator, law: Program | None = None, linked: LinkedLaw | None = None) -> Loop:
+    """Return the loop of a machine under a controller, or under given forces; see `Loop`."""
+    return Loop(robot, law, linked)
+
+
+def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, Array]:
+    """Return a machine's own numbers for a program of the loop, as `Loop.run` takes them."""
+    return {
+        f"{name}_{port.name}": FIXED[port.name](robot).reshape(1, 1, -1)
+        for port in part.inputs
+        if port.name in FIXED
+    }
+
+
+_plant = lru_cache(maxsize=64)(motion_program)
+_code = lru_cache(maxsize=64)(LoopCode)

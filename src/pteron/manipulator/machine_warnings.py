@@ -1,0 +1,183 @@
+"""Warnings about a machine: possible but unlikely values, most often a wrong unit or sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import hypot, pi, sqrt
+from typing import Any
+
+import numpy as np
+
+from pteron.bodies.inertia import PlanarInertia
+from pteron.bodies.vectors import Vector, cross
+from pteron.legs import LegKind
+from pteron.legs.drive_warnings import drive_warnings
+from pteron.manipulator.manipulator import Manipulator, told_legs
+from pteron.platforms import Platform
+
+_LARGE = 10.0
+"""Length, m, beyond which millimetres are likelier."""
+
+_UNLIKE = 20.0
+"""Greatest ratio of a link's central inertia to a uniform bar's, or the inverse: two masses at its
+ends have 3."""
+
+_PULL = 30.0
+"""Gravity, m/s^2, beyond which another unit is likelier."""
+
+
+def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, ...]:
+    """Return warnings about a machine's file, one line each.
+
+    Each begins with the place: ``leg 2: lower: center_of_mass: ...``. Masses and inertias are
+    looked at where `bodies` says so.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.manipulator.machine_warnings import machine_warnings
+    >>> machine_warnings(pteron.load("quadrupteron"))
+    ()
+    """
+    platform, far = robot.platform, _far(robot)
+    found = _in_millimetres(far)
+    if hypot(*robot.gravity) > _PULL:
+        found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
+    turn, most = ("half a turn", pi) if platform.tilts else ("a turn", 2.0 * pi)
+    found += [
+        f"platform: limits: {list(limits)} rad, more than {turn} from {angle} = 0: are these "
+        "degrees?"
+        for angle, limits in platform.angle_limits.items()
+        if max(map(abs, limits)) > most
+    ]
+    radius = max(hypot(*leg.platform_point) for leg in robot.legs)
+    points = any("platform_point" in keys for keys in far.values())
+    # Consequences of lengths in millimetres are not listed beside them.
+    if bodies and radius > 0.0 and not points and 0 not in far:
+        found += [f"platform: {text}" for text in _spread(platform, radius)]
+    axis = platform.rotation_axes[0] if len(platform.rotation_axes) == 1 else None
+    for i, leg in enumerate(robot.legs, start=1):
+        own = () if i in far else _leg_warnings(leg, platform, bodies)
+        found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis), *drive_warnings(leg))]
+    if axis is not None:
+        found += _turning_offsets(robot.legs, axis, platform.angles[0])
+    return tuple(found)
+
+
+def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
+    """Return, by leg from 1 or 0 for the platform, what lies beyond `_LARGE`, by its key; m."""
+    platform = robot.platform
+    given: dict[int, dict[str, Sequence[float]]] = {
+        0: {
+            "tool": platform.tool,
+            "center_of_mass": platform.inertia.center_of_mass,
+            **{f"hinge of bars item {i}": b.hinge for i, b in enumerate(platform.bars, start=1)},
+        }
+    }
+    for i, leg in enumerate(robot.legs, start=1):
+        bodies: Any = {key: leg.bodies[at.body] for key, at in leg.every_key().items() if at.body}
+        centers = {
+            f"{key}.center_of_mass": body.center_of_mass
+            for key, body in bodies.items()
+            if hasattr(body, "center_of_mass")
+        }
+        given[i] = {**leg.metres, **centers}
+    far = {
+        i: {key: v for key, v in values.items() if max(map(abs, v)) > _LARGE}
+        for i, values in given.items()
+    }
+    return {i: values for i, values in far.items() if values}
+
+
+def _in_millimetres(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[str]:
+    """Return the question whether lengths are in millimetres: one, since the cause is one."""
+    if not far:
+        return []
+    alike: dict[tuple[str, ...], list[int]] = {}
+    for i, values in far.items():
+        alike.setdefault(tuple(values), []).append(i)
+    where = "; ".join(
+        f"{told_legs(legs) if legs[0] else 'platform'}: {', '.join(keys)}"
+        for keys, legs in alike.items()
+    )
+    first, *others = (value for values in far.values() for value in values.values())
+    size = f"{first[0]:g}" if len(first) == 1 else f"{list(first)}"
+    return [f"{where}: {f'beyond {_LARGE:g}' if others else size} m: are these mm?"]
+
+
+def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[str]:
+    """Yield warnings about a leg, one line each."""
+    far = hypot(*leg.platform_point)
+    # A platform that tilts may have a pivot far away for its P.
+    if 0.0 < leg.size < far and not platform.tilts:
+        yield (
+            f"platform_point: {far:g} m from P, farther than the leg is long: is it in the "
+            "platform's frame?"
+        )
+    if leg.limits is not None and leg.joint.unit == "rad" and max(map(abs, leg.limits)) > 2.0 * pi:
+        yield f"limits: {list(leg.limits)} rad: are these degrees?"
+    for letter, (key, low, high, _) in leg.extents.items() if bodies else ():
+        body: Any = leg.bodies[letter]
+        if text := leg.beyond_ends(letter, body.center_of_mass[0]):
+            yield f"{key}: center_of_mass: {text}"
+        yield from (f"{key}: {text}" for text in _unlike_a_bar(body, high - low))
+
+
+def _turning_offsets(legs: Sequence[LegKind], axis: Vector, angle: str) -> Iterator[str]:
+    """Yield the legs whose fixed offset is kept from turning by no leg at the same hinge."""
+    keeps: dict[Vector, bool] = {}
+    for leg in legs:
+        free = np.array(leg.free_axes(None)).reshape(-1, 3)
+        held = np.linalg.matrix_rank(np.vstack([free, axis])) > np.linalg.matrix_rank(free)
+        keeps[leg.platform_point] = keeps.get(leg.platform_point, False) or bool(held)
+    for i, leg in enumerate(legs, start=1):
+        if hypot(*cross(leg.fixed_offset, axis)) > 0.0 and not keeps[leg.platform_point]:
+            yield (
+                f"leg {i}: fixed_offset: does not turn with {angle}, but no leg at this "
+                "platform_point keeps it from turning"
+            )
+
+
+def _unlike_a_bar(body: Any, length: float) -> Iterator[str]:
+    """Yield what in a link's inertia is far from that of a bar of its length."""
+    beside = hypot(*body.center_of_mass[1:])
+    if beside > length:
+        yield f"center_of_mass: {beside:g} m beside it: are these mm?"
+        return
+    own = body.inertia - body.mass * sum(x * x for x in body.center_of_mass)
+    # One by one: a product of small numbers may vanish.
+    share = 12.0 * own / length / length / body.mass
+    if not 1.0 / _UNLIKE <= share <= _UNLIKE:
+        yield (
+            f"inertia: {body.inertia:g} kg m^2 leaves {own:.3g} about the centre of mass, "
+            f"{share:.2g} times that of a uniform bar: is it about the origin, in kg m^2?"
+        )
+
+
+def _spread(platform: Platform, radius: float) -> Iterator[str]:
+    """Yield what lies farther from P than a platform has it whose points are within a radius."""
+    body, size = platform.inertia, 3.0 * radius
+    off = hypot(*body.center_of_mass)
+    if off > size:
+        yield f"center_of_mass: {off:g} m away: are these mm?"
+    inertia = body.inertia if isinstance(body, PlanarInertia) else max(np.diag(body.tensor))
+    if sqrt(inertia / body.mass) > 3.0 * size:
+        yield (
+            f"inertia: {inertia:g} kg m^2 with {body.mass:g} kg is mass "
+            f"{sqrt(inertia / body.mass):g} m away: is it in kg m^2?"
+        )
+    for i, bar in enumerate(platform.bars, start=1):
+        off = hypot(*bar.hinge)
+        if off > size:
+            yield (
+                f"hinge of bars item {i}: {off:g} m from P, while the legs' points are within "
+                f"{radius:g} m: is it in m, in the platform's frame?"
+            )
+    for i, part in enumerate(platform.geared, start=1):
+        joined = part.ratio**2 * part.inertia
+        away = sqrt(joined / platform.joined.mass)
+        if away > 3.0 * size:
+            yield (
+                f"geared item {i}: {part.ratio:g}^2 times {part.inertia:g} kg m^2 is the "
+                f"platform's mass {away:g} m away: is it in kg m^2?"
+            )

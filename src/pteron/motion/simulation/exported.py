@@ -1,0 +1,110 @@
+"""`Exported`: a controller by its exported C, as it runs on the machine (software in the loop)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pteron.controllers import Controller
+from pteron.controllers.law import Law
+from pteron.errors import DataError
+from pteron.kernels.loop_code import LinkedLaw
+from pteron.manipulator import RobotLike
+
+
+@dataclass(frozen=True)
+class ExportedLaw(Law):
+    """A law whose forces come from exported C."""
+
+    linked: LinkedLaw | None = None
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A controller whose exported C is compiled into the loop of `simulate`, as it is.
+
+    The numbers are those of its tables, as on the machine: gains, inertial parameters, drives; the
+    `model` of `simulate` says only what memory begins with.
+
+    Parameters
+    ----------
+    folder : path
+        What `pteron.export_c(robot, [controller], folder)` wrote.
+    controller : Controller
+        Whose law it is, with its period.
+
+    Raises
+    ------
+    DataError
+        If the folder has no C of the law, or one of single precision.
+
+    Examples
+    --------
+    >>> import tempfile, pteron
+    >>> from pteron.controllers import ComputedTorque
+    >>> from pteron.motion import Exported
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     files = pteron.export_c("tripteron", [ComputedTorque()], folder)
+    ...     controller = Exported(folder, ComputedTorque())
+    >>> controller.period
+    0.001
+    """
+
+    folder: str | Path
+    controller: Controller
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.controller, Controller):
+            raise DataError(
+                f"controller: {self.controller!r} given, one of pteron.controllers expected"
+            )
+        object.__setattr__(self, "_text", self._read())
+
+    @property
+    def period(self) -> float:
+        """Time between two samples, s."""
+        return self.controller.period
+
+    def law(self, model: RobotLike) -> ExportedLaw:
+        """Return its law, which runs in the loop alone."""
+        own = self.controller.law(model)
+        header, source, function = self._text  # type: ignore[attr-defined]
+        tables = []
+        for port in own.program.inputs:
+            if port.shared:
+                stem = function.removesuffix(own.what)
+                names = (f"{function}_{port.name}", f"{stem}{port.name}")
+                found = [n for n in names if re.search(rf"extern const double {n}\[", header)]
+                if not found:
+                    raise DataError(
+                        f"{self.folder}: no table {names[1]} there; export the controller without "
+                        "--specialised, for this machine"
+                    )
+                size = int(re.search(rf"{found[0]}\[(\d+)\]", header)[1])  # type: ignore[index]
+                if size != port.size:
+                    raise DataError(
+                        f"{self.folder}: {found[0]} has {size} numbers, {port.size} expected; "
+                        "export the controller for this machine"
+                    )
+                tables.append((port.name, found[0]))
+        linked = LinkedLaw(header + source, function, tuple(tables))
+        return ExportedLaw(own.what, own.model, own.gains, own.base, linked)
+
+    def _read(self) -> tuple[str, str, str]:
+        """Return header and source, without the line that includes it, and the function."""
+        what = self.controller.what
+        for path in sorted(Path(self.folder).glob("*.h")):
+            header = path.read_text(encoding="utf-8")
+            found = re.search(rf"\bint (\w+_{what})\((\w+ )*(double|float)", header)
+            if found and path.with_suffix(".c").exists():
+                if found[3] == "float":
+                    raise DataError(
+                        f'{path}: numbers of single precision; export with real="double"'
+                    )
+                source = path.with_suffix(".c").read_text(encoding="utf-8")
+                return header, re.sub(r'#include "[^"]*"', "", source), found[1]
+        raise DataError(
+            f"{self.folder}: no C of {what} there; write it with pteron.export_c(robot, "
+            "[controller], folder)"
+        )

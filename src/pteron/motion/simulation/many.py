@@ -1,0 +1,232 @@
+"""`simulate_many`: many machines that differ in their numbers, under one controller, at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.atomic import make_folder
+from pteron.controllers import Controller, Custom
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.kernels.loop_code import STATE
+from pteron.kernels.loops import loop, machine_numbers
+from pteron.manipulator import RobotLike, as_manipulator
+from pteron.motion.motion import Motion
+from pteron.motion.simulation.loop import Timing, loop_arrays
+from pteron.motion.simulation.machines import Machines
+from pteron.motion.simulation.plant import allowed_step
+from pteron.motion.simulation.sensors import Sensors, encoder_noise, expect_sensed
+from pteron.motion.simulation.simulate import STEP, check_delay, check_positive, reference_of
+from pteron.shapes import Workers
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_ROWS = 200_000
+"""Samples that are held in memory at once, and stand in one file, about."""
+
+_WHY = ("", "no forces were asked for", "a leg came to the edge of its reach, or it diverged")
+"""Why a machine ended, by its fault."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Figures of many simulated machines, a row each, over the samples that each has.
+
+    Attributes
+    ----------
+    machines : Machines
+        What was simulated.
+    samples : array, shape (B,)
+        How many each came to.
+    rms, largest : array, shape (B, m)
+        Pose less reference, m and rad.
+    force : array, shape (B, n)
+        Largest force of each drive, N or N m.
+    stopped : array of str, shape (B,)
+        Why a machine ended before its time; empty where it did not.
+    files : tuple of Path
+        The samples, if they were asked for.
+    """
+
+    machines: Machines
+    samples: NDArray[np.int64]
+    rms: Array
+    largest: Array
+    force: Array
+    stopped: NDArray[np.str_]
+    files: tuple[Path, ...]
+
+    def __repr__(self) -> str:
+        """Return the batch in a line."""
+        ended = int((self.stopped != "").sum())
+        return f"<Batch of {len(self.samples)} {self.machines.robot.name!r}: {ended} ended early>"
+
+
+def simulate_many(
+    machines: Machines,
+    motion: Motion,
+    controller: Controller | Custom,
+    *,
+    model: RobotLike | None = None,
+    sensors: Sensors | None = None,
+    delay: float = 0.0,
+    step: float = STEP,
+    duration: float | None = None,
+    out: str | Path | None = None,
+    threads: Workers = 1,
+) -> Batch:
+    """Simulate many machines that follow a motion under one controller.
+
+    Each is what `simulate` makes of it, to the same bits but for the noise, whose seed is that of
+    the sensors with the machine's number; joints' limits and singularities of type II do not end
+    it. In C eight machines share a vector.
+
+    Parameters
+    ----------
+    machines : Machines
+        See `machines_about`.
+    motion : Motion
+        What they are to follow; they start on it.
+    controller : Controller
+        Of `pteron.controllers`.
+    model : Manipulator, name or path, optional
+        What the controller takes them for; by default `machines.robot` without payload.
+    sensors : Sensors, optional
+        The encoders; by default coordinates and rates are exact.
+    delay : float
+        From a sample to what the drives give for it, s.
+    step : float
+        Length of the integration's steps, s.
+    duration : float, optional
+        s; by default the motion's.
+    out : path, optional
+        A folder for the samples: files of Parquet, each written when its machines are done, so that
+        memory does not grow with their number.
+    threads : int
+        How many share the work.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    DataError
+        If a number is not sensible, or the folder has samples already.
+    OutputError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.controllers import ComputedTorque
+    >>> from pteron.motion import machines_about, pick_and_place, simulate_many
+    >>> robot = pteron.load("tripteron")
+    >>> motion = pick_and_place(robot, [0.0, 0.0, 0.0])
+    >>> many = machines_about(robot, 2, masses=0.1)
+    >>> simulate_many(many, motion, ComputedTorque(), duration=0.01)
+    <Batch of 2 'tripteron': 0 ended early>
+    """
+    robot = machines.robot
+    if not isinstance(controller, Controller | Custom):
+        raise DataError(
+            f"controller: {controller!r} given, one of pteron.controllers expected: `simulate` "
+            "takes others"
+        )
+    check_delay(delay)
+    check_positive(step=step)
+    sensors = sensors or Sensors()
+    reference = reference_of(robot, motion, None, duration, controller.period)
+    count, m, n = len(reference.time), robot.freedom, robot.joint_count
+    about = reference.pose[:: max(1, count // 64)]
+    timing = Timing(
+        delay,
+        "rk4",
+        allowed_step(robot, about, step, usual=step == STEP),
+        1e-10,
+        sensors.delay + sensors.samples * controller.period,
+    )
+    times, counts = timing.parts(controller.period, count)
+    law = controller.law(robot if model is None else as_manipulator(model))
+    expect_sensed(robot, law.program)
+    made = loop(robot, law.program)
+    alone = loop_arrays(
+        robot, (reference.pose[0], reference.velocity[0]), reference, law, sensors, counts
+    )
+    alone |= machine_numbers(robot, made.plant, "plant")
+    alone["wrench"] = np.zeros((1, 1, len(robot.column_names["wrench"])))
+    folder = None if out is None else _empty(out)
+    size, files = max(8, _ROWS // count // 8 * 8), list[Path]()
+    found: dict[str, list[Array]] = {name: [] for name in ("done", "fault", "rms", "most", "force")}
+    for start in range(0, len(machines), size):
+        part = machines.rows(slice(start, start + size))
+        arrays = alone | {
+            "plant_parameters": np.ascontiguousarray(part.loaded[:, None]),
+            "plant_drives": np.ascontiguousarray(part.drives[:, None]),
+            **encoder_noise(sensors, robot, count, range(start, start + len(part))),
+        }
+        arrays |= {name: np.repeat(alone[name], len(part), axis=0) for name in STATE}
+        sizes = {"states": alone["state"].shape[2], "joints": n, "forces": n}
+        samples = {name: np.full((len(part), count, k), np.nan) for name, k in sizes.items()}
+        made.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
+        done = arrays["done"][:, 0]
+        gone = np.arange(count) >= done
+        error = np.where(gone[..., None], np.nan, samples["states"][..., :m] - reference.pose)
+        found["rms"].append(np.sqrt(np.nanmean(error**2, axis=1)))
+        found["most"].append(np.nanmax(np.abs(error), axis=1))
+        force = np.where(gone[..., None], np.nan, np.abs(samples["forces"]))
+        found["force"].append(np.nanmax(force, axis=1))
+        found["done"].append(done[:, 0])
+        found["fault"].append(arrays["fault"][:, 0, 0])
+        if folder is not None:
+            files.append(folder / f"machines-{start:08d}.parquet")
+            table = _table(machines, start, reference.time, samples, ~gone)
+            table.write_parquet(files[-1])
+    whole = {name: np.concatenate(parts) for name, parts in found.items()}
+    return Batch(
+        machines,
+        whole["done"].astype(np.int64),
+        whole["rms"],
+        whole["most"],
+        whole["force"],
+        np.array(_WHY)[whole["fault"].astype(int)],
+        tuple(files),
+    )
+
+
+def _empty(out: str | Path) -> Path:
+    folder = make_folder(out)
+    there = sorted(folder.glob("machines-*.parquet"))
+    if there:
+        raise DataError(f"{folder}: has {there[0]} already; give another folder, or remove them")
+    return folder
+
+
+def _table(
+    machines: Machines, start: int, time: Array, samples: dict[str, Array], kept: NDArray[np.bool_]
+) -> pl.DataFrame:
+    """Return the samples of some machines that each came to."""
+    import polars as pl
+
+    robot = machines.robot
+    m = robot.freedom
+    names = robot.coordinates
+    numbers = np.broadcast_to(start + np.arange(len(kept))[:, None], kept.shape)
+    columns: dict[str, NDArray[np.generic]] = {
+        "machine": numbers[kept],
+        "t": np.broadcast_to(time, kept.shape)[kept],
+    }
+    for titles, values in (
+        (names, samples["states"][..., :m]),
+        ([f"d{name}" for name in names], samples["states"][..., m : 2 * m]),
+        (robot.joint_names, samples["joints"]),
+        (robot.force_names, samples["forces"]),
+    ):
+        columns |= {title: values[..., k][kept] for k, title in enumerate(titles)}
+    return pl.DataFrame(columns)

@@ -1,0 +1,193 @@
+"""The machine's equations of motion, linearised about a pose at rest or a moment of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+import scipy  # type: ignore[import-untyped]
+
+from pteron.dynamics import drive_forces
+from pteron.equations.drives import drive_numbers
+from pteron.equations.transmissions import DriveKind, actuator_numbers
+from pteron.kernels import Array, bare, program
+from pteron.kernels.programs import motion_program
+from pteron.kinematics import jacobian
+from pteron.kinematics.evaluate import checked_one
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
+from pteron.motion.simulation.plant import motor_states
+from pteron.motion.simulation.sensors import encoder_of
+from pteron.shapes import PoseLike
+
+
+@dataclass(frozen=True)
+class LinearPlant:
+    """A machine with its drives near a state: s' = A s + B F, and C s is what its encoders tell.
+
+    s are small changes of (q, q'), then of the motors' coordinates and rates where transmissions
+    bend, and of the currents' forces where these lag: S numbers in all.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine.
+    pose : array, shape (m,)
+        Where it was linearised.
+    matrix : array, shape (S, S)
+        A, of the joints' coordinates and their rates first; SI units.
+    inputs : array, shape (S, n)
+        B, of the forces that are asked of the drives.
+    outputs : array, shape (2 n, S)
+        C: coordinates and rates, of the joints or of the motors, where the encoders are.
+    differenced : array, shape (n, S)
+        Coordinates of which rates are the differences, where encoders tell no rates.
+    """
+
+    robot: Manipulator
+    pose: Array
+    matrix: Array
+    inputs: Array
+    outputs: Array
+    differenced: Array
+
+    @property
+    def poles(self) -> Array:
+        """Eigenvalues of A, (S,), rad/s: the machine's own, its drives' forces held."""
+        return np.asarray(np.linalg.eigvals(self.matrix))
+
+    def held(self, span: float) -> tuple[Array, Array]:
+        """Return exp(A t) and the integral of exp(A s) B over the span: forces held, exactly."""
+        size, count = self.inputs.shape
+        both = np.zeros((size + count, size + count))
+        both[:size] = np.hstack([self.matrix, self.inputs]) * span
+        found = scipy.linalg.expm(both)[:size]
+        return found[:, :size], found[:, size:]
+
+
+def linearised(
+    robot: RobotLike,
+    pose: PoseLike,
+    velocity: PoseLike | None = None,
+    acceleration: PoseLike | None = None,
+) -> LinearPlant:
+    """Linearise a machine with its drives at a pose, at rest, or at a moment of a motion.
+
+    The drives' forces are those that hold the machine there, or that the motion needs. The closed
+    chain is kept whole: at rest A has (J M^-1 J^T) times the change of the forces of gravity, and B
+    is J M^-1 J^T, with the motors' inertia in M. A moment of a motion is frozen: A and B are those
+    of this moment. The derivatives are exact, of the equations of `simulate`: transmissions that
+    bend and currents that lag are states of their own. Viscous friction counts; dry friction does
+    not, as it only damps, and least where a joint moves, nor do backlash, ripple and limits.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (m,)
+        m and rad.
+    velocity, acceleration : array, shape (m,), optional
+        Of the motion; by default the machine rests.
+
+    Returns
+    -------
+    LinearPlant
+
+    Raises
+    ------
+    UnreachablePose, SingularPose
+        If a leg does not reach the pose, or the machine is singular there.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import linearised
+    >>> plant = linearised("tripteron", [0.0, 0.0, 0.0])
+    >>> plant.matrix.shape, plant.inputs.shape
+    ((6, 6), (6, 3))
+    """
+    robot = as_manipulator(robot)
+    rest = np.zeros(robot.freedom)
+    given = (pose, velocity, acceleration)
+    names = ("pose", "velocity", "acceleration")
+    state = [
+        checked_one(robot, rest if value is None else value, name)
+        for value, name in zip(given, names, strict=True)
+    ]
+    smooth = with_linear_drives(robot)
+    kind, n = DriveKind.of(smooth), robot.joint_count
+    motors = motor_states(smooth, *state)
+    values = {
+        **dict(zip(("pose", "velocity"), state, strict=False)),
+        **{name: motors[name] for name, _ in kind.more},
+        "forces": drive_forces(smooth, *state),
+        "wrench": np.zeros(len(robot.column_names["wrench"])),
+        "parameters": parameters(robot),
+        "drives": drive_numbers(smooth),
+        "actuators": actuator_numbers(smooth),
+    }
+    function = _derivatives(bare(robot), kind)
+    found = function(*(values[name] for name in function.name_in()))
+    system, driven, turned = (np.asarray(part, dtype=float) for part in found)
+    rows, m = jacobian(robot, state[0]), robot.freedom
+    # A motor that moves with its joint, and a current that does not lag, are no states.
+    own = [kind.lag if name == "current" else kind.elastic for name, _ in kind.more]
+    kept = np.flatnonzero([*[True] * (2 * m), *np.ravel(own)])
+    system, driven = system[np.ix_(kept, kept)], driven[kept]
+    # From the platform's (x, x') to the joints' (q, q'): q' = J x' changes with x too.
+    change = np.eye(len(kept) + 2 * (n - m), len(kept), 2 * (m - n))
+    change[: 2 * n, : 2 * m] = np.block([[rows, np.zeros((n, m))], [turned, rows]])
+    matrix = np.linalg.solve(change.T, (change @ system).T).T
+    outputs = np.eye(2 * n, len(matrix))
+    differenced = outputs[:n].copy()
+    bends = np.flatnonzero(kind.elastic)
+    for k, i in enumerate(bends):
+        at = encoder_of(smooth.legs[i].drive)
+        for rows_of, place, there in (
+            (outputs[i], 2 * n + k, at == "motor"),
+            (outputs[i + n], 2 * n + k + len(bends), at != "joint"),
+            (differenced[i], 2 * n + k, at != "joint"),
+        ):
+            if there:
+                rows_of[:] = 0.0
+                rows_of[place] = 1.0
+    return LinearPlant(robot, state[0], matrix, change @ driven, outputs, differenced)
+
+
+def with_linear_drives(robot: Manipulator) -> Manipulator:
+    """Return a machine whose drives have no dry friction, no play, no ripple and no limits."""
+    drives = [
+        drive
+        and Drive(
+            viscous=drive.viscous,
+            offset=drive.offset,
+            rotor_inertia=drive.rotor_inertia,
+            ratio=drive.ratio,
+            elastic=drive.elastic and replace(drive.elastic, backlash=0.0),
+            current_time=drive.current_time,
+        )
+        for drive in (leg.drive for leg in robot.legs)
+    ]
+    pairs = zip(robot.legs, drives, strict=True)
+    return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in pairs))
+
+
+@lru_cache(maxsize=16)
+def _derivatives(robot: Manipulator, kind: DriveKind) -> ca.Function:
+    """Return derivatives of the state's rates by state and forces, and those of J x' by x."""
+    given = motion_program(robot, kind)
+    names, symbols = [port.name for port in given.inputs], given.function.sx_in()
+    by_name = dict(zip(names, symbols, strict=True))
+    found = (ca.vec(part) for part in given.function.call(symbols))
+    results = zip((port.name for port in given.outputs), found, strict=True)
+    every = by_name | dict(results)
+    state = ca.vertcat(*(by_name[name] for name in ("pose", "velocity", *dict(kind.more))))
+    moved = ("velocity", "acceleration", *dict(kind.more).values())
+    rates = ca.vertcat(*(every[name] for name in moved))
+    pose, velocity = by_name["pose"], by_name["velocity"]
+    joint_rates = ca.mtimes(program(robot, "jacobian", plain=True).function(pose).T, velocity)
+    parts = [(rates, state), (rates, by_name["forces"]), (joint_rates, pose)]
+    slopes = [ca.cse(ca.jacobian(*part)) for part in parts]
+    return ca.Function("derivatives", symbols, slopes, names, ["matrix", "driven", "turned"])

@@ -1,0 +1,184 @@
+"""Stability margins of a sampled loop: of gain, phase and delay, at each drive and at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy  # type: ignore[import-untyped]
+
+from pteron.kernels import Array
+from pteron.motion.tuning.sampled_loop import SampledLoop
+
+_AT_ONE = 1e-7
+"""Distance from the unit circle within which a pole is on it: of what a law never learns, z = 1
+exactly, and by rounding some of the root of eps away where several coincide."""
+
+_FREQUENCIES = 300
+"""Frequencies of a response."""
+
+_LOWEST = 1e-5
+"""The lowest of these, as a share of the highest, half the sample rate."""
+
+_STEPS = 0.5, 0.1
+"""Steps in which the smallest unstable delay, in periods, and the smallest unstable gain, of 1, are
+looked for: a loop that is stable again beyond a shorter range than this could be missed."""
+
+_MOST = 60.0, 1000.0
+"""Greatest delay, in periods, and gain that are looked at; beyond them a margin is infinite."""
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Gain, phase and delay that a sampled loop bears until it is unstable.
+
+    At each drive, the other loops closed: `gain`, the factor on its force above 1, `phase`, rad,
+    and `delay`, s, beyond the loop's own, all (n,), from the frequency response; and `crossover`,
+    (n,), the highest frequency at which the drive's loop has the gain 1, rad/s, NaN where none. At
+    all drives at once: `common_gain`, `common_delay` and `disk`. All are 0 where the loop is
+    unstable as it is, and infinite where nothing makes it so.
+
+    Attributes
+    ----------
+    loop : SampledLoop
+        The loop, its delay included.
+
+    Examples
+    --------
+    >>> from pteron.motion import tune
+    >>> margins = tune("five-bar").margins[0]
+    >>> bool(margins.common_gain <= margins.gain.min())
+    True
+    """
+
+    loop: SampledLoop
+
+    @cached_property
+    def gain(self) -> Array:
+        """The factor on the drive's force above 1, (n,)."""
+        return np.asarray(self._each[0])
+
+    @cached_property
+    def phase(self) -> Array:
+        """The phase that it may lose, or gain, rad, (n,)."""
+        return np.asarray(self._each[1])
+
+    @cached_property
+    def delay(self) -> Array:
+        """The further delay of its force, s, (n,)."""
+        return np.asarray(self._each[2])
+
+    @cached_property
+    def crossover(self) -> Array:
+        """The highest frequency at which its loop has the gain 1, rad/s, (n,)."""
+        return np.asarray(self._each[3])
+
+    @cached_property
+    def common_gain(self) -> float:
+        """The smallest factor above 1 on all forces for which a pole reaches the unit circle."""
+        return self._stable and 1.0 + _first(
+            lambda more: radius(self.loop.closed(1.0 + more)), 1.0, 1
+        )
+
+    @cached_property
+    def common_delay(self) -> float:
+        """The smallest further delay of all forces for which one does, s."""
+        return self._stable and _first(
+            lambda more: radius(self.loop.closed(more=more)), self.loop.period, 0
+        )
+
+    @cached_property
+    def disk(self) -> float:
+        """The disk margin d at all drives at once.
+
+        The loop stays stable though each force is multiplied by a complex number of its own, within
+        the disk on whose rim (1 + d / 2) / (1 - d / 2) and its inverse are. It is a lower bound, by
+        the greatest singular value and by Perron's bound, of which the better.
+        """
+        one = np.eye(len(self._response[0]))
+        middle = np.linalg.inv(one + self._response) - 0.5 * one
+        greatest = np.linalg.norm(middle, ord=2, axis=(1, 2))
+        perron = np.abs(np.linalg.eigvals(np.abs(middle))).max(axis=-1)
+        return self._stable and float(1.0 / np.minimum(greatest, perron).max())
+
+    @cached_property
+    def slowest(self) -> float:
+        """The rate at which the slowest pole decays, 1/s; negative where it grows."""
+        return float(-np.log(radius(self.loop.closed())) / self.loop.period)
+
+    @cached_property
+    def drive_loops(self) -> Array:
+        """Frequency response of each drive's loop, the others closed, (W, n); of `frequencies`."""
+        sensitivity = np.linalg.inv(np.eye(len(self._response[0])) + self._response)
+        return np.asarray(1.0 / np.diagonal(sensitivity, axis1=1, axis2=2) - 1.0)
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies of the response, rad/s, (W,): up to half the sample rate."""
+        return np.geomspace(_LOWEST, 1.0, _FREQUENCIES) * np.pi / self.loop.period
+
+    @cached_property
+    def _stable(self) -> float:
+        return float(self.slowest > 0.0)
+
+    @cached_property
+    def _response(self) -> Array:
+        return self.loop.response(self.frequencies)
+
+    @cached_property
+    def _each(self) -> Array:
+        n = self.loop.plant.inputs.shape[1]
+        if not self._stable:
+            return np.array([0.0, 0.0, 0.0, np.nan])[:, None] * np.ones(n)
+        found = [_classical(self.frequencies, one) for one in self.drive_loops.T]
+        return np.array(found).T
+
+
+def radius(matrix: Array) -> float:
+    """Return the greatest modulus of a pole, those at 1 left out."""
+    poles = np.linalg.eigvals(matrix)
+    return float(np.abs(poles[np.abs(poles - 1.0) > _AT_ONE]).max(initial=0.0))
+
+
+def _first(radius_of: Callable[[float], float], unit: float, which: int) -> float:
+    """Return the smallest amount for which the greatest pole is on the unit circle, or inf."""
+    step, below = _STEPS[which] * unit, 0.0
+    while below < _MOST[which] * unit:
+        above = below + max(step, 0.1 * below)
+        if radius_of(above) >= 1.0:
+            return float(
+                scipy.optimize.brentq(lambda x: radius_of(x) - 1.0, below, above, rtol=1e-6)
+            )
+        below = above
+    return float("inf")
+
+
+def _classical(omega: Array, loop: Array) -> tuple[float, float, float, float]:
+    """Return gain, phase (rad) and delay (s) margin and crossover (rad/s) of one loop (W,)."""
+    lead = np.unwrap(np.angle(-loop))  # 0 where L is on the negative axis
+    size = np.log(np.abs(loop))
+    turns = (
+        2.0 * np.pi * np.arange(np.floor(lead.min() / (2 * np.pi)), lead.max() / (2 * np.pi) + 1)
+    )
+    sizes = [np.exp(-_at_zeros(lead - turn, size)) for turn in turns]
+    # At half the sample rate L is real: the last crossing that there is.
+    last = [1.0 / abs(loop[-1])] if loop[-1].real < 0.0 else []
+    gains = np.concatenate([*sizes, last])
+    crossings = np.exp(_at_zeros(size, np.log(omega)))
+    leads = _at_zeros(size, lead)
+    ahead = np.mod(leads, 2.0 * np.pi)
+    return (
+        float(gains[gains > 1.0].min(initial=np.inf)),
+        float(np.minimum(ahead, 2.0 * np.pi - ahead).min(initial=np.inf)),
+        float((ahead / crossings).min(initial=np.inf)),
+        float(crossings.max(initial=-np.inf)) if len(crossings) else float("nan"),
+    )
+
+
+def _at_zeros(values: Array, others: Array) -> Array:
+    """Return other values where values (W,) change their sign, by straight lines between."""
+    k = np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1]))
+    share = values[k] / (values[k] - values[k + 1])
+    return others[k] + share * (others[k + 1] - others[k])

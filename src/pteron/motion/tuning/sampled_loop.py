@@ -1,0 +1,111 @@
+"""The linear loop of machine, encoders and controller from sample to sample, its delay exact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.motion.tuning.linear_law import LinearLaw
+from pteron.motion.tuning.linear_plant import LinearPlant
+
+_WHOLE = 1e-9
+"""Part of a sample by which a delay of whole samples may miss them, from rounding."""
+
+
+@dataclass(frozen=True)
+class SampledLoop:
+    """A machine under a controller near a state, from one sample to the next.
+
+    Forces are held for a period and act a delay after their sample, of any length; both are exact.
+    Encoders' steps do not count, but the lag of rates by differences and of their filter does.
+
+    Attributes
+    ----------
+    plant : LinearPlant
+        The machine.
+    law : LinearLaw
+        The controller.
+    period : float
+        s.
+    delay : float
+        From a sample to the drives' force, s.
+    share : float, optional
+        What a sample's difference counts in a rate, by the filter's cut-off, 1 without a filter;
+        None where rates are exact.
+    """
+
+    plant: LinearPlant
+    law: LinearLaw
+    period: float
+    delay: float = 0.0
+    share: float | None = None
+
+    def opened(self, more: float = 0.0) -> tuple[Array, Array, Array]:
+        """Return (F, G, H) of s' = F s + G u, asked = H s: the loop opened at all drives.
+
+        s are the changes of the plant's state, joints and rates told last, memory, and the forces
+        asked for that still wait; u are forces asked for, `more` is a delay, s, beyond the loop's.
+        """
+        period, law, n = self.period, self.law, self.plant.inputs.shape[1]
+        delay = self.delay + more
+        whole = int(delay / period + _WHOLE)
+        late = max(delay - whole * period, 0.0)
+        moved, after = self.plant.held(period - late)
+        early, before = self.plant.held(late)
+        free, before = moved @ early, moved @ before
+        told = self.share is not None
+        sizes = [len(free), 2 * n * told, len(law.matrix), *[n] * (whole + 1)]
+        places = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
+        state, last, memory, *waiting = places
+        size = sum(sizes)
+        # What the controller is told, of the whole state.
+        measured = np.zeros((2 * n, size))
+        measured[:, state] = self.plant.outputs
+        if told:
+            share = float(self.share or 1.0)
+            measured[n:] = 0.0
+            measured[n:, state] = share / period * self.plant.differenced
+            measured[n:, last] = np.hstack([-share / period * np.eye(n), (1 - share) * np.eye(n)])
+        asked = law.feedthrough @ measured
+        asked[:, memory] += law.outputs
+        matrix, inputs = np.zeros((size, size)), np.zeros((size, n))
+        matrix[np.ix_(state, state)] = free
+        if told:
+            matrix[np.ix_(last[:n], state)] = self.plant.differenced
+            matrix[last[n:]] = measured[n:]
+        matrix[memory] = law.inputs @ measured
+        matrix[np.ix_(memory, memory)] += law.matrix
+        # waiting[k] was asked for k + 1 samples ago.
+        matrix[np.ix_(state, waiting[whole])] = before
+        if whole:
+            matrix[np.ix_(state, waiting[whole - 1])] = after
+        else:
+            inputs[state] = after
+        for newer, older in pairwise(waiting):
+            matrix[np.ix_(older, newer)] = np.eye(n)
+        inputs[waiting[0]] = np.eye(n)
+        return matrix, inputs, asked
+
+    def closed(self, gain: float = 1.0, more: float = 0.0) -> Array:
+        """Return the closed loop's matrix, all forces times a gain and delayed more, s."""
+        matrix, inputs, asked = self.opened(more)
+        return matrix + gain * inputs @ asked
+
+    @cached_property
+    def poles(self) -> Array:
+        """Poles of the closed loop in the plane of z = exp(s period)."""
+        return np.asarray(np.linalg.eigvals(self.closed()))
+
+    def response(self, frequencies: Array) -> Array:
+        """Return the loop's frequency response L (W, n, n), from drives to what is asked of them.
+
+        Opened at all drives; I + L is singular where the closed loop has a pole. In rad/s, at most
+        pi / period.
+        """
+        matrix, inputs, asked = self.opened()
+        z = np.exp(1j * frequencies * self.period)[:, None, None]
+        return -asked @ np.linalg.solve(z * np.eye(len(matrix)) - matrix, inputs + 0j * z)

@@ -1,0 +1,361 @@
+"""`tune`: the greatest bandwidth of a controller with stated margins, at all poses of interest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pteron.controllers import Controller, FeedForwardPD
+from pteron.controllers.feedback import Feedback
+from pteron.controllers.joint_masses import light_poses
+from pteron.errors import DataError, shown
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.evaluate import checked
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.motion import Motion, told_pose
+from pteron.motion.payload import with_payload
+from pteron.motion.simulation import Sensors
+from pteron.motion.tuning.linear_law import linearised_law
+from pteron.motion.tuning.linear_plant import linearised
+from pteron.motion.tuning.margins import Margins
+from pteron.motion.tuning.sampled_loop import SampledLoop
+from pteron.workspace.margins import joint_distances
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_MOMENTS = 16
+"""Moments of a motion at which the loop is linearised."""
+
+_PLACES = 24
+"""Random poses at which it is."""
+
+_DAMPINGS = 1.0, 1.4, 2.0, 2.8, 4.0, 5.6
+"""Factors on the damping that are tried one after the other until a bandwidth serves: a joint that
+is nine times as heavy as its gains suppose has a third of the damping, at any bandwidth."""
+
+_FINER, _EXACT = 0.8, 1e-4
+"""Factor between bandwidths tried from above, and relative length of the last bisection."""
+
+_SLOWEST = 1e-3
+"""The least bandwidth tried, as a share of the greatest."""
+
+
+@dataclass(frozen=True)
+class Required:
+    """The margins that a loop must have: gain, a factor, phase, rad, and delay, s.
+
+    Gain and delay hold at each drive and at all at once. A delay of 0 asks for none.
+    """
+
+    gain: float = 2.0
+    phase: float = np.pi / 4.0
+    delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 1.0 < self.gain < np.inf:
+            raise DataError(f"gain margin: {shown(self.gain)} given, a factor above 1 expected")
+        if not 0.0 < self.phase < np.pi / 2.0:
+            raise DataError(
+                f"phase margin: {shown(self.phase)} rad given, {np.degrees(self.phase):.4g} "
+                "degrees; more than 0 and less than 90 degrees expected"
+            )
+        if not 0.0 <= self.delay < np.inf:
+            raise DataError(f"delay margin: {shown(self.delay)} given, 0 s or more expected")
+
+    def share(self, found: Margins) -> float:
+        """Return the least of margin over required margin; a loop serves from 1 on."""
+        each = self._share(found.gain.min(), found.delay.min()), found.phase.min() / self.phase
+        if min(each) < 1.0:  # those of all drives at once take longer to compute
+            return float(min(each))
+        delay = found.common_delay if self.delay else 0.0
+        return float(min(*each, self._share(found.common_gain, delay)))
+
+    def _share(self, gain: float, delay: float) -> float:
+        factor = np.log(max(gain, 1.0)) / np.log(self.gain)
+        return float(min(factor, delay / self.delay if self.delay else np.inf))
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """A machine's controller with its stability margins at poses and moments of a motion.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine, with what it carries.
+    controller : Controller
+        With its gains.
+    required : Required
+        The margins asked for.
+    states : array, shape (S, 3, m)
+        Poses, velocities and accelerations at which the loop was linearised.
+    moments : array, shape (S,)
+        Their times in the motion, s; NaN of poses in the workspace, at rest.
+    loops : tuple of SampledLoop
+        The loops there.
+    margins : tuple of Margins
+        Theirs.
+    """
+
+    robot: Manipulator
+    controller: Controller
+    required: Required
+    states: Array
+    moments: Array
+    loops: tuple[SampledLoop, ...]
+    margins: tuple[Margins, ...]
+
+    @property
+    def worst(self) -> int:
+        """The state whose margins are the least share of those required."""
+        return int(np.argmin([self.required.share(found) for found in self.margins]))
+
+    @property
+    def least(self) -> dict[str, float]:
+        """The least margins of all states: factors, rad, s and the disk margin."""
+        found = self.margins
+        return {
+            "gain": min(float(min(one.gain.min(), one.common_gain)) for one in found),
+            "phase": min(float(one.phase.min()) for one in found),
+            "delay": min(float(min(one.delay.min(), one.common_delay)) for one in found),
+            "disk": min(one.disk for one in found),
+        }
+
+    def gains(self) -> dict[str, list[float]]:
+        """Return proportional and derivative gains of each joint, or what else the law has."""
+        law = self.controller.law(self.robot)
+        n = self.robot.joint_count
+        first = "proportional" if isinstance(self.controller, Feedback) else "slope"
+        return {first: law.gains[:n].tolist(), "derivative": law.gains[n : 2 * n].tolist()}
+
+    def table(self) -> pl.DataFrame:
+        """Return the margins as a table, a row for each state.
+
+        Columns: t (of the motion; empty in the workspace), the pose, gain, phase and delay margin
+        of each drive, those of all at once, the disk margin, and the slowest pole's rate.
+        """
+        import polars as pl
+
+        columns: dict[str, Any] = {"t": pl.Series(self.moments).fill_nan(None)}
+        columns |= dict(zip(self.robot.coordinates, self.states[:, 0].T, strict=True))
+        for name in ("gain", "phase", "delay", "crossover"):
+            each = np.array([getattr(one, name) for one in self.margins]).T
+            columns |= {f"{name}_{i}": values for i, values in enumerate(each, start=1)}
+        for name in ("common_gain", "common_delay", "disk", "slowest"):
+            columns[name] = [getattr(one, name) for one in self.margins]
+        return pl.DataFrame(columns)
+
+
+def tune(
+    robot: RobotLike,
+    motion: Motion | None = None,
+    controller: Controller | None = None,
+    *,
+    required: Required | None = None,
+    poses: Array | None = None,
+    payload: float = 0.0,
+    model: RobotLike | None = None,
+    sensors: Sensors | None = None,
+    delay: float = 0.0,
+) -> Tuning:
+    """Return the controller of the greatest bandwidth that has the margins asked for everywhere.
+
+    The loop of machine, drives, encoders, controller and delay is linearised at moments of the
+    motion, frozen there, and at poses of the workspace, at rest. All coupling of the closed chain
+    counts. From one sample to the next it is exact: forces are held, and act after the delay.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    motion : Motion, optional
+        What it is to do.
+    controller : Controller, optional
+        Its law, period and damping; by default `FeedForwardPD()`. One with a bandwidth or gains
+        keeps them, and is refused where they have not the margins.
+    required : Required, optional
+        The margins; by default a gain of 2 and a phase of 45 degrees.
+    poses : array, shape (P, m), optional
+        Where else it is to have them; by default some at random, away from singularities and
+        within the joints' limits.
+    payload : float
+        What it carries, kg, at the tool.
+    model : Manipulator, name or path, optional
+        What the controller takes it for; by default what it is, payload and all.
+    sensors : Sensors, optional
+        The encoders, whose rates lag; by default rates are exact.
+    delay : float
+        From a sample to the drives' force, s.
+
+    Returns
+    -------
+    Tuning
+
+    Raises
+    ------
+    DataError
+        If a number is not sensible, a bandwidth is above half the sample
+        rate, or no bandwidth has the margins.
+    UnreachablePose, SingularPose
+        If the machine cannot do the motion.
+
+    Examples
+    --------
+    >>> from pteron.motion import tune
+    >>> found = tune("five-bar")
+    >>> found.least["gain"] >= 2.0
+    True
+    """
+    robot, controller = as_manipulator(robot), controller or FeedForwardPD()
+    if not 0.0 <= delay < np.inf:
+        raise DataError(f"delay: {shown(delay)} given, 0 s or more expected")
+    if payload:
+        robot = with_payload(robot, payload)
+    required, sensors = required or Required(), sensors or Sensors()
+    late = delay + sensors.delay + sensors.samples * controller.period
+    states, moments = _states(robot, motion, poses)
+    search = _Search(
+        robot,
+        as_manipulator(model) if model is not None else robot,
+        controller,
+        required,
+        states,
+        [linearised(robot, *state) for state in states],
+        {"delay": late, "share": _share(sensors, controller.period)},
+    )
+    chosen = search.chosen()
+    every = range(len(states))
+    loops = tuple(search.loop(chosen, i) for i in every)
+    found = tuple(Margins(loop) for loop in loops)
+    return Tuning(robot, chosen, required, states, moments, loops, found)
+
+
+def _share(sensors: Sensors | None, period: float) -> float | None:
+    """Return what a difference counts in a rate; None where rates are exact."""
+    if sensors is None or not np.any(sensors.encoder):
+        return None
+    if sensors.cutoff is None:
+        return 1.0
+    return -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
+
+
+def _states(robot: Manipulator, motion: Motion | None, poses: Array | None) -> tuple[Array, Array]:
+    """Return the states (S, 3, m) at which the loop is linearised, and their times (S,)."""
+    if poses is None:
+        poses = light_poses(robot)
+        within = (joint_distances(robot, inverse_kinematics(robot, poses)) >= 0.0).all(axis=-1)
+        poses = poses[within][:_PLACES]
+    poses = checked(robot, poses, "poses").reshape(-1, robot.freedom)
+    rest = np.zeros_like(poses)
+    states, times = np.stack([poses, rest, rest], axis=1), np.full(len(poses), np.nan)
+    if motion is not None:
+        motion.expect_ascending()
+        moments = np.linspace(motion.time[0], motion.time[-1], _MOMENTS)
+        states = np.concatenate([np.stack(motion.at(moments), axis=1), states])
+        times = np.concatenate([moments, times])
+    if not len(states):
+        raise DataError("poses: none given, and no motion; give one of them")
+    return states, times
+
+
+@dataclass(frozen=True)
+class _Search:
+    robot: Manipulator
+    model: Manipulator
+    controller: Controller
+    required: Required
+    states: Array
+    plants: Sequence[Any]
+    how: dict[str, Any]
+
+    def loop(self, controller: Controller, i: int) -> SampledLoop:
+        law = linearised_law(controller.law(self.model), *self.states[i])
+        return SampledLoop(self.plants[i], law, controller.period, **self.how)
+
+    def share(self, controller: Controller, which: Sequence[int]) -> tuple[float, int]:
+        """Return the least share of the required margins at some states, and the state."""
+        return min((self.required.share(Margins(self.loop(controller, i))), i) for i in which)
+
+    def chosen(self) -> Controller:
+        """Return the controller with the greatest bandwidth that serves at all states."""
+        own, every = self.controller, range(len(self.states))
+        most = np.pi / own.period
+        given = own.bandwidth is not None or getattr(own, "proportional", None) is not None
+        if own.bandwidth is not None and np.max(own.bandwidth) >= most:
+            raise DataError(
+                f"bandwidth: {np.max(own.bandwidth):g} rad/s given, below {most:.4g} rad/s "
+                f"expected: half the sample rate of {1.0 / own.period:g} Hz"
+            )
+        if given:
+            share, at = self.share(own, every)
+            if share < 1.0:
+                raise DataError(f"{self._told(own, at)}; lower the gains, or ask for less")
+            return own
+        tried: list[tuple[float, Controller]] = []
+        few = [0]
+        for more in _DAMPINGS if isinstance(own, Feedback) else (1.0,):
+            trial = own
+            if isinstance(own, Feedback) and more > 1.0:
+                trial = replace(own, damping=float(more * np.max(own.damping)))
+            found = self._greatest(trial, most * (1.0 - 1e-9), few, tried)
+            if found is not None:
+                return found
+        best = max(tried, key=lambda one: one[0])[1]
+        _, at = self.share(best, every)
+        raise DataError(
+            f"no bandwidth has the margins asked for; best {self._told(best, at)}; ask for less, "
+            "sample faster, or shorten the delay"
+        )
+
+    def _greatest(
+        self,
+        own: Controller,
+        high: float,
+        few: list[int],
+        tried: list[tuple[float, Controller]],
+    ) -> Controller | None:
+        """Return the controller with the greatest bandwidth that serves, or None.
+
+        `few` are the states that decided so far, `tried` what was tried, with its share.
+        """
+
+        def share(bandwidth: float) -> float:
+            one = replace(own, bandwidth=bandwidth)
+            tried.append((self.share(one, few)[0], one))
+            return tried[-1][0]
+
+        while True:  # bisect at few states; add the one that serves least at what is found
+            low = high
+            while share(low) < 1.0:
+                high, low = low, low * _FINER
+                if low < _SLOWEST * np.pi / own.period:
+                    return None
+            while high - low > _EXACT * low:
+                middle = float(np.sqrt(low * high))
+                low, high = (middle, high) if share(middle) >= 1.0 else (low, middle)
+            found = replace(own, bandwidth=low)
+            least, at = self.share(found, range(len(self.states)))
+            if least >= 1.0:
+                return found
+            few.append(at)
+            high = low
+
+    def _told(self, controller: Controller, i: int) -> str:
+        found, asked = Margins(self.loop(controller, i)), self.required
+        gain, delay = (
+            min(found.gain.min(), found.common_gain),
+            min(found.delay.min(), found.common_delay),
+        )
+        wanted = f", {1e3 * asked.delay:.3g} ms" if asked.delay else ""
+        rate = controller.bandwidth
+        with_ = f"with {np.max(rate):.4g} rad/s" if rate is not None else "with these gains"
+        return (
+            f"{with_}, at pose {told_pose(self.states[i][0])} the margins are a gain of "
+            f"{gain:.3g}, {np.degrees(found.phase.min()):.3g} degrees and {1e3 * delay:.3g} ms; "
+            f"{asked.gain:.3g}, {np.degrees(asked.phase):.3g} degrees{wanted} asked for"
+        )

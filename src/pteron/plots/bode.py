@@ -1,0 +1,54 @@
+"""Bode plot of the drives' loops, and the poles of a sampled loop beside the unit circle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.plots.canvas import INK, MUTED, blank, leg_curves, legend, plain_axes, stack
+
+
+def bode_figure(frequencies: ArrayLike, loops: Any, names: Sequence[str] | None = None) -> Figure:
+    """Return gain and phase of each drive's loop (W, n), complex, over the frequency (W,), rad/s.
+
+    Lines mark the gain 1 and the phase -180 degrees.
+    """
+    omega, found = np.asarray(frequencies, dtype=float), np.asarray(loops)
+    if found.ndim != 2 or omega.shape != found.shape[:1]:
+        raise DataError(
+            f"loops: shape {found.shape} given, a row for each of {omega.size} frequencies expected"
+        )
+    phase = np.degrees(np.unwrap(np.angle(found), axis=0))
+    # A loop of two integrators begins at -180 degrees, not at 180, one of a spring at 0.
+    phase -= 360.0 * np.round((phase[0] + 90.0) / 360.0)
+    figure = blank(5.4, 4.4)
+    axes = stack(figure, "frequency (rad/s)", ["gain", "phase (degrees)"])
+    curves = list(range(found.shape[1]))
+    labels = list(names or (f"drive {i + 1}" for i in curves))
+    for one, values, line in zip(axes, (np.abs(found), phase), (1.0, -180.0), strict=True):
+        leg_curves(one, omega, values, curves, 1.6, labels if one is axes[0] else ())
+        one.axhline(line, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+        one.set_xscale("log")
+    axes[0].set_yscale("log")
+    legend(figure, found.shape[1])
+    return figure
+
+
+def poles_figure(poles: Any) -> Figure:
+    """Return a picture of a sampled loop's poles, complex, and the unit circle round the stable."""
+    try:
+        found = np.asarray(poles, dtype=complex).ravel()
+    except (TypeError, ValueError):
+        raise DataError("poles: not an array of complex numbers") from None
+    figure = blank(3.6, 3.6)
+    axes = plain_axes(figure, "real part of z", "imaginary part of z")
+    circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
+    axes.plot(circle.real, circle.imag, color=MUTED, linewidth=1.0)
+    axes.plot(found.real, found.imag, "x", color=INK, markersize=5.0)
+    axes.set_aspect("equal")
+    return figure

@@ -1,0 +1,297 @@
+"""A session that tabs look at and act on: the one thread that moves it, and tells what it shows."""
+
+from __future__ import annotations
+
+import json
+import threading
+import traceback
+from collections.abc import Callable
+from time import monotonic
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import DataError, PteronError
+from pteron.manipulator import Manipulator
+from pteron.report.motion_frames import seen
+from pteron.report.typeset import resource, template
+from pteron.viewer import panel
+from pteron.viewer.picture import Picture
+from pteron.viewer.readings import readings
+from pteron.viewer.readout import readout
+from pteron.viewer.server import Tab
+from pteron.viewer.session import Session
+from pteron.viewer.slices import choices, slice_map, slice_strips
+from pteron.viewer.state import stopped
+
+_FRAME = 1.0 / 30.0
+"""Time between two pictures of a motion, s."""
+
+_SETTLED = 0.25
+"""Time without an action after which results that take longer are shown, s."""
+
+_ONE = 1.0
+"""Time, s, within which actions of one name are undone as one."""
+
+_LONGEST = 0.1
+"""Longest time that a motion goes on at once, s."""
+
+_UNDONE = ("pose", "joint", "drag", "type", "payload", "home", "mode", "assembly", "move_to")
+"""Beginnings of the names of actions that can be undone."""
+
+
+class Live:
+    """A session, what its pages show, and the actions that wait for it.
+
+    Attributes
+    ----------
+    session : Session
+    name : str
+        The machine's.
+    idle : Event
+        Set while all that was asked for is done.
+    faults : list of str
+        Tracebacks of unexpected failures.
+    """
+
+    def __init__(self, session: Session, compared: tuple[Manipulator, float] | None) -> None:
+        self.session, self._compared = session, compared
+        self.name = session.state.robot.name
+        self.idle, self.faults = threading.Event(), list[str]()
+        self._actions: dict[str, Callable[[], object]] = {}
+        self._wake = threading.Condition()
+        self._closed = False
+        self._tabs, self._kept = set[Tab](), dict[str, str]()
+        self._files: dict[Tab, str] = {}
+        self._last: tuple[str, float] = ("", 0.0)
+        self._sliced: tuple[object, ...] = ()
+        self._scaled: tuple[object, ...] = ()
+        self._robot: Manipulator | None = None
+        self._show(settled=True)
+        self._thread = threading.Thread(target=self._run, name="pteron viewer", daemon=True)
+
+    def start(self) -> None:
+        """Let time go on."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Do nothing more."""
+        with self._wake:
+            if self._closed:
+                return
+            self._closed = True
+            self._wake.notify()
+        self._thread.join()
+
+    def do(self, name: str, act: Callable[[], object]) -> None:
+        """Do something with the session soon; of actions with one name only the last is done."""
+        with self._wake:
+            self._actions.pop(name, None)
+            self._actions[name] = act
+            self.idle.clear()
+            self._wake.notify()
+
+    # What tabs see and say.
+
+    def page(self) -> str:
+        """Return the page, HTML."""
+        script = resource("picture.js") + resource("live.js", "viewer")
+        style = resource("page.css") + resource("live.css", "viewer")
+        return template("live.html.j2", "viewer").render(
+            name=self.name, script=script, style=style, controls=panel.controls(self.session)
+        )
+
+    def entered(self, tab: Tab) -> None:
+        """Send a tab what it is to show."""
+        with self._wake:
+            self._tabs.add(tab)
+            for kind, message in self._kept.items():
+                tab.send(kind, message)
+
+    def left(self, tab: Tab) -> None:
+        """Send a tab no more."""
+        with self._wake:
+            self._tabs.discard(tab)
+            self._files.pop(tab, None)
+
+    def told(self, tab: Tab, message: str | bytes) -> None:
+        """Do what a tab asks for; a file comes after its name."""
+        session = self.session
+        if isinstance(message, bytes):
+            name = self._files.pop(tab, "")
+            self.do("load", lambda: session.load(name, message))
+            return
+        try:
+            asked = json.loads(message)
+            if isinstance(asked, dict) and asked.get("do") == "file":
+                self._files[tab] = str(asked.get("name"))
+                return
+            if isinstance(asked, dict) and asked.get("do") == "push":
+                self._push(str(asked.get("drives")))
+                return
+            name, act = panel.action(session, message)
+        except (DataError, ValueError) as error:
+            told = str(error)
+            self.do("refused", lambda: self._tell(told))
+            return
+        self.do(name, act)
+
+    def _push(self, drives: str) -> None:
+        """Compile the equations of motion, for which others do not wait, and begin."""
+
+        def prepare() -> None:
+            try:
+                self.session.prepare_push(drives)
+            except PteronError as error:
+                told = str(error)
+                self.do("push", lambda: self._tell(told))
+            else:
+                self.do("push", lambda: self.session.begin_push(drives))
+
+        self.do("prepare", lambda: self._tell("Preparing the equations of motion."))
+        threading.Thread(target=prepare, name="pteron push", daemon=True).start()
+
+    def _tell(self, text: str) -> None:
+        self.session.playing = False
+        self.session.state = stopped(self.session.state, _sentence(text))
+
+    def _send(self, kind: str, data: dict[str, Any]) -> None:
+        text = json.dumps({kind: data}, allow_nan=False)
+        with self._wake:
+            self._kept[kind] = text
+            for tab in self._tabs:
+                tab.send(kind, text)
+
+    # The thread that owns the session.
+
+    def _run(self) -> None:
+        session = self.session
+        last = changed = monotonic()
+        settled = True
+        while True:
+            with self._wake:
+                if not self._actions:
+                    self.idle.set()
+                if not self._actions and not self._closed:
+                    self._wake.wait(self._until(last, changed, settled))
+                if self._closed:
+                    return
+                actions, self._actions = self._actions, {}
+            for name, act in actions.items():
+                self._guard(lambda: self._acted(name, act))  # noqa: B023
+            now = monotonic()
+            if actions:
+                changed, settled = now, False
+            moves = session.playing or session.push is not None
+            advanced = moves and now - last >= _FRAME
+            if advanced:
+                elapsed = min(now - last, _LONGEST)
+                self._guard(lambda: session.advance(elapsed))  # noqa: B023
+            if advanced or not moves:
+                last = now
+            if actions or advanced:
+                self._guard(self._show)
+            if not settled and now - changed >= _SETTLED:
+                settled = not moves
+                changed = now
+                self._guard(lambda: self._show(settled=True))
+
+    def _until(self, last: float, changed: float, settled: bool) -> float | None:
+        """Return the time until the next picture, s; None where it waits for an action."""
+        now = monotonic()
+        moves = self.session.playing or self.session.push is not None
+        times = [last + _FRAME - now] if moves else []
+        times += [] if settled else [changed + _SETTLED - now]
+        return max(0.0, min(times)) if times else None
+
+    def _acted(self, name: str, act: Callable[[], object]) -> None:
+        before, now = self._last, monotonic()
+        if name.startswith(_UNDONE):
+            if before[0] != name or now - before[1] > _ONE:
+                self.session.remember()
+            self._last = name, now
+        elif name == "undo":
+            self._last = "", now
+        act()
+
+    def _guard(self, act: Callable[[], object]) -> None:
+        """Act; a failure is reported on the page, and the last good state stays."""
+        try:
+            act()
+        except PteronError as error:
+            self.session.push = None
+            self._tell(str(error))
+        except Exception as error:
+            self.faults.append(traceback.format_exc())
+            self.session.push = None
+            self._tell(f"Something failed in the viewer ({type(error).__name__}: {error}).")
+
+    # What the page shows.
+
+    def _show(self, *, settled: bool = False) -> None:
+        session = self.session
+        state, push = session.state, session.push
+        if state.robot != self._robot:
+            self._robot, self._sliced = state.robot, ()
+            self._picture = Picture(state.robot, session.examples, self._compared)
+            drawn = {"still": self._picture.still, "cloud": self._picture.cloud}
+            self._send("machine", panel.controls(session) | drawn)
+        scaled = state.robot, state.payload, session.title
+        if self._scaled != scaled:
+            self._scaled, self._scale = scaled, session.force_scale()
+        found = readings(state, None if push is None else push.forces)
+        moment = self._picture.moment(state, found.forces, self._scale, screws=session.screws)
+        spring = push.spring if push else None
+        self._send(
+            "state",
+            panel.values(session, found.joints)
+            | moment
+            | {
+                "clock": monotonic(),
+                "message": state.message or panel.doing(session),
+                "warns": bool(state.message),
+                "readout": readout(state, found),
+                "plotted": {
+                    "forces": _finite(found.forces),
+                    "joints": panel.shown_joints(state.robot, found.joints),
+                    "power": _finite(found.power),
+                },
+                "scale": _finite(self._scale),
+                "spring": spring and [seen(state.robot, end) for end in spring],
+            },
+        )
+        if settled:
+            values = panel.settled_values(session, lambda: bool(self._actions))
+            if values is not None:
+                self._send("settled", values)
+                self._show_slice()
+
+    def _show_slice(self) -> None:
+        state, span = self.session.state, self.session.pose_range
+        plane = choices(state.robot).get(self.session.plane)
+        # A map shows where the machine is, too.
+        rest = [
+            value
+            for name, value in zip(state.robot.coordinates, state.pose, strict=True)
+            if not isinstance(plane, str) or name not in plane
+        ]
+        key = (plane, state.robot, *np.round(rest, 9)) if plane else ()
+        if key == self._sliced:
+            return
+        self._sliced = key
+        given = state.robot, state.pose
+        map_, parts = "", []
+        if isinstance(plane, str):
+            for color, strips in slice_strips(*given, plane, span):
+                parts.append({"color": color, "quads": seen(state.robot, strips)})
+        elif plane is not None:
+            map_ = slice_map(*given, plane, span)
+        self._send("slice", {"parts": parts, "map": map_})
+
+
+def _finite(values: Any) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith((".", "?", "!")) else f"{text}."

@@ -1,0 +1,117 @@
+"""The machine of the viewer as plain data that `picture.js` draws: bodies, arrows, a slice."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import PteronError
+from pteron.kernels import Array
+from pteron.kinematics import joint_screws
+from pteron.manipulator import Manipulator
+from pteron.motion import JointPoints, joint_guides, joint_points
+from pteron.motion.enlarged_points import enlarged_points
+from pteron.report.motion_frames import moving, seen, still
+from pteron.viewer.boundary import allowed
+from pteron.viewer.state import ViewerState
+
+_SCREW, _FORCE = 0.09, 0.3
+"""Half the length of the arrow along a joint's axis, and the length of the largest force's, as
+shares of the machine's size."""
+
+_SCREW_RADIUS, _SLIDING_RADIUS, _FORCE_RADIUS = 0.0035, 0.006, 0.009
+"""Radii of arrows, as such shares."""
+
+_MOST = 2.0
+"""Longest arrow of a force, over the one of the force that the scale is made for."""
+
+_POSES = 40
+"""Most poses that the picture's size is made for."""
+
+_NEAR = 0.6
+"""Distance of these from the home pose, over that of random ones."""
+
+Arrow = tuple[Any, Any, str | int, float]
+"""Start and tip, colour by its name or its leg from 0, and radius over the machine's size."""
+
+
+class Picture:
+    """The picture of one machine in one working mode; guides are as long as poses (K, m) need.
+
+    The compared machine stands there too, so many times as far from the first one.
+    """
+
+    def __init__(
+        self, robot: Manipulator, poses: Array, compared: tuple[Manipulator, float] | None
+    ) -> None:
+        self._robot, self._compared = robot, compared
+        self._guides = joint_guides(robot, poses)
+        home = joint_points(robot, poses[0])
+        near = poses[0] + _NEAR * (poses[:: max(1, len(poses) // _POSES)] - poses[0])
+        around = joint_points(robot, near[allowed(robot, near)])
+        lines = [line.reshape(-1, 3) for line in (*around.links, around.reference, around.tool)]
+        cloud = np.vstack(lines)
+        paths = np.vstack([*home.links, *(guide.path for guide in self._guides)])
+        self.size = float(np.ptp(paths, axis=0).max())
+        self.still = still(robot, self._guides, home)
+        self.cloud = seen(robot, cloud)
+
+    def moment(
+        self, state: ViewerState, forces: Array, scale: Array, *, screws: bool
+    ) -> dict[str, Any]:
+        """Return the machine in a state; its arrows are as long as forces (n,) over a scale."""
+        points = joint_points(state.robot, state.pose)
+        return {
+            "now": moving(self._robot, points),
+            "ghost": self._ghost(points, state.pose),
+            "forces": self._forces(points, forces, scale),
+            "arrows": self._screws(state, points) if screws else [],
+            "tip": seen(self._robot, points.tool),
+        }
+
+    def _ghost(self, points: JointPoints, pose: Array) -> dict[str, Any] | None:
+        """Return the compared machine in a pose, if it reaches it."""
+        if self._compared is None:
+            return None
+        robot, times = self._compared
+        try:
+            moved = enlarged_points(points, joint_points(robot, pose), times)
+        except PteronError:
+            return None
+        return moving(self._robot, moved)
+
+    def _arrow(self, start: Array, way: Array, color: str | int, radius: float) -> Arrow:
+        return seen(self._robot, start), seen(self._robot, start + way), color, radius
+
+    def _screws(self, state: ViewerState, points: JointPoints) -> list[Arrow]:
+        """Return the axes of all joints; those of sliding joints are thicker, in another colour."""
+        try:
+            screws = joint_screws(state.robot, state.pose)
+        except PteronError:
+            return []
+        found, length = list[Arrow](), _SCREW * self.size
+        for i, guide in enumerate(self._guides):
+            for j, screw in enumerate(screws[i]):
+                at = points.links[i][0] if guide.slides and j == 0 else points.chain[i, j]
+                turns = bool(np.linalg.norm(screw[:3]) > 0.5)
+                axis = screw[:3] if turns else screw[3:]
+                if np.isfinite([*at, *axis]).all() and axis.any():
+                    way = length * axis / np.linalg.norm(axis)
+                    look = ("ink", _SCREW_RADIUS) if turns else ("warning", _SLIDING_RADIUS)
+                    found.append(self._arrow(at - way, 2.0 * way, *look))
+        return found
+
+    def _forces(self, points: JointPoints, forces: Array, scale: Array) -> list[Arrow]:
+        """Return the drives' forces; a torque's arrow is along its axis, as a screw turns.
+
+        A ram's begins at its base joint, along it.
+        """
+        found = list[Arrow]()
+        shares = np.clip(np.nan_to_num(forces) / scale, -_MOST, _MOST)
+        for i, (line, guide) in enumerate(zip(points.links, self._guides, strict=True)):
+            along = line[-1] - line[0]
+            axis = along / np.linalg.norm(along) if points.rams[i] else guide.axis
+            way = _FORCE * self.size * shares[i] * axis
+            found.append(self._arrow(line[0], way, i, _FORCE_RADIUS))
+        return found

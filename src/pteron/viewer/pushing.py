@@ -1,0 +1,150 @@
+"""A machine that a spring pulls at its platform: forward dynamics, its drives free or holding."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.controllers import ComputedTorque, Law, PDGravity
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics, joint_rates
+from pteron.manipulator import Manipulator
+from pteron.motion.simulation.plant import advance, allowed_step, drive_states
+from pteron.viewer.boundary import allowed, what_stops
+from pteron.viewer.sliding import nearest
+
+_PERIOD = 4e-3
+"""Time for which the forces of the spring and of a controller are held, s."""
+
+DRIVES = {
+    "free: no force": None,
+    "soft springs (PD, gravity balanced)": PDGravity(_PERIOD, bandwidth=8.0),
+    "stiff springs (PD, gravity balanced)": PDGravity(_PERIOD, bandwidth=40.0),
+    "computed torque": ComputedTorque(_PERIOD, bandwidth=8.0),
+}
+"""Controllers of the drives while somebody pulls, by names that people read."""
+
+_STEP = 5e-4
+"""Longest step of the integration, s."""
+
+_RATE = 9.0
+"""Rate of the spring with the machine's moving mass, where none is given, rad/s."""
+
+_DAMPING = 0.3
+"""Damping of the spring, over the critical one for that mass."""
+
+
+class Push:
+    """A machine, with its payload, in motion from rest under a spring.
+
+    Attributes
+    ----------
+    pose, velocity : array, shape (m,)
+        m, rad and s.
+    forces : array, shape (n,)
+        Of the drives, N or N m.
+    stops : str
+        What stopped the platform in the last span; empty where nothing did.
+    stiffness : float
+        Of the spring, N/m.
+    spring : (array, array) or None
+        Its ends, m: on the platform, and where it is held.
+    """
+
+    def __init__(self, robot: Manipulator, pose: Array, drives: str) -> None:
+        self._robot, still = robot, np.zeros_like(pose)
+        self._law: Law | None = None
+        if (controller := DRIVES[drives]) is not None:
+            self._law = controller.law(robot)
+        self._wanted = pose
+        self._memory = np.empty(0) if self._law is None else self._law.memory(pose, still)
+        self._begin(pose, still)
+        self._step = allowed_step(robot, pose, _STEP, usual=True)
+        bodies = [body for leg in robot.legs for body in leg.bodies.values()]
+        self._mass = sum(body.values[0] for body in (*bodies, robot.platform.joined))
+        self.stiffness = round(_RATE**2 * self._mass, 1)
+        self.forces, self.stops = np.zeros(robot.joint_count), ""
+        self._arm: Array | None = None
+        self._held = np.zeros(3)
+        self._move(_PERIOD)  # compiles it
+        self._begin(pose, still)
+
+    @property
+    def spring(self) -> tuple[Array, Array] | None:
+        """The spring's ends, m."""
+        return None if self._arm is None else (self._grip()[0], self._held)
+
+    def pull(self, grip: Array, held: Array) -> None:
+        """Hold the spring, which begins at a point of the platform (3,), at another point, m."""
+        if self._arm is None:
+            place, axes = self._robot.platform.at(self.pose)
+            self._arm = axes @ (grip - place)
+        self._held = held
+
+    def release(self) -> None:
+        """Let the spring go."""
+        self._arm = None
+
+    def go(self, span: float) -> None:
+        """Let time go on by a span, s.
+
+        The platform slides along what it meets, and loses the speed towards it.
+        """
+        self.stops, robot = "", self._robot
+        for rest in range(max(1, round(span / _PERIOD)), 0, -1):
+            before = self.pose
+            self._control()
+            whole = self._move(_PERIOD)
+            if whole and allowed(robot, self.pose):
+                continue
+            # What it meets is met once for the rest of the span, as a slide takes milliseconds.
+            if whole:
+                self._move((rest - 1) * _PERIOD)
+            wanted = self.pose if np.isfinite(self.pose).all() else before
+            last, beyond = nearest(robot, before, wanted)
+            self.stops = what_stops(robot, wanted if beyond is None else beyond)
+            self._begin(last, (last - before) / (rest * _PERIOD))
+            return
+
+    def _begin(self, pose: Array, velocity: Array) -> None:
+        """Put the machine into a state, in which drives that bend hold it."""
+        self.pose, self.velocity = pose, velocity
+        self._drives = drive_states(self._robot, pose, velocity)
+
+    def _move(self, span: float) -> bool:
+        """Go on by a span under the forces as they are; return whether it was made whole."""
+        count = int(np.ceil(span / self._step - 1e-9))
+        state, step = (self.pose, self.velocity), span / max(count, 1)
+        given = self._robot, *state, self.forces, step, count, self._wrench()
+        self.pose, self.velocity, self._drives, whole = advance(*given, drives=self._drives)
+        return bool(whole)
+
+    def _control(self) -> None:
+        if self._law is None:
+            return
+        joints = inverse_kinematics(self._robot, self.pose)
+        rates = joint_rates(self._robot, self.pose, self.velocity).actuated
+        still = np.zeros_like(self.pose)
+        forces, self._memory = self._law(self._wanted, still, still, joints, rates, self._memory)
+        # At a singularity of type II the law has no forces: the last ones stay.
+        self.forces = np.where(np.isfinite(forces), forces, self.forces)
+
+    def _grip(self) -> tuple[Array, Array]:
+        """Return where the spring is fixed, and the arm from P to it, in the base frame."""
+        place, axes = self._robot.platform.at(self.pose)
+        arm = np.zeros(3) if self._arm is None else self._arm @ axes
+        return place + arm, arm
+
+    def _wrench(self) -> Array:
+        """Return the spring's load on the platform at P, in the components of its wrenches."""
+        platform, force = self._robot.platform, np.zeros(3)
+        grip, arm = self._grip()
+        if self._arm is not None:
+            ahead = self._robot.platform.at(self.pose + 1e-6 * self.velocity)
+            speed = (ahead[0] + self._arm @ ahead[1] - grip) / 1e-6
+            damping = 2.0 * _DAMPING * np.sqrt(self.stiffness * self._mass)
+            force = self.stiffness * (self._held - grip) - damping * speed
+        moment = np.cross(arm, force)
+        if platform.tilts:
+            return np.concatenate([force, moment])
+        turning = [np.array(platform.axis) @ moment] * len(platform.angles)
+        return np.array([*(platform.directions @ force), *turning])

@@ -1,0 +1,277 @@
+"""Drives that bend, have play, lag and ripple: modes, impacts, limits, mistakes."""
+
+from dataclasses import replace
+
+import mechanisms
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh, null_space
+
+import pteron
+from pteron.controllers import FeedForwardPD
+from pteron.legs import Elastic, LuGre, Wave, Winding
+from pteron.manipulator import parameters
+from pteron.motion import Sensors, advance, longest_step, modes, pick_and_place, simulate
+from pteron.workspace import home_pose
+
+BENDS = pteron.legs.Drive(coulomb=2.0, viscous=5.0, rotor_inertia=0.2, elastic=Elastic(2e5, 30.0))
+
+
+def driven(robot, *drives):
+    drives = drives * robot.joint_count if len(drives) == 1 else drives
+    legs = zip(robot.legs, drives, strict=True)
+    return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in legs))
+
+
+@pytest.fixture
+def mass():
+    """Return a Tripteron of point masses, whose joints do not know of each other."""
+    robot = pteron.load("tripteron")
+    masses = [
+        value if (data.kind, data.body) == ("m", "p") else 1e-9 * value
+        for data, value in zip(
+            pteron.manipulator.parameter_data(robot), parameters(robot), strict=True
+        )
+    ]
+    return replace(pteron.with_parameters(robot, masses), gravity=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("name", mechanisms.gated(["quadrupteron", "delta", "par4"], ["delta"]))
+def test_modes_are_those_of_the_tree_with_its_loops_closed(name):
+    """MuJoCo's mass matrix of the tree, projected on what its closed loops leave."""
+    mujoco = pytest.importorskip("mujoco")
+    from pteron.export import coordinates, mjcf, tree
+
+    robot = pteron.load(name)
+    stiffness = np.linspace(1e5, 3e5, robot.joint_count)
+    inertia = np.linspace(0.1, 0.3, robot.joint_count)
+    drives = [
+        pteron.legs.Drive(rotor_inertia=i, elastic=Elastic(k))
+        for i, k in zip(inertia, stiffness, strict=True)
+    ]
+    soft, home = driven(robot, *drives), home_pose(robot)
+    opened = tree(robot)
+    model = mujoco.MjModel.from_xml_string(mjcf(opened))
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    data = mujoco.MjData(model)
+    data.qpos[:] = coordinates(opened, home[None])[0]
+    mujoco.mj_forward(model, data)
+    tree_mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, tree_mass)
+    equal = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    free = null_space(data.efc_J.reshape(-1, model.nv)[equal], rcond=1e-9)
+    assert free.shape[1] == robot.freedom
+    names = [joint.name for joint in opened.joints]
+    rows = free[[names.index(joint) for joint in robot.joint_names]]
+    n = robot.joint_count
+    mass = np.block(
+        [[free.T @ tree_mass @ free, np.zeros((n, n))], [np.zeros((n, n)), np.diag(inertia)]]
+    )
+    bent = np.hstack([-rows, np.eye(n)])
+    expected = np.sqrt(np.clip(eigh(bent.T @ np.diag(stiffness) @ bent, mass)[0], 0.0, None))[n:]
+    rates, stretch = modes(soft, home)
+    found = np.sort(rates.imag[rates.imag > 1.0])
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    assert stretch.shape == (n, 4 * n)
+    assert longest_step(soft, home) == pytest.approx(2.0 / found[-1], rel=1e-6)
+
+
+def test_the_loop_vibrates_as_its_modes_do(mass):
+    soft = driven(mass, pteron.legs.Drive(rotor_inertia=0.3, elastic=Elastic(3e4, 2.0)))
+    start = np.zeros(3), np.array([0.1, 0.0, 0.0])
+    found = simulate(soft, start=start, duration=0.1)
+    # Motors begin as fast as their joints; then it is the platform that is thrown on.
+    np.testing.assert_allclose(found.velocity[:, 0], 0.1, atol=1e-9)
+    pushed = simulate(soft, start=(np.zeros(3), np.zeros(3)), forces=[3.0, 0.0, 0.0], duration=0.1)
+    load, rotor, k, c = pteron.mass_matrix(soft, np.zeros(3))[0, 0], 0.3, 3e4, 2.0
+
+    def rates(_, y):
+        spring = k * (y[2] - y[0]) + c * (y[3] - y[1])
+        return [y[1], spring / load, y[3], (3.0 - spring) / rotor]
+
+    exact = solve_ivp(rates, (0, 0.1), np.zeros(4), "DOP853", pushed.time, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(pushed.pose[:, 0], exact.y[0], rtol=0.0, atol=2e-10)
+
+
+def test_backlash_is_that_of_an_event_driven_solution(mass):
+    """Contact, play and contact again, each solved by itself up to where it ends."""
+    gap, k, c, rotor = 2e-4, 3e4, 5.0, 0.3
+    bends = Elastic(k, c, backlash=gap)
+    soft = driven(mass, pteron.legs.Drive(rotor_inertia=rotor, elastic=bends))
+    load = pteron.mass_matrix(soft, np.zeros(3))[0, 0]
+
+    def force(t):
+        return 20.0 * np.sin(90.0 * t)
+
+    def spring(y, side):
+        return 0.0 if side == 0 else k * (y[2] - y[0] - side * gap / 2) + c * (y[3] - y[1])
+
+    def rates(held, side):
+        return lambda t, y: [
+            *(y[1], spring(y, side) / load),
+            *(y[3], (held - spring(y, side)) / rotor),
+        ]
+
+    def events(side):
+        def at(edge):
+            return lambda t, y: y[2] - y[0] - edge * gap / 2
+
+        def parts(t, y):
+            return side * spring(y, side)
+
+        found = [at(1), at(-1)] if side == 0 else [parts]
+        for event, way in zip(found, (1, -1) if side == 0 else (-1,), strict=True):
+            event.terminal, event.direction = True, way
+        return found
+
+    period, state, side, exact, changes = 1e-3, np.zeros(4), 0, [np.zeros(4)], 0
+    for sample in range(80):
+        held, now, end = force(sample * period), sample * period, (sample + 1) * period
+        while end - now > 1e-13:
+            part = solve_ivp(
+                rates(held, side), (now, end), state, "DOP853", events=events(side),
+                rtol=1e-11, atol=1e-14,
+            )  # fmt: skip
+            state, now = part.y[:, -1], part.t[-1]
+            if part.status == 1:
+                changes += 1
+                edge = 1 if len(part.t_events[0]) else -1
+                side = edge if side == 0 else 0
+        exact.append(state)
+    exact = np.array(exact)
+    assert changes > 4
+    off = []
+    for step in (1e-4, 2.5e-5):
+        found = simulate(
+            soft, start=(np.zeros(3), np.zeros(3)), duration=0.08, step=step,
+            forces=lambda t: np.array([force(t), 0.0, 0.0]),
+        )  # fmt: skip
+        off.append(np.abs(found.pose[:, 0] - exact[:, 0]).max() / np.abs(exact[:, 0]).max())
+    assert off[1] < 1e-4
+    assert off[1] < 0.5 * off[0]
+
+
+def test_a_motor_gives_what_its_curve_winding_and_current_allow(mass):
+    def moved(*, forces, duration=0.02, **drive):
+        robot = driven(mass, pteron.legs.Drive(rotor_inertia=0.01, ratio=1.0, **drive), *2 * [None])
+        rest = np.zeros(3)
+        return robot, simulate(
+            robot, start=(rest, rest), forces=[forces, 0.0, 0.0], duration=duration
+        )
+
+    load = pteron.mass_matrix(mass, np.zeros(3))[0, 0] + 0.01
+    _, first = moved(forces=5.0, current_time=5e-3)
+    lag = 5e-3
+    exact = 5.0 / load * (first.time - lag * -np.expm1(-first.time / lag))
+    np.testing.assert_allclose(first.velocity[:, 0], exact, rtol=0.0, atol=1e-3 * exact[-1] + 2e-2)
+    _, limited = moved(forces=1e3, curve=((0.0, 10.0), (0.2, 10.0), (0.5, 0.0)), duration=0.5)
+    assert limited.acceleration[0, 0] == pytest.approx(10.0 / load, rel=1e-6)
+    assert limited.velocity[-1, 0] == pytest.approx(0.5, rel=1e-3)
+    winding = Winding(resistance=2.0, torque_constant=4.0, voltage=6.0)
+    _, supplied = moved(forces=1e3, winding=winding, duration=0.2)
+    assert supplied.acceleration[0, 0] == pytest.approx(12.0 / load, rel=1e-6)
+    rate = 16.0 / 2.0 / load
+    expected = 1.5 * -np.expm1(-rate * supplied.time)
+    np.testing.assert_allclose(supplied.velocity[:, 0], expected, rtol=0.0, atol=1e-9)
+
+
+def test_ripple_and_cogging_come_by_the_motors_angle(mass):
+    drive = pteron.legs.Drive(
+        rotor_inertia=1e-6, ratio=200.0, ripple=(Wave(6, 0.05, 0.3),), cogging=(Wave(4, 0.02),)
+    )
+    robot = driven(mass, drive, *2 * [None])
+    rest = np.zeros(3)
+    found = simulate(robot, start=(rest, rest), forces=[8.0, 0.0, 0.0], duration=0.3)
+    angle = 200.0 * found.joints[:, 0]
+    force = 8.0 * (1.0 + 0.05 * np.sin(6 * angle + 0.3)) + 200.0 * 0.02 * np.sin(4 * angle)
+    load = pteron.mass_matrix(robot, rest)[0, 0] + drive.inertia
+    np.testing.assert_allclose(found.acceleration[:, 0], force / load, rtol=0.0, atol=1e-6)
+    assert np.ptp(found.acceleration[:, 0]) > 5.0
+
+
+@pytest.mark.parametrize("encoder", ["motor", "joint"])
+def test_a_machine_with_soft_drives_follows_its_cycle_alike_in_c_and_numpy(encoder, monkeypatch):
+    robot = pteron.load("quadrupteron")
+    bends = replace(
+        BENDS, elastic=Elastic(3e5, 60.0, 2e-6, encoder), current_time=2e-4, ratio=300.0,
+        rotor_inertia=0.2 / 300.0**2, cogging=(Wave(4, 1e-4),), lugre=LuGre(2e4, 20.0),
+    )  # fmt: skip
+    robot = driven(robot, bends, *2 * [BENDS], replace(BENDS, elastic=None))
+    motion = pick_and_place(robot, home_pose(robot), least=0.1)
+    given = {"sensors": Sensors(1e-6), "duration": 0.01, "model": pteron.load("quadrupteron")}
+    slow = simulate(robot, motion, FeedForwardPD(bandwidth=40.0), **given)
+    monkeypatch.delenv("PTERON_KERNELS")
+    fast = simulate(robot, motion, FeedForwardPD(bandwidth=40.0), **given)
+    assert fast.stopped is None
+    for part in ("pose", "velocity", "acceleration", "joints", "forces", "memory"):
+        np.testing.assert_array_equal(getattr(fast, part), getattr(slow, part))
+    assert np.abs(fast.error).max() < 1e-2
+
+
+@pytest.mark.parametrize("lag", [None, 5e-4])
+def test_states_of_soft_drives_go_on_from_call_to_call(lag):
+    robot = driven(pteron.load("delta"), replace(BENDS, coulomb=0.5, current_time=lag))
+    pose = pteron.random_poses(robot, 3, seed=1, type_i=0.3, type_ii=0.2)
+    forces = 2.0 * np.random.default_rng(1).normal(size=pose.shape)
+    velocity, drives = np.zeros_like(pose), None
+    whole = advance(robot, pose, velocity, forces, 5e-5, 40)
+    for _ in range(4):
+        pose, velocity, drives, going = advance(
+            robot, pose, velocity, forces, 5e-5, 10, drives=drives
+        )
+        assert going.all()
+    assert drives.shape == (3, 6 if lag is None else 9)
+    for one, other in zip(whole, (pose, velocity, drives), strict=False):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_mistakes_are_told():
+    robot, rest = pteron.load("tripteron"), np.zeros(3)
+    stiff = driven(robot, *2 * [BENDS], replace(BENDS, elastic=Elastic(2e9)))
+    told = {
+        "leg 3: the stiffness of its transmission asks for 1.*e-05 s at most": {"step": 5e-5},
+        'the drives of tripteron bend, lag or ripple; "rk4" has them': {"method": "dop853"},
+    }
+    for message, given in told.items():
+        with pytest.raises(pteron.DataError, match=message):
+            simulate(stiff, start=(rest, rest), duration=0.01, **given)
+    assert simulate(stiff, start=(rest, rest), duration=0.002).step < 2e-5
+    with pytest.raises(pteron.DataError, match="drives: shape"):
+        advance(stiff, rest, rest, rest, 1e-5, 1, drives=rest)
+    slow = driven(robot, replace(BENDS, elastic=None, current_time=1e-5))
+    with pytest.raises(pteron.DataError, match="leg 1: the current's time constant asks for 2e-05"):
+        simulate(slow, start=(rest, rest), duration=0.01, step=5e-5)
+    for wrong, message in (
+        ({"elastic": "soft", "curve": 5}, "2 faults"),
+        ({"curve": ((0.0, np.nan),)}, "curve: .* pairs of numbers, speed and force, expected"),
+        ({"ripple": (3,)}, "ripple: .* a list of Wave expected"),
+        ({"lugre": {"stiffness": 1.0}}, "lugre: .* a LuGre expected"),
+        ({"elastic": Elastic(1e5)}, "elastic: needs rotor_inertia"),
+        ({"cogging": (Wave(4, 1.0),)}, "cogging: needs ratio"),
+        ({"curve": ((1.0, 2.0), (0.5, 3.0))}, "curve: speeds from 0 up expected"),
+        ({"curve": ((0.0, 2.0),), "max_force": 5.0}, "max_force: 5 given, but the curve has 2"),
+    ):
+        with pytest.raises(pteron.ModelError, match=message):
+            pteron.legs.Drive(**wrong)
+    with pytest.raises(pteron.ModelError, match="stiffness: -1 given"):
+        Elastic(-1.0)
+    with pytest.raises(
+        pteron.ModelError, match='encoder: \'load\' given, "motor", "joint" or "both"'
+    ):
+        Elastic(1.0, encoder="load")
+
+
+def test_a_file_keeps_all_of_a_drive(tmp_path):
+    drive = replace(
+        BENDS, ratio=100.0, current_time=2e-4, curve=((0.0, 10.0), (1.0, 5.0)),
+        winding=Winding(0.5, 0.1, 48.0), ripple=(Wave(6, 0.02),), cogging=(Wave(42, 0.005, 0.1),),
+        lugre=LuGre(1e6, 3.0),
+    )  # fmt: skip
+    robot = driven(pteron.load("five-bar"), drive)
+    pteron.save(robot, tmp_path / "robot.toml")
+    assert pteron.load(tmp_path / "robot.toml") == robot
+    text = (tmp_path / "robot.toml").read_text().replace("stiffness", "stifness", 1)
+    (tmp_path / "robot.toml").write_text(text)
+    with pytest.raises(pteron.ModelError, match="stifness"):
+        pteron.load(tmp_path / "robot.toml")
