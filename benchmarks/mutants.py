@@ -433,7 +433,7 @@ def main() -> None:
     asked.add_argument("--seed", type=int, default=21)
     given = asked.parse_args()
     count = given.count or (300 if given.quick else 20_000)
-    warnings.simplefilter("ignore", UnlikelyValue)  # many a damaged number is, and is read all the same
+    warnings.simplefilter("ignore", UnlikelyValue)  # damaged numbers are, and are read
     raw: list[str] = []
     total: Counter[str] = Counter()
     begin = process_time()

@@ -53,7 +53,7 @@ SIDES = np.array([[0, 0], [2, 0], [4, 0], [2.5, 1.5], [1, 3], [0.5, 1.5]])
     ("base", "top", "reason"),
     [
         (CIRCLE, PARABOLA, "lie on conics, the one a projective image of the other"),
-        (SIDES, 0.6 * np.roll(SIDES, -1, axis=0), r"rams that push with \(-1, 1, -1, 1, -1, 1\)"),
+        (SIDES, 0.6 * np.roll(SIDES, -1, axis=0), r"rams that push with \(1, -1, 1, -1, 1, -1\)"),
         (np.outer(CIRCLE[:, 0], [1, 2]), SIDES, "all guide points lie on one line"),
         (SIDES, 0.6 * SIDES, ""),
     ],

@@ -35,7 +35,9 @@ def balance_of_rams(robot: Manipulator) -> str:
     if not _vanishes(products, 5):
         return ""
     shares = np.linalg.svd(products)[0][:, -1]
-    told = ", ".join(f"{v:.4g}" for v in shares / shares[np.abs(shares).argmax()] + 0.0)
+    sizes = np.abs(shares)
+    first = int((sizes > (1.0 - 1e-6) * sizes.max()).argmax())  # of equal ones, on any processor
+    told = ", ".join(f"{v:.4g}" for v in shares / shares[first] + 0.0)
     return (
         f"{_alike(base, top) or _on_conics(base, top)}rams that push with ({told}) times their "
         "lengths leave the platform in balance at every pose"

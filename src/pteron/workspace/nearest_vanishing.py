@@ -40,7 +40,7 @@ programs."""
 _BESIDE = 0.1
 """Share of a pose's distance within which other poses count as its neighbours and are left out."""
 
-_LAST, _HITS = 128, 12
+_LAST, _HITS = 256, 12
 """Boxes searched of those left in the end, the nearest and as many spread over all; and poses found
 in them that lead to quadratic programs."""
 
