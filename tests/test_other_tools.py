@@ -259,7 +259,10 @@ def test_an_fmu_ends_where_a_leg_does_not_reach(name, kind):
     ("values", "words"),
     [
         ({"pose.x": 300.0}, "does not reach the platform at the pose to start from"),
-        ({"payload.mass": -1.0}, "must be 0 or more; -1 was given"),
+        ({"payload.mass": -1.0}, "payload.mass must be 0 or more; -1 was given"),
+        ({"payload.inertia": -1.0}, "payload.inertia must be 0 or more; -1 was given"),
+        ({"drive2.coulomb": -1.0}, "drive2.coulomb must be 0 or more; -1 was given"),
+        ({"drive3.rest_speed": 0.0}, "drive3.rest_speed must be 1e-12 or more; 0 was given"),
         ({"force1": np.nan}, "a number is expected"),
         ({"payload.mass": 1e308}, "no finite acceleration"),
     ],

@@ -84,6 +84,11 @@ class FmuVariables:
         return next(block.references for block in self.blocks if block.name == name)
 
     @property
+    def parameters(self) -> list[FmuVariable]:
+        """The parameters of payload and drives; all other variables stand before them."""
+        return [v for block in self.blocks if block.kind == "START" for v in block.variables]
+
+    @property
     def count(self) -> int:
         """Number of variables."""
         return sum(len(block.variables) for block in self.blocks)
@@ -267,7 +272,7 @@ def _drives(robot: Manipulator) -> Iterator[FmuVariable]:
                 "rest_speed": f"{leg.joint.unit}/s",
             }
             unit = units.get(name, _dotted(leg.joint.force_unit))
-            least = None if name == "offset" else 0.0
+            least = None if name == "offset" else 1e-12 if "speed" in name else 0.0
             yield FmuVariable(
                 f"drive{i}.{name}", unit, f"Leg {i}: {texts[name]}", float(next(values)), least
             )
