@@ -586,11 +586,17 @@ def test_a_byte_order_mark_is_passed_over(tmp_path):
     assert pteron.load(file) == CATALOG["quadrupteron"]
 
 
+HEXAPODS = ("rubin-camera-hexapod", "rubin-m2-hexapod", "stewart")
+
+
 def test_files_that_cannot_be_read_are_refused(tmp_path):
     missing = tmp_path / "nowhere.toml"
     words = "neither a file nor a machine of the catalog (3-prr, 3-rpr, 3-rrr, ankle, "
     refused(lambda: pteron.load(missing), f"{missing}: {words}")
     refused(lambda: pteron.load("quadrupteorn"), 'did you mean "quadrupteron"?')
+    refused(lambda: pteron.load("delta.toml"), 'did you mean "delta"?')
+    hexapods = ' or '.join(f'"{name}"' for name in HEXAPODS)
+    refused(lambda: pteron.load("hexapod"), f"did you mean {hexapods}?")
     refused(lambda: pteron.load(tmp_path), f"{tmp_path}: cannot be read")
     binary = tmp_path / "binary.toml"
     binary.write_bytes(bytes(range(256)))

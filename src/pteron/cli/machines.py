@@ -39,13 +39,17 @@ def catalog() -> Result:
     --------
     pteron catalog --json
     """
-    from pteron.manipulator import catalog as names, load
+    from pteron.manipulator import load
+    from pteron.manipulator.files import descriptions
 
-    found = [{**_machine(robot), "legs": len(robot.legs)} for robot in map(load, names())]
-    keys = ("name", "motion", "coordinates", "types", "working_mode")
+    found = [
+        {**_machine(robot), "legs": len(robot.legs), "description": text}
+        for robot, text in ((load(name), text) for name, text in descriptions().items())
+    ]
+    keys = ("name", "motion", "types", "description")
     cells = ((one[key] for key in keys) for one in found)
     rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
-    made = table("name", "motion", "pose", "legs", "elbows", rows=rows, names=("name",))
+    made = table("name", "motion", "legs", "machine", rows=rows, names=("name",))
     return Result(found, [made])
 
 

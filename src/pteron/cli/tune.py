@@ -150,7 +150,7 @@ def _show(found: Tuning, controller: str, tried: pl.DataFrame) -> None:
                 if row["stopped"]
                 else (
                     f"{1e6 * row['error']:.3g} {unit}",
-                    f"{1e3 * row['settling']:.3g} ms",
+                    "does not" if np.isnan(row["settling"]) else f"{1e3 * row['settling']:.3g} ms",
                     f"{row['peak_force']:.4g}",
                     f"{row['energy']:.4g} J",
                 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -39,6 +40,15 @@ def catalog() -> tuple[str, ...]:
 def _names() -> tuple[str, ...]:
     folder = files("pteron.manipulator") / "catalog"
     return tuple(sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml")))
+
+
+@lru_cache(maxsize=1)
+def descriptions() -> dict[str, str]:
+    """Return what each machine of the catalog is: the first words of its file, to a stop."""
+    folder = files("pteron.manipulator") / "catalog"
+    opening = re.compile(r"# (?:An? |The )?(.*?)(?: \(|[.,:;]\s)", re.DOTALL)
+    texts = {name: opening.match((folder / f"{name}.toml").read_text("utf-8")) for name in _names()}
+    return {name: found[1].replace("\n# ", " ") for name, found in texts.items() if found}
 
 
 def load(name_or_path: str | Path) -> Manipulator:
@@ -99,10 +109,13 @@ def _contents(name_or_path: str | Path) -> tuple[bytes, str]:
     if name in catalog():
         resource = files("pteron.manipulator") / "catalog" / f"{name}.toml"
         return resource.read_bytes(), name
-    close = get_close_matches(name, catalog(), n=1)
-    guess = f'; did you mean "{close[0]}"?' if close else ""
-    names = ", ".join(catalog())
-    absent = f"neither a file nor a machine of the catalog ({names}){guess}"
+    word = Path(name).stem.lower()
+    said = [own for own, text in descriptions().items() if word in text.lower().split()]
+    close = get_close_matches(word, catalog(), n=1, cutoff=0.85) or said
+    close = close or get_close_matches(word, catalog(), n=1)
+    names = " or ".join(f'"{own}"' for own in close)
+    guess = f"; did you mean {names}?" if close else f" ({', '.join(catalog())})"
+    absent = f"neither a file nor a machine of the catalog{guess}"
     return toml_bytes(name_or_path, ModelError, absent)
 
 
