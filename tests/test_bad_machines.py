@@ -411,7 +411,7 @@ def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are(monkeypat
     monkeypatch.setenv("PTERON_KERNELS", "auto")  # millions of poses are drawn
     robot = CATALOG["3-rrr"]
     elbows = legs_of("3-rrr", lambda i, leg: replace(leg, elbow_limits=(3.0, 3.1)))
-    with pytest.raises(ModelError, match=r"leg 1: elbow at .* rad of 3 to 3\.1, leg 2: elbow at "):
+    with pytest.raises(ModelError, match=r"legs 1, 2 and 3: elbow at .* to .* rad of 3 to 3\.1;"):
         home_pose(replace(robot, legs=elbows))
     far = legs_of("quadrupteron", lambda i, leg: replace(leg, limits=(1.0 + i, 2.0 + i)))
     with pytest.raises(ModelError, match=r"keeps the joints' limits; .*leg 4: slider at .* m of 4"):

@@ -595,7 +595,7 @@ def test_files_that_cannot_be_read_are_refused(tmp_path):
     refused(lambda: pteron.load(missing), f"{missing}: {words}")
     refused(lambda: pteron.load("quadrupteorn"), 'did you mean "quadrupteron"?')
     refused(lambda: pteron.load("delta.toml"), 'did you mean "delta"?')
-    hexapods = ' or '.join(f'"{name}"' for name in HEXAPODS)
+    hexapods = " or ".join(f'"{name}"' for name in HEXAPODS)
     refused(lambda: pteron.load("hexapod"), f"did you mean {hexapods}?")
     refused(lambda: pteron.load(tmp_path), f"{tmp_path}: cannot be read")
     binary = tmp_path / "binary.toml"

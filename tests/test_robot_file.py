@@ -230,6 +230,22 @@ def test_new_machines_of_every_kind_pass_the_check(program, name):
     assert json.loads(checked.stdout)["home_reserve"] > 0.0
 
 
+@pytest.mark.parametrize("name", ["par4", "stewart"])
+def test_a_platform_of_another_mass_is_as_much_heavier_in_all(program, name):
+    done = program("new", name, "--base-radius", "0.3", "--out", "new.toml")
+    assert "still: the platform of" in done.stdout
+    assert "(--platform-mass)" in done.stdout
+    own = pteron.load(name).platform
+    done = program("new", name, "--platform-mass", "0.3", "--limits", "1:2", "--out", "light.toml")
+    assert "still" not in done.stdout
+    light = pteron.load("light.toml").platform
+    masses = [sum((one.inertia.mass, *(bar.mass for bar in one.bars))) for one in (own, light)]
+    assert masses[1] == pytest.approx(0.3, rel=1e-9)
+    factor = masses[1] / masses[0]
+    expected = factor * np.array(own.inertia.values)
+    np.testing.assert_allclose(light.inertia.values, expected, rtol=1e-9, atol=1e-15)
+
+
 @pytest.mark.parametrize("name", sorted(set(CATALOG) - {"five-bar"}))
 def test_machines_have_radii(name):
     robot, platform = CATALOG[name], CATALOG[name].platform

@@ -62,6 +62,7 @@ def new(
     rod: float | None = None,
     limits: str | None = None,
     mass_from: list[str] | None = None,
+    platform_mass: float | None = None,
     out: str | None = None,
     overwrite: bool = False,
 ) -> Result:
@@ -83,6 +84,7 @@ def new(
     --limits LOW:HIGH: Of the joints, m or rad; of rams their length.
     --mass-from STOCK: Masses and inertias of links as cut from aluminium-tube:30x2 or steel-rod:8,
         mm; again, with upper= or lower= before it, for one of the two.
+    --platform-mass: Of the platform with its bars, kg; its inertia is in proportion.
     --out FILE: Write it to this TOML file.
     --overwrite: Replace the file if it is there.
 
@@ -95,7 +97,8 @@ def new(
     if kind is None:
         return catalog()
     from pteron.atomic import write_text
-    from pteron.manipulator.explained import explained
+    from pteron.manipulator import load
+    from pteron.manipulator.explained import explained, kept
 
     given = {
         "base_radius": base_radius,
@@ -104,17 +107,19 @@ def new(
         "rod": rod,
         "limits": _interval(limits),
         "stock": _stocks(mass_from),
+        "platform_mass": platform_mass,
     }
+    given = {key: value for key, value in given.items() if value not in (None, {})}
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
-    text = explained(kind, {key: value for key, value in given.items() if value not in (None, {})})
+    text = explained(kind, given)
     if out is not None:
         write_text(out, text)
     data = {"kind": kind, "file": out, "text": text}
     if out is None:
         return Result(data, partial(write, text))
     told = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
-    return Result(data, [told])
+    return Result(data, [told, *map(plain, kept(load(kind), given))])
 
 
 def _interval(text: str | None) -> tuple[float, float] | None:
@@ -184,7 +189,7 @@ def check(file: str, *, elbows: str | None = None) -> Result:
 
 
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
-    from pteron.kinematics import architecture, singular_orientations
+    from pteron.kinematics import architecture, inverse_kinematics, singular_orientations
     from pteron.workspace import home_pose, limited_joints, pose_margins
     from pteron.workspace.load_warnings import load_warnings
     from pteron.workspace.mode_places import elbow_warnings, mode_places
@@ -199,7 +204,10 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     return {
         **_machine(robot),
         "gravity": list(robot.gravity),
-        "legs": [_leg(leg) for leg in robot.legs],
+        "legs": [
+            {**_leg(leg), "at_home": float(joint)}
+            for leg, joint in zip(robot.legs, inverse_kinematics(robot, home), strict=True)
+        ],
         "singular_orientations": singular_orientations(robot, position).tolist(),
         "singular_at_every_position": bool(len(singular_orientations(robot))),
         "tool": list(robot.platform.tool),
@@ -236,10 +244,11 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
             *(str(i), leg["type"], _vector(leg["axis"], 2) if leg["axis"] else "along the leg"),
             ", ".join(f"{length:g}" for length in leg["lengths"].values()) or "-",
             "{:g} to {:g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
+            f"{leg['at_home']:.4g} {leg['unit']}",
         )
         for i, leg in enumerate(found["legs"], start=1)
     )
-    headings = ("leg", "type", "joint's axis", "lengths (m)", "limits")
+    headings = ("leg", "type", "joint's axis", "lengths (m)", "limits", "at home")
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     where = "" if found["singular_at_every_position"] or not angles else " at the home position"
     singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]

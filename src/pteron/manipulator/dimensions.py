@@ -79,11 +79,12 @@ def with_dimensions(
     rod: float | None = None,
     limits: tuple[float, float] | None = None,
     stock: Mapping[str, str | Stock] | None = None,
+    platform_mass: float | None = None,
 ) -> Manipulator:
     """Return a machine of the same kind with other dimensions, which hold for all of its legs.
 
-    Links of another length keep their section, unless a stock says what they are cut from; the
-    platform's inertia stays.
+    Links of another length keep their section, unless a stock says what they are cut from. Limits
+    of joints, and the platform's mass and inertia, stay unless they are given.
 
     Parameters
     ----------
@@ -100,6 +101,8 @@ def with_dimensions(
         Least and greatest joint coordinate: of rams the length, m.
     stock : mapping, optional
         What links are cut from, by their key, ``upper`` or ``lower``: see `Stock.of`.
+    platform_mass : float, optional
+        Of the platform with its bars, kg: its inertia changes by the same factor.
 
     Returns
     -------
@@ -132,7 +135,17 @@ def with_dimensions(
         robot = _of_legs(robot, (replace(leg, limits=held) for leg in robot.legs))
     for key, given in (stock or {}).items():
         robot = _cut(robot, key, Stock.of(given) if isinstance(given, str) else given)
+    if platform_mass is not None:
+        robot = _with_mass(robot, positive(platform_mass, "platform_mass", "kg"))
     return robot
+
+
+def _with_mass(robot: Manipulator, mass: float) -> Manipulator:
+    own, bars = robot.platform.inertia, robot.platform.bars
+    factor = mass / (own.mass + sum(bar.mass for bar in bars))
+    inertia = type(own).of_values([factor * value for value in own.values])
+    bars = tuple(replace(bar, mass=factor * bar.mass) for bar in bars)
+    return replace(robot, platform=replace(robot.platform, inertia=inertia, bars=bars))
 
 
 def _of_legs(robot: Manipulator, legs: Iterable[LegKind]) -> Manipulator:

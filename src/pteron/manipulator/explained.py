@@ -9,6 +9,7 @@ from typing import Any
 from pteron.errors import shown
 from pteron.manipulator.dimensions import with_dimensions
 from pteron.manipulator.files import DEFAULT_KIND, document, load
+from pteron.manipulator.manipulator import Manipulator
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import document_of
 from pteron.manipulator.writing import written
@@ -20,6 +21,7 @@ _FOLLOWS = {
     "rod": "Rods or lower links of {} m: their section stays where no stock is given.",
     "limits": "Joint coordinates from {}.",
     "stock": "Masses and inertias of links from {}: a first guess, without their ends and joints.",
+    "platform_mass": "Platform of {} kg: its inertia is in proportion.",
 }
 """The sentence of the file for each argument of `with_dimensions`."""
 
@@ -45,10 +47,22 @@ def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = N
     if dimensions:
         given = document_of(with_dimensions(robot, **dimensions))
         about += [_FOLLOWS[key].format(_told(value)) for key, value in dimensions.items()]
+        about += kept(robot, dimensions)
     legs = [{"type": DEFAULT_KIND, **leg} for leg in given["legs"]]
     return written(
         {**given, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}, explained=True, about=about
     )
+
+
+def kept(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
+    """Return a sentence on what stays as in a machine, though dimensions change."""
+    mass = robot.platform.inertia.mass + sum(bar.mass for bar in robot.platform.bars)
+    numbers = {
+        "platform_mass": f"the platform of {mass:.4g} kg (--platform-mass)",
+        "limits": "the joints' limits (--limits)",
+    }
+    told = " and ".join(text for key, text in numbers.items() if key not in dimensions)
+    return [f"As in {shown(robot.name, bare=True)} still: {told}."] if told and dimensions else []
 
 
 def _told(value: Any) -> str:

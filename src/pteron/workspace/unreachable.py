@@ -6,7 +6,7 @@ import numpy as np
 
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.limits import limited_joints
+from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
@@ -67,15 +67,22 @@ def _deepest(robot: Manipulator) -> tuple[Array, Array]:
 def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
     """Return what is said of a machine that at the best of poses, in reach, passes limits."""
     pose = poses[distance_to_limits(robot, poses).min(axis=-1).argmax()]
-    told = [
-        f"{f'leg {at.leg}: ' if at.leg else ''}{at.noun} at {at.value:.4g} {at.unit} of "
-        f"{at.limits_text('{:g}'.format)}"
-        for at in limited_joints(robot, pose)
-        if not at.least < at.value < at.most
-    ]
-    nearest = f"; nearest to it is one with {', '.join(told)}" if told else ""
+    passed: dict[tuple[str, str], list[LimitedJoint]] = {}
+    for at in limited_joints(robot, pose):
+        if not at.least < at.value < at.most:
+            passed.setdefault((at.noun, at.limits_text("{:g}".format)), []).append(at)
+    told = [f"{_values(own)} of {limits}" for (_, limits), own in passed.items()]
+    nearest = f"; nearest to it is one with {'; '.join(told)}" if told else ""
     return ModelError(
         f"no pose in reach of all legs keeps the joints' limits{nearest}; widen limits or move the "
         "guide points",
         subject=robot.name,
     )
+
+
+def _values(joints: list[LimitedJoint]) -> str:
+    """Say at what values joints of one noun are."""
+    first, values = joints[0], [at.value for at in joints]
+    low, high = (f"{value:.4g}" for value in (min(values), max(values)))
+    legs = f"{told_legs([at.leg for at in joints])}: " if first.leg else ""
+    return f"{legs}{first.noun} at {low if low == high else f'{low} to {high}'} {first.unit}"
