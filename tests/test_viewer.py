@@ -833,6 +833,10 @@ def test_a_server_that_is_gone_says_so_and_its_page_comes_back(browser):
             slide(tab, "x (mm)", ["ArrowRight"] * 5)
             wait_for(tab, SHOWN, [10.5, 120.0])
             assert second.faults == ()
+        with view("delta", port=port) as third:
+            tab.locator("#pose2").wait_for()
+            wait_for(tab, "document.title.includes('delta')", True)
+            assert third.faults == ()
 
 
 @CLIENTS

@@ -24,6 +24,7 @@
 
   function takeMachine(found) {
     const first = !machine;
+    if (!first && machine.run !== found.run) { socket.onmessage = null; location.reload(); return; } // perhaps of another machine
     machine = found; trail = []; slice = [];
     if (first) {
       picture = new Picture(the("view"), found.still, found.cloud);

@@ -6,6 +6,7 @@ import json
 import threading
 import traceback
 from collections.abc import Callable
+from secrets import token_hex
 from time import monotonic
 from typing import Any
 
@@ -58,6 +59,7 @@ class Live:
         self.session, self._compared = session, compared
         self.name = session.state.robot.name
         self.idle, self.faults = threading.Event(), list[str]()
+        self._run_name = token_hex(8)  # a page that another run gave is loaded anew
         self._actions: dict[str, Callable[[], object]] = {}
         self._wake = threading.Condition()
         self._closed = False
@@ -235,7 +237,7 @@ class Live:
             self._robot, self._sliced = state.robot, ()
             self._picture = Picture(state.robot, session.examples, self._compared)
             drawn = {"still": self._picture.still, "cloud": self._picture.cloud}
-            self._send("machine", panel.controls(session) | drawn)
+            self._send("machine", panel.controls(session) | drawn | {"run": self._run_name})
         scaled = state.robot, state.payload, session.title
         if self._scaled != scaled:
             self._scaled, self._scale = scaled, session.force_scale()
