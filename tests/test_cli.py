@@ -523,7 +523,7 @@ def test_forces_of_a_table_with_and_without_a_wrench(robot: str):
     ("line", "words"),
     [
         ("--velocity 0 0 1", ["no pose given; give --pose with x y z"]),
-        ("", ["no pose given", "--table FILE"]),
+        ("", ["no pose given; give --pose with x y z, or --table FILE"]),
         ("--pose", ["'--pose' requires an argument"]),
         ("--pose 0 0", ["--pose: 2 values given, 3 expected: x y z"]),
         ("--pose 0 0 0 --velocity 0 0 0 0", ["--velocity: 4 values", "dx dy dz"]),

@@ -182,7 +182,7 @@ def forces(
     loads = names["wrench"]
     motion = [*names["pose"], *names["velocity"], *names["acceleration"]]
     typed = [pose, velocity, acceleration, wrench]
-    if all(text is None for text in typed):
+    if table is not None and all(text is None for text in typed):
         rows = rows_of_table(machine, table, "pose", motion)
     elif table is not None:
         raise DataError("pose and --table given; give one of them")
@@ -218,7 +218,7 @@ def forces(
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> Rows:
     m = len(motion) // 3
     if typed[0] is None:
-        raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}")
+        raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}, or --table FILE")
     names: list[str] = []
     values: list[float] = []
     parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
