@@ -54,6 +54,25 @@ def test_exported_c_in_the_loop_is_the_loops_own_controller_to_the_bit(name, law
         np.testing.assert_array_equal(getattr(linked, part), getattr(own, part))
 
 
+@pytest.mark.parametrize(
+    "name", mechanisms.gated(["quadrupteron", "five-bar", "stewart"], ["five-bar"])
+)
+def test_drives_that_count_otherwise_run_the_machine_alike(name, tmp_path):
+    """What the C takes and gives is per reading: each reading's sign, scale and zero are undone."""
+    robot, controller = driven(name), Adaptive(friction=True)
+    motion = pick_and_place(robot, home_pose(robot), least=0.1)
+    own = simulate(robot, motion, controller, **GIVEN)
+    counts = [pteron.legs.Reading(0.1 + 0.2 * i, (-1.7) ** i) for i in range(robot.joint_count)]
+    legs = zip(robot.legs, counts, strict=True)
+    other = replace(robot, legs=tuple(replace(leg, reading=count) for leg, count in legs))
+    pteron.export_c(other, [controller], tmp_path)
+    linked = simulate(other, motion, Exported(tmp_path, controller), **GIVEN)
+    for part in ("pose", "velocity", "forces", "asked", "memory"):
+        expected = getattr(own, part)
+        off = np.abs(getattr(linked, part) - expected).max()
+        assert off <= 1e-7 * np.abs(expected).max()  # encoders' steps leave rounding as it is
+
+
 def test_exported_c_in_the_loop_is_what_it_is_by_itself(tmp_path):
     """Compiled alone, with other options, and called back at each sample."""
     robot, controller = driven("quadrupteron"), ComputedTorque()
@@ -96,6 +115,12 @@ def test_mistakes_are_told(tmp_path):
     pteron.export_c("delta", [ComputedTorque()], tmp_path / "single", real="float")
     with pytest.raises(pteron.DataError, match="numbers of single precision"):
         Exported(tmp_path / "single", ComputedTorque())
+    geared = replace(driven("delta"), name="geared")
+    drive = pteron.legs.Drive(rotor_inertia=1e-5, ratio=10.0)
+    geared = replace(geared, legs=tuple(replace(leg, drive=drive) for leg in geared.legs))
+    pteron.export_c(geared, [ComputedTorque()], tmp_path / "motors", output="torque")
+    with pytest.raises(pteron.DataError, match="gives commands of the motors; export with output"):
+        Exported(tmp_path / "motors", ComputedTorque())
     pteron.export_c("delta", [ComputedTorque()], tmp_path)
     with pytest.raises(pteron.DataError, match="no C of feed_forward_pd there"):
         Exported(tmp_path, FeedForwardPD())

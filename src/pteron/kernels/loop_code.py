@@ -83,11 +83,16 @@ class LinkedLaw:
         The function's name.
     tables : tuple of (str, str)
         For each input that is the machine's own, the array in the source that is passed.
+    zeros, scales : tuple of float
+        Of the drives' readings, which its joints and rates are: coordinate = zero + scale reading.
+        Its forces are along them.
     """
 
     source: str
     function: str
     tables: tuple[tuple[str, str], ...]
+    zeros: tuple[float, ...]
+    scales: tuple[float, ...]
 
     def arguments(self, block: Block) -> list[str]:
         """Return the arguments of its call that go in."""
@@ -95,6 +100,17 @@ class LinkedLaw:
         return [
             tables[port.name] if port.shared else f"given + {block.at[port.name]}"
             for port in block.program.inputs
+        ]
+
+    def readings(self, block: Block) -> list[tuple[int, float, float]]:
+        """Return the places of joints and rates among its inputs, with zeros and scales."""
+        zeros = {"joints": self.zeros, "joint_rates": (0.0,) * len(self.zeros)}
+        return [
+            (block.at[name] + i, zero, scale)
+            for name, own in zeros.items()
+            if name in block.at
+            for i, (zero, scale) in enumerate(zip(own, self.scales, strict=True))
+            if (zero, scale) != (0.0, 1.0)
         ]
 
 

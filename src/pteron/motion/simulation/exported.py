@@ -11,6 +11,7 @@ from pteron.controllers.law import Law
 from pteron.errors import DataError
 from pteron.kernels.loop_code import LinkedLaw
 from pteron.manipulator import RobotLike
+from pteron.manipulator.readings import reading_scales, reading_zeros
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Exported:
     """A controller whose exported C is compiled into the loop of `simulate`, as it is.
 
     The numbers are those of its tables, as on the machine: gains, inertial parameters, drives; the
-    `model` of `simulate` says only what memory begins with.
+    `model` of `simulate` says only what memory begins with, and what the drives read where they do
+    not count the joint coordinates.
 
     Parameters
     ----------
@@ -37,7 +39,7 @@ class Exported:
     Raises
     ------
     DataError
-        If the folder has no C of the law, or one of single precision.
+        If the folder has no C of the law, one of single precision, or one that commands motors.
 
     Examples
     --------
@@ -88,7 +90,8 @@ class Exported:
                         "export the controller for this machine"
                     )
                 tables.append((port.name, found[0]))
-        linked = LinkedLaw(header + source, function, tuple(tables))
+        zeros, scales = reading_zeros(own.model).tolist(), reading_scales(own.model).tolist()
+        linked = LinkedLaw(header + source, function, tuple(tables), tuple(zeros), tuple(scales))
         return ExportedLaw(own.what, own.model, own.gains, own.base, linked)
 
     def _read(self) -> tuple[str, str, str]:
@@ -101,6 +104,10 @@ class Exported:
                 if found[3] == "float":
                     raise DataError(
                         f'{path}: numbers of single precision; export with real="double"'
+                    )
+                if not re.search(rf"{found[1]}\([^)]*\bforces\b", header):
+                    raise DataError(
+                        f'{path}: {what} gives commands of the motors; export with output="force"'
                     )
                 source = path.with_suffix(".c").read_text(encoding="utf-8")
                 return header, re.sub(r'#include "[^"]*"', "", source), found[1]
