@@ -209,6 +209,24 @@ def test_a_machine_with_soft_drives_follows_its_cycle_alike_in_c_and_numpy(encod
     assert np.abs(fast.error).max() < 1e-2
 
 
+@pytest.mark.parametrize("encoder", ["motor", "joint"])
+def test_motors_lead_by_what_the_load_bends_and_a_log_has_what_encoders_tell(encoder):
+    robot = pteron.load("delta")
+    bends = Elastic(2e4, damping=40.0, backlash=1e-3, encoder=encoder)
+    soft = pteron.legs.Drive(rotor_inertia=0.05, elastic=bends)
+    machine = replace(robot, legs=(replace(robot.legs[0], drive=soft), *robot.legs[1:]))
+    start = np.array([0.0, 0.0, -1.0]), np.zeros(3)
+    held = pteron.inverse_dynamics(robot, *start, np.zeros(3))
+    found = simulate(machine, start=start, forces=held, duration=0.05)
+    lead = found.motors - found.joints
+    np.testing.assert_allclose(lead[:, 0], held[0] / 2e4 + 0.5e-3, rtol=1e-6)
+    np.testing.assert_array_equal(lead[:, 1:], 0.0)
+    log = found.table()
+    told = found.motors if encoder == "motor" else found.joints
+    np.testing.assert_array_equal(log["theta1"], told[:, 0])
+    np.testing.assert_array_equal(log["motor_theta1"], found.motors[:, 0])
+
+
 @pytest.mark.parametrize("lag", [None, 5e-4])
 def test_states_of_soft_drives_go_on_from_call_to_call(lag):
     robot = driven(pteron.load("delta"), replace(BENDS, coulomb=0.5, current_time=lag))

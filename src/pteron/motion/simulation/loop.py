@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from pteron.dynamics import drive_accelerations
+from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError
 from pteron.kernels import Array, Program
 from pteron.kernels.loops import loop, machine_numbers
@@ -173,7 +174,14 @@ def run(
             break
     done, fault = int(arrays["done"].item()), arrays["fault"].item()
     columns = {name: value[0, :done] for name, value in found.items()}
-    pose, velocity = columns["states"][:, :m], columns["states"][:, m : 2 * m]
+    pose, velocity, *more = np.split(columns["states"], np.cumsum([m, m, n, n]), axis=1)
+    bends = DriveKind.of(robot).elastic
+    motors, motor_rates = columns["joints"], columns["rates"]
+    if any(bends):
+        motors, motor_rates = (
+            np.where(bends, more[0], motors),
+            np.where(bends, more[1], motor_rates),
+        )
     why = None
     if fault == _ASKED:
         why = (
@@ -203,6 +211,8 @@ def run(
         columns["acceleration"][:end],
         columns["joints"][:end],
         columns["rates"][:end],
+        motors[:end],
+        motor_rates[:end],
         columns["forces"][:end],
         columns["asked"][:end],
         Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),

@@ -32,6 +32,8 @@ class Simulation:
         The platform's motion; m, rad and s. The acceleration is the one right after the sample.
     joints, joint_rates : array, shape (T, n)
         m and m/s; rad and rad/s at cranks.
+    motors, motor_rates : array, shape (T, n)
+        Those of the motors, counted at the joints, which differ where transmissions bend.
     forces : array, shape (T, n)
         Forces of the drives from this sample on, limits and delay included; N, N m at cranks.
     asked : array, shape (T, n)
@@ -55,6 +57,8 @@ class Simulation:
     acceleration: Array
     joints: Array
     joint_rates: Array
+    motors: Array
+    motor_rates: Array
     forces: Array
     asked: Array
     reference: Motion
@@ -119,19 +123,28 @@ class Simulation:
 
         Its columns are t; x y z phi, dx dy dz dphi, ddx ddy ddz ddphi and xref yref zref phiref,
         those that the machine has; its joints (rho1, theta2) and their rates (drho1, dtheta2);
-        forces (force1, torque2); and payload. Joints and forces are as the drives count them.
+        forces (force1, torque2); and payload. Joints and forces are as the drives count them: where
+        a transmission bends and its encoder is at the motor, the joint's columns are the motor's.
+        With such transmissions motor_rho1, ..., dmotor_rho1, ... are the motors' everywhere.
         """
         import polars as pl
 
         names, joints = self.robot.coordinates, self.robot.joint_names
         scales = reading_scales(self.robot)
+        bends = [leg.drive.elastic if leg.drive else None for leg in self.robot.legs]
+        behind = [one is not None and one.encoder == "motor" for one in bends]
+        told = np.where(behind, self.motors, self.joints)
+        rates = np.where(behind, self.motor_rates, self.joint_rates)
+        motors = [f"motor_{name}" for name in joints] if any(bends) else []
         blocks = (
             (names, self.pose),
             ([f"d{name}" for name in names], self.velocity),
             ([f"dd{name}" for name in names], self.acceleration),
             ([f"{name}ref" for name in names], self.reference.pose),
-            (joints, to_readings(self.robot, self.joints)),
-            ([f"d{name}" for name in joints], self.joint_rates / scales),
+            (joints, to_readings(self.robot, told)),
+            ([f"d{name}" for name in joints], rates / scales),
+            (motors, to_readings(self.robot, self.motors)[:, : len(motors)]),
+            ([f"d{name}" for name in motors], (self.motor_rates / scales)[:, : len(motors)]),
             (self.robot.force_names, self.forces * scales),
         )
         columns = {"t": self.time}
