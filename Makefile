@@ -16,8 +16,8 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: demo quick test tests clients nightly lint bench docs evidence first wheels clean
 
 demo: $(VENV)/.runtime
-	$(BIN)/pteron report quadrupteron --out demo
-	$(BIN)/pteron table1
+	$(BIN)/pteron report delta --out demo
+	@echo "Open demo/report.html in a browser. To drag the robot: $(BIN)/pteron view delta"
 
 # The gate: lint and tests side by side, some six minutes on two cores; tests/README.md says what waits
 # for `make nightly`.

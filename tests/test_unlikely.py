@@ -89,7 +89,8 @@ def test_bodies_that_pteron_wrote_are_not_doubted(tmp_path):
     values = pteron.parameters(robot)
     values[[name.startswith("mgx_l") for name in pteron.parameter_names(robot)]] *= -1.0
     odd = pteron.with_parameters(robot, values)
-    assert len(machine_warnings(odd)) == 3
+    (told,) = machine_warnings(odd)  # three legs alike
+    assert told.startswith("legs 1, 2 and 3: lower: center_of_mass: ")
     pteron.load(pteron.save(odd, tmp_path / "robot.toml"))  # a warning would be an error
 
 

@@ -36,7 +36,8 @@ def inverse(
     A table has the columns x y z phi or x y z roll pitch yaw, those that the machine has, in m and
     rad, or in units that their names say: x (mm), roll (deg). The result has its columns, in SI
     units, and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad, as the drives
-    count them where a leg has a `reading`.
+    count them where a leg has a `reading`. A crank is at 0 along its zero_direction and counts by
+    the right hand about its axis, `direction`; pteron check tells it of each joint.
 
     Arguments
     ---------

@@ -159,7 +159,7 @@ def check(file: str, *, elbows: str | None = None) -> Result:
     mode, above its base, below or inside, which is the file's and which is likely meant; of more
     than eight modes the file's, its opposite, and those with all elbows alike. What is possible
     but unlikely, such as a length in millimetres or a centre of mass beyond its link, is told as a
-    warning.
+    warning. The exit code is 2 where it fails, and 0 where not, warnings or none.
 
     Arguments
     ---------
@@ -255,14 +255,17 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
     singular = singular if robot.platform.angles and not robot.platform.tilts else []
     tool = [f"Tool: {_vector(found['tool'])} m from P, in the platform frame"]
     tool = tool if any(found["tool"]) else []
-    work = "[green]This machine can work.[/green]"
-    if found["doubts"]:
-        work = "[yellow]This machine can work, if the warnings are none.[/yellow]"
+    work = "[green]Fine: the file is valid. This machine can work.[/green]"
+    if doubts := len(found["doubts"]):
+        warnings = "the warning" if doubts == 1 else f"the {doubts} warnings"
+        work = f"[yellow]This machine can work, if {warnings} above can be left as is.[/yellow]"
+    joints = dict.fromkeys(leg.joint for leg in robot.legs)
     show(
         f"[bold]{plain(robot.name)}[/bold]: a {robot.platform.motion} machine with "
         f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
         f"working mode {signs(robot)}",
         table(*headings, rows=rows, numbers=("leg",)),
+        *(f"A {joint.noun} {joint.zero}." for joint in joints if joint.zero),
         *_drives(robot),
         *singular,
         f"Home pose: {_vector(found['home_pose'])}, margin {found['home_reserve']:.2f} of 1",

@@ -84,7 +84,8 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
         if "carried" in own:
             passed["carried"] = Carried.of(values["payload"], values["tool"])
         if "machine" in own:
-            passed["machine"] = load_robot(values["robot"], values["elbows"])
+            quiet = "warns" in vars(command)  # the command tells the file's warnings itself
+            passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
         found = command(**passed)
         if found is not None:
             found.tell(as_json=values["json"])

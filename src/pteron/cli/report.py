@@ -39,19 +39,19 @@ def report(
     pteron report quadrupteron --motion motion.csv --out report
     """
     with spinner(f"Writing the report on {machine.name}"):
-        from pteron.manipulator.machine_warnings import machine_warnings
         from pteron.report import write_report
 
         shown = None if motion is None else played(machine, motion)
         page = write_report(machine, out, motion=shown)
     found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
-    known = machine_warnings(machine, bodies=False)  # told where the machine was loaded
-    doubts = [text for text in found["doubts"] if text not in known]
-    warn([*doubts, *found["cycle"]["overloads"]])
+    warn([*found["doubts"], *found["cycle"]["overloads"]])
     cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
-    tables = _machine(found), _legs(found["cycle"], found["joints"]), _costs(found["costs"])
+    tables = _machine(found), _legs(found["cycle"], found["joints"])
     told = [*tables, f"Written to {plain(str(page))}"]
     return Result({"page": str(page), **found, "cycle": cycle}, told)
+
+
+vars(report)["warns"] = True
 
 
 def _machine(found: dict[str, Any]) -> Table:
@@ -89,8 +89,3 @@ def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
         unit, rate = joints[i - 1]["force_unit"], f"{joints[i - 1]['unit']}/s"
         rows.append((str(i), f"{peak:.3f} {unit}", f"{rms:.3f} {unit}", f"{speed:.3f} {rate}"))
     return table(*headings, rows=rows, numbers=headings, caption=of)
-
-
-def _costs(costs: list[dict[str, Any]]) -> Table:
-    rows = ((plain(cost["form"]), str(cost["operations"])) for cost in costs)
-    return table("inverse dynamics as", "operations", rows=rows, numbers=("operations",))

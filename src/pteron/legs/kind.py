@@ -25,18 +25,26 @@ from pteron.toml import told
 
 @dataclass(frozen=True)
 class ActuatedJoint:
-    """The names of an actuated joint: its columns, its units, and a noun for messages."""
+    """The names of an actuated joint: its columns, its units, a noun for messages, and its zero."""
 
     noun: str
     coordinate: str
     unit: str
     force: str
     force_unit: str
+    zero: str = ""
+    """Where the coordinate is 0, and which way it counts."""
 
 
-SLIDER = ActuatedJoint("slider", "rho", "m", "force", "N")
-CRANK = ActuatedJoint("crank", "theta", "rad", "torque", "N m")
-SHAFT = ActuatedJoint("shaft", "theta", "rad", "torque", "N m")
+_TURN = "rad", "torque", "N m"
+SLIDER = ActuatedJoint(
+    *("slider", "rho", "m", "force", "N"), "is at 0 at its guide_point and counts along its axis"
+)
+CRANK = ActuatedJoint(
+    *("crank", "theta", *_TURN),
+    "is at 0 along its zero_direction and counts by the right hand about its axis",
+)
+SHAFT = ActuatedJoint("shaft", "theta", *_TURN, "is at its ratio times phi")
 
 Role = Literal["point", "direction", "normal", "length", "number", "sign"]
 """The role of a quantity: a point or a unit vector in the base frame; a unit vector that no force

@@ -29,7 +29,7 @@ class RamLeg(LegKind):
 
     limits: tuple[float, float]
 
-    joint = ActuatedJoint("ram", "rho", "m", "force", "N")
+    joint = ActuatedJoint("ram", "rho", "m", "force", "N", "counts its length from end to end")
     branches = (1,)
     names: ClassVar = {"u": "cylinder", "l": "piston"}
     measure_text = "1 everywhere, as a ram pushes the platform point in every pose"

@@ -56,9 +56,12 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     if bodies and radius > 0.0 and not points and 0 not in far:
         found += [f"platform: {text}" for text in _spread(platform, radius)]
     axis = platform.rotation_axes[0] if len(platform.rotation_axes) == 1 else None
+    alike: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
         own = () if i in far else _leg_warnings(leg, platform, bodies)
-        found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis), *drive_warnings(leg))]
+        for text in (*own, *leg.doubts(axis), *drive_warnings(leg)):
+            alike.setdefault(text, []).append(i)
+    found += [f"{told_legs(legs)}: {text}" for text, legs in alike.items()]
     if axis is not None:
         found += _turning_offsets(robot.legs, axis, platform.angles[0])
     return tuple(found)
