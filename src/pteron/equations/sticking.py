@@ -61,7 +61,7 @@ class Motors(NamedTuple):
     current: Expression
     """Forces of the currents at the joints, where they lag behind."""
     bristle: Expression
-    """What the bristles of LuGre's friction are bent."""
+    """Deflections of the bristles of LuGre's friction."""
     pace: Expression
     """Greatest rate, 1/s, at which these follow."""
 

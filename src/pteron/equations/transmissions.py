@@ -20,7 +20,7 @@ from pteron.manipulator import Manipulator
 
 @dataclass(frozen=True)
 class DriveKind:
-    """What the drives of a machine's joints have, joint by joint."""
+    """The features of the drives of a machine's joints, joint by joint."""
 
     dry: bool
     """Whether some have dry friction."""

@@ -51,7 +51,7 @@ TOLD = {
     "motor_rates": "measured + 3 * N",
     "memory": "memory",
 }
-"""What a controller may be told, and where the loop's C has it."""
+"""The inputs that a controller may have, and where the loop's C has them."""
 
 _RIGID = {"motors": TOLD["joints"], "motor_rates": TOLD["joint_rates"]}
 """The same where no transmission bends."""

@@ -22,7 +22,7 @@ Ask = Callable[[int, int, Array], Array]
 """Gives the forces of a machine at a sample from its measured joints and their rates, (2 n,)."""
 
 READINGS = ("joints", "joint_rates", "motors", "motor_rates")
-"""What the encoders tell a controller."""
+"""Names of the encoders' coordinates and rates among a controller's inputs."""
 
 _TURN = 2.0 * np.pi
 

@@ -17,5 +17,5 @@ KINDS: dict[str, tuple[str, str]] = {
     "3-prr": ("base_radius platform_radius", "xy"),
     "3-rpr": ("base_radius platform_radius", "xy"),
 }
-"""Of each kind the dimensions that vary beside the size, and the coordinates of its place that do:
+"""The dimensions of each kind that vary beside the size, and the coordinates of its place that do:
 the others are those of its plane or axis of symmetry."""

@@ -34,7 +34,7 @@ class _Arm(NamedTuple):
     """A crank as Klipper has it: its shoulder, and its angle, lift q + zero, from the level."""
 
     number: int
-    """Of its leg, from 1."""
+    """The leg's, from 1."""
     limits: tuple[float, float] | None
     shoulder: Array
     out: Array
