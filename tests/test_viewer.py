@@ -716,6 +716,15 @@ def test_what_is_typed_wrongly_is_told_on_the_page(page, viewer):
     said(page, "at rest")
     assert viewer.wait(10.0)
     assert np.allclose(viewer.state.pose, [0.01, 0.02, 0.03, 0.0], atol=1e-12)
+    for text, shown in (
+        ("12,5", 12.5),
+        ("far", 12.5),
+    ):  # a decimal comma; no number
+        page.fill("#pose0n", text)
+        page.press("#pose0n", "Tab")
+        wait_for(page, "x => document.getElementById('pose0n').value === String(x)", shown)
+        assert viewer.wait(10.0)
+        assert np.isclose(viewer.state.pose[0], 0.0125, atol=1e-12)
 
 
 @CLIENTS

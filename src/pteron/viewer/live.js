@@ -122,7 +122,7 @@
     if (state.pushing) {
       const grip = nearest(corners, (p) => p);
       if (away(grip) > 45) return null;
-      const pull = (px, py) => send({ do: "pull", grip, to: picture.given(picture.under(px, py, picture.deep(grip))), stiffness: Number(the("stiffness").value) || state.stiffness });
+      const pull = (px, py) => send({ do: "pull", grip, to: picture.given(picture.under(px, py, picture.deep(grip))), stiffness: typed(the("stiffness")) || state.stiffness });
       pull(x, y);
       return { move: pull, end: () => send({ do: "release" }) };
     }
@@ -171,11 +171,12 @@
   }
 
   // What people do.
+  function typed(field) { const said = field.value.trim().replace(",", "."), value = Number(said); return said !== "" && Number.isFinite(value) ? value : null; }
   for (const [name, what] of [["pose", "coordinate"], ["joint", "joint"]]) {
     every(`input[type=range][id^=${name}]`).forEach((slider, i) => {
       const ask = (value) => { if (value !== "" && Number.isFinite(Number(value))) send({ do: what, i, value: Number(value) }); };
       slider.addEventListener("input", () => { touched[slider.id] = performance.now(); the(slider.id + "n").value = slider.value; ask(slider.value); });
-      the(slider.id + "n").addEventListener("change", (event) => ask(event.target.value));
+      the(slider.id + "n").addEventListener("change", (event) => { if (typed(event.target) === null) event.target.value = slider.value; else ask(typed(event.target)); });
     });
   }
   const on = (id, event, act) => the(id).addEventListener(event, act);
@@ -209,7 +210,7 @@
   fold(window.matchMedia("(max-width: 759px)").matches);
   the("legend").open = window.matchMedia("(min-width: 1000px) and (min-height: 700px)").matches;
   document.addEventListener("keydown", (event) => {
-    if ((event.ctrlKey || event.metaKey) && event.key === "z" && !event.target.matches("input[type=text], input[type=number]")) { event.preventDefault(); send({ do: "undo" }); }
+    if ((event.ctrlKey || event.metaKey) && event.key === "z" && !event.target.matches("input[type=text]")) { event.preventDefault(); send({ do: "undo" }); }
   });
 
   // A link that carries pose, modes and looks.
