@@ -224,13 +224,16 @@ def turned(pose):
     return np.array([c * pose[0] - s * pose[1], s * pose[0] + c * pose[1], *pose[2:]])
 
 
-@pytest.mark.parametrize(("pose", "known"), [pytest.param(*SEEN[0], marks=NIGHTLY), SEEN[1]])
-def test_singular_poses_at_the_edge_of_the_reach_are_found(pose, known):
+@pytest.mark.parametrize(
+    ("pose", "known", "most"),
+    [(*SEEN[1], 1000), *(pytest.param(*seen, 4000, marks=NIGHTLY) for seen in SEEN)],
+)
+def test_singular_poses_at_the_edge_of_the_reach_are_found(pose, known, most):
     robot = CATALOG["delta"]
-    found = nearest_singularities(robot, pose, most=4000)
+    found = nearest_singularities(robot, pose, most=most)
     (two,) = [one for one in found if one.kind == "II"]
     assert two.distance < known
-    assert 0.6 * two.distance < two.lower_bound < two.distance
+    assert (0.6 if most > 1000 else 0.1) * two.distance < two.lower_bound < two.distance
     assert abs(two.measure) <= 1e-10
     assert (numeric(robot, "squared_type_i")(two.pose)[0] > -1e-9).all()
     # What symmetry makes equal is told alike, leg by leg.

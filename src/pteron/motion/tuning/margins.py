@@ -48,7 +48,7 @@ class Margins:
     Examples
     --------
     >>> from pteron.motion import tune
-    >>> margins = tune("five-bar").margins[0]
+    >>> margins = tune("five-bar", poses=[[0.0, 0.12]]).margins[0]
     >>> bool(margins.common_gain <= margins.gain.min())
     True
     """
@@ -78,15 +78,17 @@ class Margins:
     @cached_property
     def common_gain(self) -> float:
         """The smallest factor above 1 on all forces for which a pole reaches the unit circle."""
+        matrix, inputs, asked = self.loop.opened()
+        fed_back = inputs @ asked
         return self._stable and 1.0 + _first(
-            lambda more: radius(self.loop.closed(1.0 + more)), 1.0, 1
+            lambda more: radius(matrix + (1.0 + more) * fed_back), 1.0, 1
         )
 
     @cached_property
     def common_delay(self) -> float:
         """The smallest further delay of all forces for which one does, s."""
         return self._stable and _first(
-            lambda more: radius(self.loop.closed(more=more)), self.loop.period, 0
+            lambda more: radius(self.loop.closed(more)), self.loop.period, 0
         )
 
     @cached_property

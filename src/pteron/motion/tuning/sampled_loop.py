@@ -90,10 +90,10 @@ class SampledLoop:
         inputs[waiting[0]] = np.eye(n)
         return matrix, inputs, asked
 
-    def closed(self, gain: float = 1.0, more: float = 0.0) -> Array:
-        """Return the closed loop's matrix, all forces times a gain and delayed more, s."""
+    def closed(self, more: float = 0.0) -> Array:
+        """Return the closed loop's matrix, all forces delayed more, s."""
         matrix, inputs, asked = self.opened(more)
-        return matrix + gain * inputs @ asked
+        return matrix + inputs @ asked
 
     @cached_property
     def poles(self) -> Array:
