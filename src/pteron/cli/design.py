@@ -53,7 +53,7 @@ def design(
     -------
     --out FOLDER: Write the results to a folder, and go on there if ended.
     --seed: Of all chance. [default: the file's]
-    --sweep: Evaluate so many designs spread evenly, instead of a search.
+    --sweep: Evaluate so many designs spread evenly, in whole files of 256, instead of a search.
     --workers: Processes that do the work. [default: this one]
 
     Examples
