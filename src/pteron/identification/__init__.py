@@ -85,6 +85,10 @@ if TYPE_CHECKING:
         States as States,
         preprocessing_of as preprocessing_of,
     )
+    from pteron.identification.transmissions import (
+        Transmissions as Transmissions,
+        identify_transmissions as identify_transmissions,
+    )
     from pteron.verdict import Verdict as Verdict
 
 _publish(__name__, checked=True)
