@@ -37,7 +37,7 @@ _ACROSS = 2e-3
 
 @dataclass(frozen=True)
 class Transmissions:
-    """What bends between motors and joints: load = stiffness bent + damping bent'.
+    """Transmissions between motors and joints: load = stiffness bent + damping bent'.
 
     Attributes
     ----------
