@@ -255,7 +255,8 @@ def test_the_numbers_are_the_librarys(name):
     np.testing.assert_allclose(expected, forces, atol=1e-10)
     assert cycle["with_drives"] == (np.abs(forces - rigid).max() > 1.0) == (name == "driven")
     assert [text[:5] for text in cycle["overloads"]] == (["leg 3"] if name == "driven" else [])
-    assert data["drives"][1] == (asdict(robot.legs[1].drive) if name == "driven" else None)
+    drive = strict(json.dumps(asdict(robot.legs[1].drive))) if name == "driven" else None
+    assert data["drives"][1] == drive
     # The report looks between the samples too.
     np.testing.assert_allclose(np.abs(forces).max(axis=0), cycle["peak_forces"], rtol=1e-3)
     mean = np.trapezoid(forces**2, cycle["time"], axis=0) / cycle["duration"]
@@ -293,8 +294,9 @@ def test_the_numbers_are_the_librarys(name):
 def test_the_page_shows_the_numbers(name):
     found, text = report(name), read(name).text
     loads = found.sizing
-    for value in (*loads.peak_forces, *loads.rms_forces, *loads.peak_speeds, *loads.peak_power):
-        assert significant(float(value)) in text
+    for values in (loads.peak_forces, loads.rms_forces, loads.peak_speeds, loads.peak_power):
+        for value in values[values > 1e-12 * values.max()]:  # the rest is rounding
+            assert significant(float(value)) in text
     joints = {leg.joint.noun: leg.joint.force_unit for leg in found.robot.legs}
     for noun in ("slider", "crank", "shaft"):
         assert (noun in text.replace("the slider is tilted", "")) == (noun in joints)

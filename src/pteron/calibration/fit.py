@@ -17,6 +17,7 @@ from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import KINDS, Measurements
 from pteron.calibration.residuals import MachineSlopes, Rows
 from pteron.errors import DataError
+from pteron.kinematics import direct_kinematics
 
 Array = NDArray[np.float64]
 
@@ -170,7 +171,7 @@ class Fitter:
                 "and order"
             ) from None
         for _ in range(_ROUNDS):
-            at = self._settled(at)
+            at = self._found_again(self._settled(at))
             noise = at.noise | self._noise(at, sought)
             scaled = at.distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
             limits = scipy.stats.chi2.isf(
@@ -185,6 +186,19 @@ class Fitter:
             again = self._at(at.guess, at.total, at.poses, noise, kept)
             at = replace(again, steps=at.steps)
         return replace(at, shared=self._shared(at))
+
+    def _found_again(self, at: Fit) -> Fit:
+        """Return the fit with the poses of rows that Newton's steps lost on their way."""
+        lost = np.flatnonzero(at.distances >= BEYOND)
+        if not len(lost):
+            return at
+        joints, poses = at.guess.joints(self.given.readings)[lost], at.poses.copy()
+        for i, modes in zip(lost, direct_kinematics(at.guess.robot, joints), strict=True):
+            off = np.abs(modes - self.begin_poses[i]).max(axis=-1)
+            if np.isfinite(off).any():
+                poses[i] = modes[np.nanargmin(off)]
+        again = self._at(at.guess, at.total, poses, at.noise, at.kept)
+        return replace(again, steps=at.steps)
 
     def _settled(self, begin: Fit) -> Fit:
         """Return the most probable values for a noise and rows that are kept."""
