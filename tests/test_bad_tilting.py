@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
-from mechanisms import NIGHTLY, TILTED
+from mechanisms import CLIENTS, NIGHTLY, TILTED
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from test_cli import run
@@ -77,6 +77,7 @@ def test_figures_of_rams_that_balance_at_every_pose(base, top, reason):
         assert "rams that push with (" in pteron.kinematics.architecture(oblique).reason
 
 
+@CLIENTS
 def test_equal_plates_are_told_to_move_with_their_rams_held(tmp_path):
     robot = TILTED["stewart"]
     azimuths = np.radians([-10.0, 10.0, 110.0, 130.0, 230.0, 250.0])

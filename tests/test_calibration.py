@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import tilting
 from calibrated import GEOMETRY, NOISE, PRINTERS, measured, off_drawing, printer, tool_places
-from mechanisms import NIGHTLY, gated
+from mechanisms import CLIENTS, NIGHTLY, gated
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -343,6 +343,7 @@ def test_rows_that_a_fault_explains_are_not_listed_one_by_one():
     assert left.startswith("Left out, as it does not fit: row 18 (off by 5.0")
 
 
+@CLIENTS
 def test_an_instrument_and_a_mark_that_moved_are_told_apart_where_the_platform_turns():
     robot = pteron.load("quadrupteron")
     given, step = measured(robot), np.array([0.0, 4e-4, 3e-4])
@@ -495,6 +496,7 @@ def test_rows_without_a_measurement_or_a_pose_do_not_touch_the_noise():
     np.testing.assert_allclose(*[[noise, *total] for noise, _, *total in found], rtol=0.01)
 
 
+@CLIENTS
 def test_intervals_hold_where_many_distances_share_a_rows_readings():
     robot, rows, held = pteron.load("linear-delta"), 41, []
     origins = np.where(np.arange(rows) > 0, 0, -1)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from logs_of_motions import machine
-from mechanisms import CATALOG, states
+from mechanisms import CATALOG, CLIENTS, states
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
@@ -202,6 +202,7 @@ def test_without_a_covariance_the_distance_is_relative():
     assert "no covariance" in result.summary()
 
 
+@CLIENTS
 def test_the_projection_against_a_general_optimiser():
     """An interior-point method on a Tripteron whose legs share: 13 unknowns, 3 bodies."""
     robot = CATALOG["tripteron"]

@@ -45,6 +45,7 @@ def test_it_moves_as_its_derivatives_say():
         np.testing.assert_allclose(slope, rate[inner], atol=0.02 * np.abs(rate).max())
 
 
+@CLIENTS
 def test_no_pose_leaves_the_box_whatever_the_vehicle_does():
     rng = np.random.default_rng(0)
     wild = {name: 50.0 * rng.normal(size=len(TIME)) for name in NONE}

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from logs_of_motions import log_of, truth
-from mechanisms import CATALOG, gated
+from mechanisms import CATALOG, CLIENTS, gated
 from scipy.signal import lfilter
 from scipy.stats import binom
 
@@ -303,6 +303,7 @@ def test_coloured_noise_is_seen_and_allowed_for(estimator):
     assert (np.abs(errors) < 1.96).mean() > 0.92
 
 
+@CLIENTS
 @pytest.mark.parametrize("estimator", [ordinary, weighted, huber])
 def test_regions_hold_the_truth(estimator):
     # Two pairs of columns are all but the same: what is known of each single one says little.

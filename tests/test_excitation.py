@@ -284,6 +284,7 @@ def test_every_limit_binds_when_it_is_the_tight_one(limits: Limits, space: str):
     assert found[tight].least < 0.01 * scale
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     "search", gated([random_excitation, optimal_excitation], [optimal_excitation])
 )
@@ -374,6 +375,7 @@ def test_a_column_that_is_short_beside_others_counts_as_so_much_worse():
     assert found == pytest.approx(expected)
 
 
+@CLIENTS
 def test_a_motion_that_moves_everything_is_sought():
     # A turn of a hundredth of a radian shows the shaft's values as well as any, made length 1.
     limits = Limits(acceleration=40.0)
@@ -425,7 +427,7 @@ def test_the_measure_of_the_volume_is_the_log_det():
 @pytest.mark.parametrize(
     ("robot", "space", "gain"),
     [
-        ("tripteron", "platform", 2.0),
+        pytest.param("tripteron", "platform", 2.0, marks=NIGHTLY),
         pytest.param("quadrupteron", "joints", 3, marks=NIGHTLY),
         pytest.param("delta", "platform", 2.0, marks=NIGHTLY),
         ("mixed", "joints", 3.0),
@@ -444,6 +446,7 @@ def test_the_search_finds_better_than_random_and_keeps_every_limit(robot, space,
     assert any(start.finished for start in found.starts)
 
 
+@CLIENTS
 def test_the_other_criterion_makes_the_volume_smaller():
     found = small("logdet")
     assert found.criterion == "logdet"
@@ -451,6 +454,7 @@ def test_the_other_criterion_makes_the_volume_smaller():
     assert found.margins.kept
 
 
+@CLIENTS
 def test_a_search_on_oblique_axes_with_force_limits_keeps_them():
     robot = CATALOG["tripteron-oblique"]
     limits = Limits(speed=0.3, acceleration=1.5, force=(11.0, 24.0, 33.0))
@@ -476,6 +480,7 @@ def test_processes_find_the_same_as_this_one_and_so_does_the_seed_again():
     assert (other.coefficients == same.coefficients).all()
 
 
+@CLIENTS
 def test_starts_whose_processes_fail_are_improved_here(monkeypatch):
     monkeypatch.setattr("sys.executable", "/bin/false")
     found = optimal_excitation(
@@ -576,11 +581,11 @@ def test_what_the_search_cannot_do_is_refused(given: dict, words: str):
 
 
 def test_the_table_for_the_controller(tmp_path: Path):
-    found = small("condition", "joints", "quadrupteron")
+    found = small()
     robot = found.motion.robot
     path = found.write_csv(tmp_path / "motion.csv", rate=50.0, periods=2)
     frame = pl.read_csv(path)
-    legs, pose = range(1, 5), robot.coordinates
+    legs, pose = range(1, 4), robot.coordinates
     assert frame.columns == [
         "t",
         *(f"rho{i}" for i in legs),

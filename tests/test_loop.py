@@ -5,6 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from mechanisms import CLIENTS
 from structured_text import Block, read
 
 import pteron
@@ -68,6 +69,7 @@ def integrating():
     return Custom(function, parameters={"gains": [4e3, 90.0, 8e3]}, memory=REST), Called()
 
 
+@CLIENTS
 def test_an_expression_is_the_controller_that_python_calls(monkeypatch):
     robot = driven("tripteron")
     motion = pick_and_place(robot, REST, least=0.1)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from mechanisms import CLIENTS
 
 import pteron
 from pteron.controllers import ComputedTorque
@@ -42,6 +43,7 @@ def one(machines, k):
     return with_payload(replace(robot, legs=legs), machines.payload[k])
 
 
+@CLIENTS
 def test_each_machine_is_what_simulate_makes_of_it(robot, tmp_path, monkeypatch):
     machines = machines_about(
         robot, 11, masses=0.2, friction=0.5, rotors=0.1, payload=(0.0, 0.5), seed=7

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, in_turn
+from mechanisms import CATALOG, CLIENTS, in_turn
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
@@ -200,6 +200,7 @@ def test_the_platform_s_angle_has_limits_too():
     assert (at.noun, at.value, at.least, at.most) == ("phi", 0.2, -0.7, 0.5)
 
 
+@CLIENTS
 def test_check_tells_where_they_are_at_home(tmp_path):
     file = str(pteron.save(limited("3-rrr", elbow_limits=(0.2, 3.0)), tmp_path / "robot.toml"))
     text = CliRunner().invoke(app, ["check", file]).stdout

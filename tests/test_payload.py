@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from logs_of_motions import log_of, machine
-from mechanisms import NIGHTLY
+from mechanisms import CLIENTS, NIGHTLY
 
 import pteron
 from pteron.bodies.inertia import SpatialInertia
@@ -28,7 +28,7 @@ EACH = pytest.mark.parametrize(
     ("name", "processing"),
     [
         *(
-            pytest.param(name, None, marks=() if name in SOME else NIGHTLY)
+            pytest.param(name, None, marks=CLIENTS if name in SOME else NIGHTLY)
             for name in (*SOME, "five-bar", "quadrupteron", "delta-4", "random 3T 0", *OTHERS)
         ),
         ("quadrupteron-oblique", CENTRAL),

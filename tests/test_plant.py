@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import several
+from mechanisms import CLIENTS, several
 
 import pteron
 from pteron.identification import (
@@ -76,6 +76,7 @@ def test_its_forces_are_those_of_the_model(name, duration):
     assert np.sqrt((off**2).mean()) < 1e-4 * np.sqrt((recording.forces**2).mean())
 
 
+@CLIENTS
 def test_it_is_identified_through_its_sensors():
     robot, built, friction, recording = recorded("tripteron", 2.5)
     import plant

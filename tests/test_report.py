@@ -374,6 +374,7 @@ def test_the_platforms_inertia_is_told_with_all_its_parts():
     assert [name for name, leg, _ in bodies(MACHINES["delta"]) if leg is None] == ["platform"]
 
 
+@CLIENTS
 def test_the_condition_number_mixes_no_units():
     # In millimetres a machine is the same machine.
     robot = CATALOG["quadrupteron"]

@@ -6,7 +6,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 import pytest
-from mechanisms import CATALOG, NIGHTLY, gated, random_machine, scaled, unit
+from mechanisms import CATALOG, CLIENTS, NIGHTLY, gated, random_machine, scaled, unit
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -224,6 +224,7 @@ def turned(pose):
     return np.array([c * pose[0] - s * pose[1], s * pose[0] + c * pose[1], *pose[2:]])
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("pose", "known", "most"),
     [(*SEEN[1], 1000), *(pytest.param(*seen, 4000, marks=NIGHTLY) for seen in SEEN)],

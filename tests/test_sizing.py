@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, NIGHTLY, gated, in_turn, random_machine, with_elbows
+from mechanisms import CATALOG, CLIENTS, NIGHTLY, gated, in_turn, random_machine, with_elbows
 
 import pteron
 from pteron.motion import (
@@ -240,6 +240,7 @@ def test_places_are_those_that_a_loop_over_all_finds(name, wider):
     assert span.greatest == pytest.approx(min(s.greatest for s in spans), rel=1e-9)
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", gated(["quadrupteron", "par4"], ["quadrupteron"], NIGHTLY))
 def test_the_platform_turns_with_the_cycle(name):
     robot = CATALOG[name]

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 import tilting
-from mechanisms import NIGHTLY
+from mechanisms import CLIENTS, NIGHTLY
 
 import pteron
 from pteron.errors import DataError, ModelError
@@ -54,6 +54,7 @@ def test_every_pose_of_the_largest_tilt_serves_and_not_all_beyond(motion, kinds)
     assert beyond == 1.55 or not keeps(robot, asked, leaning(robot, home, beyond)).all()
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("motion", "kinds"), [("1T2R", ("RPS",)), pytest.param("3T3R", ("UPS",), marks=NIGHTLY)]
 )
@@ -102,6 +103,7 @@ def rams_apart(robot, poses, count=60):
     )
 
 
+@CLIENTS
 def test_a_tilt_keeps_the_legs_apart():
     robot = pteron.load("wrist")
     home, thick = np.zeros(3), 0.06

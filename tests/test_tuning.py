@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanisms import CLIENTS
 from typer.testing import CliRunner
 
 import pteron
@@ -223,6 +224,7 @@ def test_margins_hold_in_the_motion_and_the_workspace() -> None:
     assert 0.0 < tuned.least["disk"] < 2.0
 
 
+@CLIENTS
 def test_trials_tell_errors_and_why_one_ended() -> None:
     robot = driven("five-bar")
     motion = pick_and_place(robot)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from logs_of_motions import Friction, log_of, machine
+from mechanisms import CLIENTS
 from scipy.interpolate import make_interp_spline
 
 import pteron
@@ -39,6 +40,7 @@ def test_speeds_are_found_without_noise():
     np.testing.assert_allclose(result.estimate.values, truth(result), rtol=0, atol=2e-4)
 
 
+@CLIENTS
 def test_intervals_allow_for_speeds_and_delay_that_are_not_known():
     robot, held, clear = machine("tripteron"), 0, 0
     both = {"terms": Terms(stribeck="auto"), "processing": Processing(delay="auto"), "cad": None}

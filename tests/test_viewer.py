@@ -181,7 +181,7 @@ def test_where_the_forces_are_not_determined_the_page_says_why():
     assert '<span class="close">close</span>' in page
 
 
-@pytest.mark.parametrize("name", gated(MECHANISMS))
+@pytest.mark.parametrize("name", gated(MECHANISMS, ["delta", "tripteron-oblique"]))
 def test_every_machine_is_pushed_by_a_spring_and_stays_where_it_may_be(name):
     robot = MECHANISMS[name]
     session = Session(robot)
@@ -322,6 +322,7 @@ def test_a_motion_plays_in_its_own_time(sessions):
     assert not session.state.velocity.any()
 
 
+@CLIENTS
 def test_what_was_done_is_undone_and_spans_end_where_the_machine_stops(homes):
     session = Session(homes["3-rrr"].robot)
     session.remember()
