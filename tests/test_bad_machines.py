@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, NIGHTLY
+from mechanisms import CATALOG, CLIENTS, NIGHTLY
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -386,6 +386,7 @@ def test_rods_too_short_to_meet_are_named_with_what_they_lack(name, change, word
     )
 
 
+@CLIENTS
 def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named(monkeypatch):
     monkeypatch.setenv("PTERON_KERNELS", "auto")  # millions of poses are drawn
 

@@ -112,6 +112,7 @@ def test_a_printers_radius_and_angles_have_an_exact_rank():
     assert ranks(robot, given, poses, ["radius", "angles", "zeros", "lengths"]) == (11, 11)
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("name", "equal", "count"),
     [("linear-delta", False, 15), ("delta", True, 20), ("delta", False, 21)],
@@ -413,6 +414,7 @@ def test_swapped_marks_are_told_in_an_unknown_frame_too():
         calibrate(robot, swapped, free=GEOMETRY)
 
 
+@CLIENTS
 def test_what_is_measured_at_planned_places_is_trusted():
     """Near phi = 90 degrees, where J is singular, tolerances lead far away."""
     robot = pteron.load("quadrupteron")

@@ -219,6 +219,7 @@ def test_random_poses_agree_with_the_paving(name):
     np.testing.assert_allclose(np.cumsum([*volumes]), [found.inner_volume, found.outer_volume])
 
 
+@CLIENTS
 def test_volumes_enclose_the_quadrature_and_closed_forms():
     found = paving(QUADRUPTERON, np.zeros(4), tolerance=0.05)
     sum_ = quadrature_volume(QUADRUPTERON, np.zeros(4), lines=40)

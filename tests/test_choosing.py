@@ -77,6 +77,7 @@ def test_a_chosen_machine_keeps_what_was_asked(chosen, tmp_path):
     assert one.figures["shortest_time"] < 0.3
 
 
+@CLIENTS
 def test_a_finished_kind_is_not_searched_again(chosen, tmp_path):
     first, folder = chosen
     again = choose_machine(of(), folder=folder)

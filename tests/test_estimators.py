@@ -706,6 +706,7 @@ def test_likelihood_agrees_with_weights_where_positions_are_good():
     assert (hasty.converged, hasty.iterations) == (False, 1)
 
 
+@CLIENTS
 def test_likelihood_is_better_where_positions_are_noisy():
     worse = []
     for seed in range(2):

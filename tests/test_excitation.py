@@ -625,6 +625,7 @@ def run(line: str):
 QUICK = "--harmonics 2 --period 4 --starts 1 --draws 4 --workers 1"
 
 
+@CLIENTS
 def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run(f"excite tripteron {QUICK} --out motion.csv --rate 100")

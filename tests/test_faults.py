@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from logs_of_motions import Friction, log_of, machine
-from mechanisms import NIGHTLY, gated, random_machine
+from mechanisms import CLIENTS, NIGHTLY, gated, random_machine
 from scipy.interpolate import make_interp_spline
 
 import pteron
@@ -105,6 +105,7 @@ def test_a_delay_that_is_given_is_exact(derivatives):
     assert np.abs(values - base.values(robot)).max() < 1e-7 * np.abs(values).max()
 
 
+@CLIENTS
 def test_a_force_out_of_scale_is_named():
     robot, log, _ = clean("par4")
     first, _ = named(robot, noisy(replace(log, forces=log.forces * [1.0, 1.0, 1.07, 1.0])))

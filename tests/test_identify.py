@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 from logs_of_motions import Friction, log_of, machine, truth
-from mechanisms import CATALOG, NEAREST, gated, random_machine
+from mechanisms import CATALOG, CLIENTS, NEAREST, gated, random_machine
 
 import pteron
 from pteron.bodies.parameters import body_places
@@ -440,6 +440,7 @@ def test_one_wild_force_is_no_flipped_sign():
     assert "sign" not in str(caught.value)
 
 
+@CLIENTS
 def test_values_far_from_the_drawing_are_doubted():
     legs = [
         replace(leg, elbow=-leg.elbow) if i == 2 else leg for i, leg in enumerate(QUADRUPTERON.legs)
@@ -536,6 +537,7 @@ def test_the_worst_recording_decides():
     assert verdict_of([good, bad, good], repeats=False).grade == "not trustworthy"
 
 
+@CLIENTS
 def test_wrong_geometry_is_not_trusted():
     built = replace(
         QUADRUPTERON,

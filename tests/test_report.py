@@ -433,6 +433,7 @@ def test_the_measures_show_what_is_reached():
             assert 0 < reached[0] < reached[-1] < len(inside) - 1
 
 
+@CLIENTS
 def test_symbols_stand_for_their_numbers():
     for base in (report("quadrupteron").base, report("delta").base):
         found = in_symbols(base)

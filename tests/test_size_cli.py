@@ -75,6 +75,7 @@ def test_a_program_gets_all_numbers_and_a_pipe_what_a_person_sees(driven: str, m
     assert done(f"size {driven}").split() == text.split()
 
 
+@CLIENTS
 def test_payload_dwell_and_duration_count(driven: str):
     asked = "--payload 0.4 --dwell 0.2 --duration 0.5"
     data = json.loads(done(f"size {driven} {asked} --within here --json"))

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 from differences import along as derivative
-from mechanisms import CATALOG, MECHANISMS, NIGHTLY, gated, random_machine, states
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, NIGHTLY, gated, random_machine, states
 from typer.testing import CliRunner
 
 import pteron
@@ -190,6 +190,7 @@ def test_a_polynomial_rests_at_both_ends(law):
     assert law == "quintic" or abs(float(begin)) < 1e-12
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", PATHS)
 def test_a_path_is_smooth_in_what_it_has_gone(name):
     for path in paths(name):

@@ -96,6 +96,7 @@ def still(pose: np.ndarray) -> pteron.motion.Motion:
     return pteron.motion.Motion(np.array([0.0, 1.0]), rest + pose, rest, rest)
 
 
+@CLIENTS
 def test_margins_of_drives_that_bend_are_those_of_simulation() -> None:
     robot = bending(driven("five-bar"))
     home = home_pose(robot)
@@ -211,6 +212,7 @@ def test_other_laws_are_stable_just_within_their_margins(controller: Controller)
         assert sign * grows(robot, tuned.controller, home, delay=late, sensors=sensors) > 0.0
 
 
+@CLIENTS
 def test_margins_hold_in_the_motion_and_the_workspace() -> None:
     robot = driven("five-bar")
     motion = pick_and_place(robot)

@@ -67,6 +67,7 @@ def test_friction_that_does_not_fall_is_left_out_and_slow_passages_are_advised()
     assert result.as_dict()["unknowns"]["stribeck_speeds"] == [None] * 3
 
 
+@CLIENTS
 def test_a_payload_that_is_carried_at_the_end_of_a_log_is_fitted_with_a_delay():
     robot = machine("tripteron")
     inertia = pteron.bodies.PlanarInertia(robot.platform.inertia.mass + 0.4, (0.0, 0.0), 0.01)

@@ -242,6 +242,7 @@ def test_a_slice_holds_the_poses_in_reach(homes):
     assert list(choices(state.robot)) == ["none", "xy", "xz", "yz"]
 
 
+@CLIENTS
 def test_a_slice_along_an_angle_is_a_map():
     robot = pteron.load("ball-table")
     planes = choices(robot)

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, NIGHTLY, gated, random_machine, states
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, NIGHTLY, gated, random_machine, states
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -188,6 +188,7 @@ def test_home_respects_the_joints_limits():
     assert (joints < 0.05).all()
 
 
+@CLIENTS
 def test_machines_without_a_home_are_refused():
     robot = MECHANISMS["quadrupteron"]
     short = replace(

@@ -1,4 +1,4 @@
-"""The global conditioning index: the mean over reach of 1 / kappa, kappa the condition number."""
+"""The global conditioning index: the mean over reach of 1 / c, c the condition number."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _GROUPS = 16
 
 @dataclass(frozen=True)
 class GlobalConditioning:
-    """The mean of 1 / kappa over poses in reach.
+    """The mean of 1 / c over poses in reach.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ def global_conditioning(
     count: int = 1 << 16,
     seed: Seed = 0,
 ) -> GlobalConditioning:
-    """Return the global conditioning index: the integral of 1 / kappa over that of 1.
+    """Return the global conditioning index: the integral of 1 / c over that of 1.
 
     C. Gosselin, J. Angeles, Journal of Mechanical Design 113 (1991) 220-226. The integrals are
     over the poses in reach within the joints' limits, by scrambled Sobol points.
@@ -67,7 +67,7 @@ def global_conditioning(
     box : array, shape (2, m), optional
         Least and greatest pose; in place of that, all poses in reach in this box count.
     points : bool
-        Whether kappa is that of `condition_points` instead of `condition`.
+        Whether c is that of `condition_points` instead of `condition`.
     count : int
         Number of poses, rounded up to 16 times a power of two.
     seed : int
@@ -114,7 +114,7 @@ def global_conditioning(
         poses[:, free] += unit * (high - low)[free]
         margin = numeric(robot, "reach")(poses)[0]
         inside = np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0
-        # At the very edge of reach the index is not defined, and 1 / kappa is 0.
+        # At the very edge of reach the index is not defined, and 1 / c is 0.
         values = np.nan_to_num(1.0 / np.asarray(evaluate(robot, name, poses[inside])))
         sums.append((values.sum(), inside.sum()))
     total, number = np.array(sums, dtype=float).T

@@ -1,4 +1,4 @@
-"""Kernel of joint coordinates and their slopes against the pose and the machine's geometry.
+"""Kernel of joint coordinates and their derivatives (slopes) by pose and geometry.
 
 The geometry, in the order of `equations.machine.numbers`, is an input: calibration changes it, and
 evaluates the slopes in exact arithmetic for the rank of measurements.
@@ -24,8 +24,8 @@ def slopes_program(robot: RobotLike) -> Program:
 
     Its outputs: `joints` (n,); `jacobian` (n, m), their slopes against the pose; `slopes` (n, k),
     each leg's against those numbers of the geometry that `slope_columns` names; `twists` (6, m),
-    the platform's twist against the pose's rates; `place` (3,) of P and `axes` (3, 3), the columns
-    of its rotation. Where planes hold the platform, or it turns about a point or axes that are
+    the platform's twist against the pose's rates; `place` (3,), where its point P is; `axes`
+    (3, 3), the columns of its rotation. Where planes hold the platform, or it turns about a point or axes that are
     part of the geometry, also `shifts` (6, k): its twist, at a given pose, against the geometry.
     """
     layout = bare(robot)

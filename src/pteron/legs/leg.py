@@ -1,8 +1,8 @@
 """The protocol of legs: read this page before writing another kind.
 
 A leg makes one actuated joint follow one point of the platform. It knows the platform only through
-the motion of that point, c, and the platform's rotation: its rows stand against (c', omega). A kind
-of leg is two classes in one file of this folder:
+the motion of that point, c, and the platform's rotation: its row of the Jacobian multiplies
+(c', omega). A kind of leg is two classes in one file of this folder:
 
 - a frozen dataclass under `LegKind` (`legs.kind`): the leg's data with its TOML keys and bodies
   (`keys`), and what of its geometry the equations need (`quantities`);
@@ -10,8 +10,8 @@ of leg is two classes in one file of this folder:
   motion of c and of the platform's rotation with that of its joint and its bodies (`motion`), says
   how far it reaches (`reach`) and where c lies for a given joint (`locus`).
 
-Two lines bind them: `MyLeg.equations_class = MyEquations`, and `pteron.legs.KINDS[MyLeg.type] =
-MyLeg`, after which files may name the kind.
+Two lines make a kind of them: `MyLeg.equations_class = MyEquations`, and
+`pteron.legs.KINDS[MyLeg.type] = MyLeg`, after which files may name the kind.
 
 A machine whose legs break this protocol is refused when it is made (`legs.protocol`).
 

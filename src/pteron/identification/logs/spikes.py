@@ -15,11 +15,11 @@ MARGIN = 64
 _WINDOW = 21
 """Differences whose median is the motion's own: the jumps of a group are fewer than half."""
 _USUAL = 20.0
-"""Least jump, over the 95th percentile of differences, beside the motion's own."""
+"""Least jump of a spike, as a multiple of the 95th percentile of all differences."""
 _SHARE_OF_JOINT, _SHARE_OF_FORCE = 0.01, 0.5
 """Least jump, as a share of a channel's span; friction and stops make forces jump."""
 _FASTER = 3.0
-"""Least jump of a joint, over its differences nearby: a fast move is no jump."""
+"""Least jump of a joint, as a multiple of the differences nearby: a fast move is no jump."""
 _BACK = 0.25
 """Largest distance from the motion after a spike, as a share of the largest in it."""
 _SUDDEN = 0.5
@@ -28,11 +28,12 @@ edge, not a slope."""
 _REVERSING = 0.05
 """Speed, as a share of a joint's usual one, below which friction may turn."""
 _BEYOND = 0.1
-"""Outlier threshold of a force beyond its usual values, in their span, where friction may turn."""
+"""How far a force must lie beyond its usual values, as a share of their span, to stand out where
+friction may turn."""
 _UNUSUAL = 3.0
-"""Least acceleration of a stop beside those before and after, over that of nine of ten times."""
+"""Least acceleration of an emergency stop, as a multiple of its 90th percentile."""
 _RESTS, _MOVES = 0.1, 0.2
-"""Largest travel of joints at rest, and least in motion, as a share of their usual one."""
+"""Joints rest below the first share of their usual travel, and move above the second."""
 _MOST = 0.01
 """Largest share of the rows that is left out: where spikes are more, they are no exception."""
 

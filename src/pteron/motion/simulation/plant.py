@@ -1,4 +1,4 @@
-"""Integration of machines' motion under their drives' forces, and how long its steps may be."""
+"""The plant: the motion of machines under their drives' forces, and how long steps may be."""
 
 from __future__ import annotations
 
@@ -26,10 +26,13 @@ Method = Literal["rk4", "dop853"]
 """Runge and Kutta's method with fixed steps, or SciPy's DOP853, which chooses its steps."""
 
 Loads = Mapping[str, Array]
-"""Forces of the drives and wrench on the platform, (B, size)."""
+"""Forces of the drives and wrench on the platform by name, of B machines: (B, size)."""
 
 _STABLE = 2.0
-"""Greatest decay rate times step; Runge and Kutta's method of fourth order is stable to 2.78."""
+"""Greatest product of a step and the fastest decay rate, 1/s.
+
+Runge and Kutta's method of fourth order is stable to 2.78.
+"""
 
 _SHORTEST = 1e-8
 """A step that must be shorter than this, s, points to a mistake in the drives' numbers."""
