@@ -25,8 +25,9 @@ def slopes_program(robot: RobotLike) -> Program:
     Its outputs: `joints` (n,); `jacobian` (n, m), their slopes against the pose; `slopes` (n, k),
     each leg's against those numbers of the geometry that `slope_columns` names; `twists` (6, m),
     the platform's twist against the pose's rates; `place` (3,), where its point P is; `axes`
-    (3, 3), the columns of its rotation. Where planes hold the platform, or it turns about a point or axes that are
-    part of the geometry, also `shifts` (6, k): its twist, at a given pose, against the geometry.
+    (3, 3), the columns of its rotation. Where planes hold the platform, or it turns about a point
+    or axes that are part of the geometry, also `shifts` (6, k): its twist, at a given pose, against
+    the geometry.
     """
     layout = bare(robot)
     return kept(_key(layout), lambda: _built(layout))
