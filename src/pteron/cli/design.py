@@ -37,9 +37,9 @@ def design(
 
     The file names the machine to begin with, the numbers that may change, what must be kept
     (a workspace, which may float, floors and limits) and what is bounded, large or small: the
-    largest cube, the links' length, an index, accuracy, stiffness, forces with a payload, cycles
-    and a list of motors, ... A search of several objectives has a front of best
-    designs, each better than any other in something.
+    largest cube, the links' length, an index, accuracy, stiffness, or what motors from a list
+    must give to drive cycles with a payload. A search of several objectives ends in a front: the
+    designs that no other beats in everything.
 
     With --out a folder gets front.csv, front.parquet, front.png, report.md with what changed and
     what is proved, design.json, and the best machines as TOML files. What is evaluated is kept

@@ -1,7 +1,8 @@
 """The regressor in exact arithmetic: its rows at random states, and bounds on its entries' degrees.
 
-Rows are residues modulo a prime, or fractions. The bounds on degrees and on the number of roots
-tell how seldom a combination of entries that is not zero vanishes at random states.
+Rows are computed modulo a prime, or as fractions, so that a rank found from them has no rounding. A
+sum of columns that is zero at random states might still be another polynomial than zero; the bounds
+on degrees, and on how many roots a state takes, say how unlikely that is (Schwartz and Zippel).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pteron.bodies.vectors import Vector
-from pteron.design.choosing.job import LinksTable
+from pteron.design.choosing.job_tables import LinksTable
 from pteron.design.choosing.known_kinds import KINDS
 from pteron.errors import DataError
 from pteron.kernels import Array

@@ -13,7 +13,8 @@ from itertools import product
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.design.choosing.job import CycleTable, Job
+from pteron.design.choosing.job import Job
+from pteron.design.choosing.job_tables import CycleTable
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import pose_of

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pteron.design.choosing.job import AccuracyTable
+from pteron.design.choosing.job_tables import AccuracyTable
 from pteron.design.worst_cases import worst_position_errors
 from pteron.indices import (
     ALUMINIUM,

@@ -1,0 +1,255 @@
+"""The tables of a job's TOML file, each checked by itself, as pydantic models."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+
+from pteron.bodies.tables import Count, Number, Table, Three, Two
+from pteron.design.loads import PayloadTable, Positive
+from pteron.design.spec import Floor
+from pteron.errors import ModelError
+from pteron.manipulator.dimensions import Stock
+
+_FAR = 20.0
+"""Metres from which on a workspace or a cell was probably given in millimetres."""
+
+_TURNS = 7.0
+"""Radians from which on a turn was probably given in degrees."""
+
+
+def _listed(given: Any) -> Any:
+    return [given] if isinstance(given, str) else given
+
+
+def _near(given: Any) -> Any:
+    """Refuse lengths, m, that are those of no cell."""
+    lengths = np.abs(given).ravel()
+    if lengths.max() > _FAR:
+        raise ValueError(f"{lengths.max():g} m given: are these mm?")
+    return given
+
+
+Names = Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)]
+"""One name, or some."""
+
+Near = Annotated[Positive, AfterValidator(_near)]
+"""A length above 0 and of a cell's size, m."""
+
+Place = Annotated[Three, AfterValidator(_near)]
+"""A place in a cell, m."""
+
+
+class WorkspaceTable(Table):
+    """`[workspace]`: where the tool's centre point must work; it has one of three shapes."""
+
+    size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = Field(
+        None, description="sides of a box, m; two for a flat one"
+    )
+    radius: Near | None = Field(None, description="of an upright cylinder, m")
+    height: Near | None = Field(None, description="of the cylinder, m")
+    poses: Annotated[list[tuple[Number, ...]], Field(min_length=1)] | None = Field(
+        None, description="positions, all of which must be met: x y z, m"
+    )
+    center: Place | None = Field(
+        None, description="its middle in the cell, m; left out, it may be anywhere in the cell"
+    )
+    turn: Two | None = Field(None, description="least and greatest turn about the upright, rad")
+    tilt: Annotated[Number, Field(gt=0.0, lt=1.5)] | None = Field(
+        None, description="of the platform to every side, rad: it fills a cone"
+    )
+    directions: Annotated[list[Three], Field(min_length=1)] | None = Field(
+        None, description="of the platform's z, at each of which it must work; level is [0, 0, 1]"
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        keys = ("size", "radius", "height", "poses")
+        given = [key for key in keys if getattr(self, key) is not None]
+        if given not in (["size"], ["radius", "height"], ["poses"]):
+            raise ValueError(
+                f"{', '.join(given) or 'nothing'} given; a box has size, a cylinder radius and "
+                "height, anything else a list of poses"
+            )
+        if self.poses is not None and {len(one) for one in self.poses} not in ({2}, {3}):
+            raise ValueError("poses: each has x y, or x y z")
+        _near(self.poses or 0.0)
+        if self.turn is not None and not self.turn[0] < self.turn[1]:
+            raise ValueError(f"turn: {list(self.turn)} given, [low, high] expected, rad")
+        if self.turn is not None and max(map(abs, self.turn)) > _TURNS:
+            raise ValueError(f"turn: {list(self.turn)} rad given: are these degrees?")
+        if self.directions is not None and not all(one[2] > 0.0 for one in self.directions):
+            raise ValueError("directions: each leads upwards; z above 0 expected")
+        return self
+
+    @property
+    def tilts(self) -> bool:
+        """Whether it asks for tilts."""
+        return self.tilt is not None or self.directions is not None
+
+    @property
+    def words(self) -> str:
+        """Its shape in words."""
+        if self.size is not None:
+            return f"workspace {' x '.join(f'{1e3 * x:g}' for x in self.size)} mm"
+        if self.poses is not None:
+            return f"workspace of {len(self.poses)} poses"
+        return f"workspace: cylinder of radius {self.radius:g} m, height {self.height:g} m"
+
+
+class LoadTable(PayloadTable):
+    """`[payload]`: what the platform carries, a tool with its centre point among it."""
+
+    tool: Place = Field(
+        (0.0, 0.0, 0.0),
+        description="the tool's centre point in the platform's frame, m: what must reach",
+    )
+
+
+class CycleTable(Table):
+    """`[[cycles]]`: a path of the tool through points, again and again."""
+
+    name: str | None = None
+    points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] = Field(
+        description="from the middle of the workspace, m; a turn about the upright may follow, or "
+        "roll, pitch and yaw, rad"
+    )
+    corner: Annotated[Number, Field(ge=0.0)] = Field(
+        0.0, description="metres before and after a point where the path leaves its lines; 0: stop"
+    )
+    duration: Positive | None = Field(
+        None, description="of the path, s; left out, as fast as the motors can"
+    )
+    dwell: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="rest after it, s")
+    back: bool = Field(False, description="whether the path goes back as it came")
+    share: Positive | None = Field(
+        None,
+        description="how often it is done in a duty cycle of all; without it each counts by itself",
+    )
+    anywhere: bool = Field(
+        True, description="whether it may be at any place and in any direction of the workspace"
+    )
+
+
+class MotionTable(Table):
+    """`[motion]`: what the platform must be able to do everywhere, in every direction."""
+
+    speed: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of P, m/s")
+    acceleration: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of P, m/s^2")
+
+
+class AccuracyTable(Table):
+    """`[accuracy]`: how far the tool may be from where it should be."""
+
+    most: Positive = Field(description="m")
+    counted: Literal["deviation", "worst"] = Field(
+        "deviation", description="root of the sum of squares of all errors, or their sum"
+    )
+    counts_per_turn: Positive = Field(20000.0, description="of the motors' encoders")
+    backlash: bool = Field(True, description="whether the gearboxes' backlash counts")
+    point: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of joints' places, m")
+    length: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of links, m")
+    angle: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of axes, rad")
+
+    @property
+    def of_parts(self) -> bool:
+        """Whether errors of the machine's parts count, beside those of its drives."""
+        return bool(self.point or self.length or self.angle)
+
+
+class StiffnessTable(Table):
+    """`[stiffness]`: how far the tool may give way."""
+
+    force: Positive = Field(description="in any direction, N")
+    most: Positive = Field(description="m")
+
+
+class KeepOutTable(Table):
+    """`[[keep_out]]`: a box in which no part of the machine may be."""
+
+    low: Three = Field(description="m; from the middle of a workspace that floats")
+    high: Three = Field(description="m")
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"low {list(self.low)} is not below high {list(self.high)}")
+        return self
+
+
+class CellTable(Table):
+    """`[cell]`: the room for the machine."""
+
+    footprint: tuple[Near, Near] | None = Field(None, description="along x and y, m")
+    height: Near | None = Field(None, description="m")
+    low: Three | None = Field(None, description="of a cell with a place of its own, m")
+    high: Three | None = Field(None, description="m")
+    margin: Annotated[Number, Field(ge=0.0)] = Field(
+        0.03, description="half the width of bodies about their middle lines, m"
+    )
+
+
+class MotorsTable(Table):
+    """`[motors]`: what the drives are chosen from."""
+
+    list: str | None = Field(None, description="CSV or TOML file; else the package's examples")
+    gearboxes: str | None = Field(None, description="CSV file; else the package's examples")
+    margin: Annotated[Number, Field(ge=1.0)] = Field(
+        1.2, description="what a drive must be able to do, over what is asked"
+    )
+    friction: Annotated[Number, Field(ge=0.0, lt=0.5)] = Field(
+        0.05, description="dry friction as a share of the rated torque"
+    )
+
+
+class LinksTable(Table):
+    """`[links]`: what the moving parts are made of."""
+
+    upper: Names = Field(
+        ["aluminium-tube:40x2", "aluminium-tube:60x3"], description="stock of cranks, to choose"
+    )
+    lower: Names = Field(
+        ["carbon-tube:12x1", "carbon-tube:20x1.5"], description="stock of rods, to choose from"
+    )
+    plate: Positive = Field(0.006, description="thickness of an aluminium platform, m")
+    carriage: Positive = Field(0.4, description="mass of what slides on a guide, kg")
+    guide: Positive = Field(0.015, description="half the width of a guide, m")
+
+    @field_validator("upper", "lower")
+    @classmethod
+    def _known(cls, names: list[str]) -> list[str]:
+        for name in names:
+            try:
+                Stock.of(name)
+            except ModelError as error:
+                raise ValueError(error.message) from None
+        return names
+
+
+class FloorsTable(Table):
+    """`[floors]`: least measures of every pose of the workspace, each 1 at best."""
+
+    type_i: Floor = 0.1
+    type_ii: Floor = 0.05
+    clearance: Annotated[Number, Field(ge=0.0)] = Field(
+        0.0, description="least distance of two bodies from surface to surface, m"
+    )
+
+
+class SearchTable(Table):
+    """`[search]`: how long, and by what chance."""
+
+    evaluations: Count = Field(800, description="designs of each kind")
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class BoundTable(Table):
+    """`[most]`: greatest values of what else is asked."""
+
+    price: Positive | None = None
+    rated_power: Positive | None = None
+    moving_mass: Positive | None = None
+    energy: Positive | None = None
+    cycle_time: Positive | None = None
