@@ -3,8 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# Of the packages only what runs is translated.
-INSTALL := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 QUICK := published delta family conformance manipulator errors toml passes costs
 
@@ -72,17 +71,17 @@ wheels:
 # What README and the tour show runs in this one: `make first` tries it.
 $(VENV)/.runtime: pyproject.toml Makefile
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(INSTALL) --editable '.[consistency,design,film,viewer]'
+	$(PIP) install --editable '.[consistency,design,film,viewer]'
 	touch $@
 
 $(VENV)/.dev: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(INSTALL) --editable '.[dev]'
+	$(PIP) install --editable '.[dev]'
 	touch $@ $(VENV)/.runtime
 
 $(VENV)/.docs: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(INSTALL) --editable '.[docs]'
+	$(PIP) install --editable '.[docs]'
 	touch $@ $(VENV)/.runtime
 
 clean:
