@@ -64,7 +64,8 @@ def show(choice: Choice) -> None:
     """Print what each machine that serves keeps, and why others fall out."""
     for one in choice.candidates:
         if one.serves:
-            print(f"{one.kind}: {told(choice, one)}; {checked(choice.job, one)}", flush=True)
+            print(f"{one.kind}: {told(choice, one)}", end="; ", flush=True)
+            print(checked(choice.job, one), flush=True)
         else:
             print(f"{one.kind} falls out: {'; '.join(one.why)}", flush=True)
 

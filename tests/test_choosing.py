@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,11 @@ import pteron
 from pteron.design import Job, choose_machine
 from pteron.design.choosing.choose import cases_of
 from pteron.design.choosing.proofs import regions
+from pteron.design.choosing.rating import Rating
 from pteron.design.choosing.room import tool_places
+from pteron.design.choosing.samples import about_the_worst, sample_poses
 from pteron.design.choosing.search import search_kind
+from pteron.design.worst_cases import worst_forces
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError
 from pteron.kinematics import inverse_kinematics
@@ -117,6 +121,69 @@ def test_the_tool_stays_in_the_workspace_while_the_platform_turns():
     assert region.misses(poses - size, poses + size).any()
 
 
+def valley():
+    """Return a Tripteron whose first leg is nearly stretched where no sample is, and its middle."""
+    robot = pteron.load("tripteron")
+    points, turned = ([0, 1, 0], [0, 0, 1], [1, 0, 0]), []
+    for leg, point in zip(robot.legs, np.array(points, float), strict=True):
+        numbers = {"guide_point": 0.29985 * point, "platform_point": 0.05354 * point}
+        numbers |= {"upper_length": 0.17786, "lower_length": 0.21418, "limits": None}
+        turned.append(replace(leg, **numbers))
+    return replace(robot, legs=tuple(turned)), np.array([0.05248, 0.02574, 0.03644])
+
+
+def test_the_worst_place_is_found_between_the_samples():
+    robot, middle = valley()
+    job = of(workspace={"size": [0.3, 0.3, 0.15]})
+
+    def margins(poses):
+        return 1.0 / worst_forces(robot, middle + poses, 1.0, 10.0)
+
+    sampled = margins(sample_poses(job, robot, 7)).min(axis=0)
+    least, where = about_the_worst(job, robot, margins, 7, keep=2)
+    assert least[0] < 0.5 * sampled[0], "the valley is narrower than the samples' distance"
+    np.testing.assert_allclose(np.diag(margins(where)), least, rtol=1e-12)
+    size = np.array(job.workspace.size)
+    drawn = np.random.default_rng(0).uniform(-0.5, 0.5, (20_000, 3)) * size
+    assert (least <= 1.01 * margins(drawn).min(axis=0)).all()
+    assert (np.abs(where) <= 0.5 * size + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        {"radius": 0.12, "height": 0.1},
+        {"size": [0.2, 0.2, 0.1], "turn": [-0.4, 0.6]},
+        {"poses": [[-0.1, 0.0, 0.0], [0.1, 0.05, 0.02]]},
+    ],
+)
+def test_worse_places_stay_in_the_workspace(space):
+    robot = replace(pteron.load("quadrupteron"), name="with a tool")
+    robot = replace(robot, platform=replace(robot.platform, tool=(0.03, 0.01, -0.05)))
+    job, seen = of(workspace=space), []
+
+    def values(poses):
+        seen.append(poses)
+        turned = np.cos(3.0 * poses[:, 3] - 1.0)
+        return np.column_stack([turned, -poses @ [1.0, 1.0, 0.2, 0.0], -np.abs(poses[:, 2])])
+
+    least, where = about_the_worst(job, robot, values, keep=2)
+    poses = np.vstack(seen)
+    places = tool_places(robot, poses) - tool_places(robot, np.zeros((1, 4)))
+    if "radius" in space:
+        assert np.hypot(places[:, 0], places[:, 1]).max() <= 0.12 + 1e-9
+        assert np.abs(places[:, 2]).max() <= 0.05 + 1e-9
+    elif "size" in space:
+        assert (np.abs(places) <= np.array([0.1, 0.1, 0.05]) + 1e-9).all()
+        assert poses[:, 3].min() >= -0.4 - 1e-9
+        assert poses[:, 3].max() <= 0.6 + 1e-9
+        assert least[0] == pytest.approx(np.cos(3.0 * -0.4 - 1.0), abs=1e-12)
+    else:
+        assert len(poses) == len(sample_poses(job, robot)), "a list has no poses between"
+    assert (least <= values(poses).min(axis=0)).all()
+    assert len(where) == 3
+
+
 def test_tilts_fill_a_cone():
     job = of(workspace={**JOB["workspace"], "tilt": 0.2}, kinds=["stewart"])
     case = cases_of(job)["stewart"]
@@ -152,7 +219,8 @@ def test_shares_make_a_duty_cycle():
         values = case.kind.ranges.mean(axis=0)
         values[0] += 0.7  # twice the size
         robot, middle = case.kind.machine(values)
-        found, _ = case.loads(case.loaded(robot), middle, None)
+        rating = Rating(values, middle=middle, worst=np.zeros((0, 3)))
+        found, _ = case.loads(case.loaded(robot), rating, None)
         loads.append(found.margins(case.options["m"], [0, 1, 2]))
     times = np.array([0.3, 3 * 1.6])
     parts = [1.0 / margins[0] ** 2 for margins in loads]

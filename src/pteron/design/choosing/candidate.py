@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
-from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.design.choosing.margins import DENSE, margins_of
 from pteron.design.choosing.proofs import is_clear, proofs_of, told
 from pteron.design.choosing.rating import Case, Rating
-from pteron.design.choosing.room import tool_places
-from pteron.design.choosing.samples import Places, sample_poses
+from pteron.design.choosing.samples import Places, about_the_worst, sample_poses
 from pteron.design.choosing.search import front
 from pteron.design.choosing.tool import elasticity, greatest_errors, joint_errors, tolerances
 from pteron.errors import PteronError
-from pteron.indices import stiffness
+from pteron.indices import Tolerances, stiffness
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.manipulator.saving import text_of
 from pteron.motion import Path, limits_of, time_optimal
 from pteron.workspace import Proof, clearance
 
-_WORST, _ROUNDS = 8, 4
-"""Worst sample poses about which nearer bodies are sought, and halvings of the distance."""
+_WORST = 8
+"""Worst sample poses about which worse ones are sought."""
 
 _TRIED = 9
 """Designs of which a proof is tried: the best, and then ever further behind, as neighbours fail
@@ -141,14 +140,21 @@ def _candidate(
     time = case.kind.numbers(one.values).get("time")
     margins = margins_of(case, carrying, one.middle, time)
     figures |= margins.figures
-    poses = one.middle + sample_poses(case.job, robot, DENSE)
-    figures["clearance"] = _least_clearance(case, robot, one.middle, poses)
-    if case.job.accuracy is not None:
-        figures["error"] = _error(case, robot, one, poses)
+
+    def least(values_of: Callable[[Array], ArrayLike]) -> float:
+        def column(poses: Array) -> Array:
+            return np.reshape(values_of(one.middle + poses), (-1, 1))
+
+        return float(about_the_worst(case.job, robot, column, DENSE, _WORST)[0][0])
+
+    figures["clearance"] = least(lambda poses: clearance(robot, poses).least)
+    if (asked := case.job.accuracy) is not None:
+        given = _tolerances(case, one)
+        figures["error"] = -least(lambda poses: -greatest_errors(asked, robot, poses, given))
     if case.job.stiffness is not None:
         springs = elasticity(case.sections(one), [o.gearbox.stiffness for o in one.options])
-        least = stiffness(robot, poses, springs).least.min()
-        figures["deflection"] = float(case.job.stiffness.force / least)
+        stiff = least(lambda poses: stiffness(robot, poses, springs).least)
+        figures["deflection"] = float(case.job.stiffness.force / stiff)
     times = _reached(case, carrying, one, margins.place)
     objectives = shown_objectives(case.job.objectives)
     return Candidate(
@@ -157,7 +163,7 @@ def _candidate(
         (),
         *counts,
         told(case, proofs),
-        _clear_words(case, robot, one.middle, len(poses)),
+        _clear_words(case, robot, one.middle),
         _dimensions(robot),
         {name: value for name, value in (figures | times).items() if np.isfinite(value)},
         tuple(option.name for option in one.options),
@@ -168,8 +174,8 @@ def _candidate(
     )
 
 
-def _clear_words(case: Case, robot: Manipulator, middle: Array, count: int) -> str:
-    least = case.job.floors.clearance
+def _clear_words(case: Case, robot: Manipulator, middle: Array) -> str:
+    least, count = case.job.floors.clearance, len(sample_poses(case.job, robot, DENSE))
     kept = f"come nearer than {1e3 * least:g} mm" if least else "touch"
     if is_clear(case, robot, middle):
         return f"proved: no two links, guides or the platform {kept}"
@@ -177,26 +183,6 @@ def _clear_words(case: Case, robot: Manipulator, middle: Array, count: int) -> s
         f"no two links, guides or the platform {kept} at {count} sample poses and about the worst "
         "of them; not proved"
     )
-
-
-def _least_clearance(case: Case, robot: Manipulator, middle: Array, poses: Array) -> float:
-    """Return the least distance of two bodies, m, at poses, and ever nearer about the worst."""
-    values = clearance(robot, poses).least
-    least, center = float(values.min()), tool_places(robot, middle[None])[0]
-    if case.job.workspace.poses is not None:
-        return least
-    count = len(robot.platform.lengths)
-    offsets = np.zeros((3**count, robot.freedom))
-    offsets[:, :count] = list(product((-1.0, 0.0, 1.0), repeat=count))
-    step = np.append(case.half[:count] / (DENSE - 1), np.zeros(robot.freedom - count))
-    for _ in range(_ROUNDS):
-        worst = poses[np.argsort(values)[:_WORST]]
-        poses = (worst[:, None] + step * offsets).reshape(-1, robot.freedom)
-        away = np.abs(tool_places(robot, poses) - center)
-        poses = poses[(away <= case.half + 1e-9).all(axis=1)]
-        values = clearance(robot, poses).least
-        least, step = min(least, float(values.min())), step / 2.0
-    return least
 
 
 def _dimensions(robot: Manipulator) -> dict[str, float]:
@@ -217,13 +203,12 @@ def _dimensions(robot: Manipulator) -> dict[str, float]:
     return found | ({"stroke": max(strokes)} if strokes else {})
 
 
-def _error(case: Case, robot: Manipulator, one: Rating, poses: Array) -> float:
-    """Return the greatest error of the tool, m, as the job counts it."""
+def _tolerances(case: Case, one: Rating) -> Tolerances:
+    """Return the tolerances of a design with its drives."""
     asked = case.job.accuracy
     assert asked is not None  # who asks has some
     gears = np.array([(o.gearbox.ratio, o.gearbox.backlash) for o in one.options])
-    given = tolerances(asked, joint_errors(asked, *gears.T).tolist())
-    return float(greatest_errors(asked, robot, poses, given).max())
+    return tolerances(asked, joint_errors(asked, *gears.T).tolist())
 
 
 def _reached(

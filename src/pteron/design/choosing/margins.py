@@ -8,7 +8,7 @@ import numpy as np
 
 from pteron.design.choosing.drives import in_duty
 from pteron.design.choosing.rating import Case
-from pteron.design.choosing.samples import Places, sample_poses
+from pteron.design.choosing.samples import Places, about_the_worst
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
 from pteron.kernels import Array
@@ -16,7 +16,7 @@ from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
 
 DENSE = 7
-"""Poses along each side of a box at which a design is looked at last."""
+"""Poses along each side of a box at which a design is looked at last, before ever nearer places."""
 
 _NOTHING = 1e-9
 """Least force, speed or torque by which a limit is divided."""
@@ -46,8 +46,12 @@ class Margins:
     def take(self, name: str, limits: Array, asked: Array) -> Array:
         """Take limits (n,) over what is asked (B, n); return the margins (B,)."""
         found = np.asarray((limits / np.maximum(asked, _NOTHING)).min(axis=-1))
-        self.figures[name] = min(self.figures.get(name, np.inf), float(found.min()))
+        self.note(name, float(found.min()))
         return found
+
+    def note(self, name: str, margin: float) -> None:
+        """Keep a margin if it is the least of its name."""
+        self.figures[name] = min(self.figures.get(name, np.inf), margin)
 
 
 def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None) -> Margins:
@@ -85,16 +89,20 @@ def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None
             found.least, found.worst = least, "the rated torque of the whole duty cycle"
     asked = case.job.motion
     if asked.acceleration or asked.speed:
-        places = sample_poses(case.job, robot, DENSE)
         speed = max(asked.speed, _NOTHING)
-        forces = worst_forces(robot, middle + places, speed, asked.acceleration)
-        every = np.minimum(
-            found.take("peak_margin", most, forces),
-            found.take("speed_margin", fastest, worst_speeds(robot, middle + places, speed)),
-        )
-        if every.min() < found.least:
-            corner = places[int(every.argmin())][: len(robot.platform.lengths)]
+
+        def in_any_direction(places: Array) -> Array:
+            poses = middle + places
+            forces = worst_forces(robot, poses, speed, asked.acceleration)
+            loads = np.hstack([forces, worst_speeds(robot, poses, speed)])
+            return np.append(most, fastest) / np.maximum(loads, _NOTHING)
+
+        margins, where = about_the_worst(case.job, robot, in_any_direction, DENSE, keep=2)
+        found.note("peak_margin", float(margins[: len(most)].min()))
+        found.note("speed_margin", float(margins[len(most) :].min()))
+        if margins.min() < found.least:
+            corner = where[int(margins.argmin())][: len(robot.platform.lengths)]
             at = ", ".join(f"{1e3 * x:+.0f}" for x in corner)
-            found.least = float(every.min())
+            found.least = float(margins.min())
             found.worst = f"the motion in any direction, at ({at}) mm"
     return found

@@ -12,7 +12,13 @@ from pteron.design.choosing.drives import JointLoads, Option, Options
 from pteron.design.choosing.job import OBJECTIVES, Job
 from pteron.design.choosing.kinds import Kind, slides
 from pteron.design.choosing.room import Room
-from pteron.design.choosing.samples import Places, cycles_of, half_sides, sample_poses
+from pteron.design.choosing.samples import (
+    Places,
+    about_the_worst,
+    cycles_of,
+    half_sides,
+    sample_poses,
+)
 from pteron.design.choosing.tool import (
     compliance_with,
     compliances,
@@ -66,6 +72,8 @@ class Rating:
         The pose in the middle of the workspace.
     options : tuple of Option
         The drive of each leg.
+    worst : array, shape (C, m)
+        Poses from the middle at which measures of singularity are least.
     stage : int
         At which it fell out; 0 where it did not.
     near : float
@@ -79,6 +87,7 @@ class Rating:
     robot: Manipulator | None = None
     middle: Array = field(default_factory=lambda: np.zeros(0))
     options: tuple[Option, ...] = ()
+    worst: Array = field(default_factory=lambda: np.zeros((0, 0)))
     stage: int = 0
     near: float = 1.0
 
@@ -141,20 +150,31 @@ class Case:
     def _reach(self, found: Rating) -> None:
         """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
         robot, poses, floors = _of(found), found.middle + self.poses, self.job.floors
-        squares = np.asarray(numeric(robot, "squared_type_i")(poses)[0])
-        measure = np.asarray(numeric(robot, "type_ii")(poses)[0])
-        least = float(squares.min())
+        least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
+        if least >= 0.0:
+            sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
+
+            def measures(places: Array) -> Array:
+                poses = found.middle + places
+                squares, determinant, room = (
+                    numeric(robot, name)(poses)[0]
+                    for name in ("squared_type_i", "type_ii", "passive_room")
+                )
+                signed = sign * np.asarray(determinant)
+                every = np.column_stack([squares, signed, room])
+                return np.asarray(np.nan_to_num(every, nan=1.0))
+
+            lowest, found.worst = about_the_worst(self.job, robot, measures)
+            legs_least, type_ii, room = np.split(lowest, [robot.joint_count, robot.joint_count + 1])
+            least = float(legs_least.min())
         found.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
         if least < 0.0:
             _miss(found, "reach", 1.0 - least, "a leg that does not reach the whole workspace")
             return
+        found.figures["type_ii"] = float(type_ii[0])
         _below(found, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
-        sign = np.sign(np.nanmedian(measure))
-        lowest = float((sign * measure).min())
-        found.figures["type_ii"] = lowest
-        _below(found, "type-II measure", lowest, _FLOOR * floors.type_ii)
-        share = float(np.nan_to_num(numeric(robot, "passive_room")(poses)[0], nan=1.0).min())
-        _below(found, "passive joints' margin to their limits", share, 0.0)
+        _below(found, "type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
+        _below(found, "passive joints' margin to their limits", float(room.min()), 0.0)
         joints = inverse_kinematics(robot, poses, on_failure="nan")
         if not np.isfinite(joints).all():
             _miss(found, "reach", 1.0, "a leg that does not reach the whole workspace")
@@ -188,12 +208,14 @@ class Case:
         robot = self.loaded(_of(found))
         given = self.kind.numbers(found.values)
         try:
-            loads, work = self.loads(robot, found.middle, given.get("time"))
+            loads, work = self.loads(robot, found, given.get("time"))
             errors = gives = None
             if self.job.accuracy is not None:
-                errors = unit_errors(self.job.accuracy, robot, found.middle + self.poses)
+                poses = found.middle + np.vstack([self.poses, found.worst])
+                errors = unit_errors(self.job.accuracy, robot, poses)
             if self.job.stiffness is not None:
-                gives = compliances(robot, found.middle + self.corners, self.sections(found))
+                poses = found.middle + np.vstack([self.corners, found.worst])
+                gives = compliances(robot, poses, self.sections(found))
         except PteronError:
             _miss(found, "loads", 1.0, "a singularity or the edge of its reach on a cycle")
             return
@@ -273,10 +295,10 @@ class Case:
         return link_sections(_of(found), self.kind.cut(found.values))
 
     def loads(
-        self, robot: Manipulator, middle: Array, time: float | None
+        self, robot: Manipulator, found: Rating, time: float | None
     ) -> tuple[JointLoads, list[tuple[Array, Array]]]:
         """Return the loads of all cycles at all places, and of each the work and ways of joints."""
-        n = robot.joint_count
+        n, middle = robot.joint_count, found.middle
         squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
         speeds = np.zeros(n)
         for cycle in self.cycles:
@@ -299,7 +321,7 @@ class Case:
         asked = self.job.motion
         everywhere = np.zeros((2, n))
         if asked.acceleration or asked.speed:
-            poses = middle + self.outline
+            poses = middle + np.vstack([self.outline, found.worst])
             heavy = (replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
             speed = max(asked.speed, 1e-6)
             everywhere[0] = worst_forces(robot, poses, speed, asked.acceleration).max(axis=0)

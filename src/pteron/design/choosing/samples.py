@@ -5,13 +5,14 @@ Places are those of the tool's centre point: where the platform turns, P moves a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
 from pteron.design.choosing.job import Job
 from pteron.design.choosing.job_tables import CycleTable
@@ -45,7 +46,10 @@ _SHARES = np.linspace(1.0, 0.0, 21)
 """Shares of the way to a corner at which a cycle is tried."""
 
 _INSIDE = 1e-9
-"""Metres by which a cycle may leave the workspace."""
+"""Metres or radians by which a cycle or a place may leave the workspace."""
+
+_ROUNDS = 4
+"""Halvings of the distance at which worse places are looked for about the worst."""
 
 
 @dataclass(frozen=True)
@@ -129,12 +133,69 @@ def with_tool_in_the_middle(robot: Manipulator, angles: Array) -> Array:
 
 def sample_poses(job: Job, robot: Manipulator, along: int | None = None) -> Array:
     """Return poses (N, m) over the workspace and its orientations, from its middle."""
+    return _poses_at(robot, _places(job, robot, along or _along(job)))
+
+
+def about_the_worst(
+    job: Job,
+    robot: Manipulator,
+    values_of: Callable[[Array], Array],
+    along: int | None = None,
+    keep: int = 1,
+) -> tuple[Array, Array]:
+    """Return the least of each column of values (C,), and the poses where they are (C, m).
+
+    `values_of` gives the values (B, C) at poses (B, m), which are from the middle. They are taken
+    at `sample_poses`, and then ever nearer about those that are worst in a column, `keep` of each:
+    what is worst near a singularity is worst in a valley that samples miss.
+    """
+    along, count, space = along or _along(job), len(robot.platform.lengths), job.workspace
+    places = _places(job, robot, along)
+    values = values_of(_poses_at(robot, places))
+    steps = np.zeros(robot.freedom)
+    steps[:count] = half_sides(job)[:count] / (along - 1)
+    if space.turn is not None and not space.tilts:
+        steps[-1] = 0.25 * (space.turn[1] - space.turn[0])
+    if space.poses is None:
+        ways = np.array(list(product(*((-1.0, 0.0, 1.0) if step else (0.0,) for step in steps))))
+        for _ in range(_ROUNDS):
+            worst = np.unique(np.argsort(values, axis=0)[:keep])
+            near = (places[worst][:, None] + steps * ways).reshape(-1, robot.freedom)
+            places = near[_inside(job, near, count)]
+            values = values_of(_poses_at(robot, places))
+            steps /= 2.0
+    least = values.argmin(axis=0)
+    return values.min(axis=0), _poses_at(robot, places[least])
+
+
+def _inside(job: Job, places: Array, count: int) -> NDArray[np.bool_]:
+    """Return which places (N, m) are in the workspace."""
+    space, away = job.workspace, np.abs(places)
+    found = np.asarray((away[:, :count] <= half_sides(job)[:count] + _INSIDE).all(axis=1))
+    if space.radius is not None:
+        found &= np.hypot(away[:, 0], away[:, 1]) <= space.radius + _INSIDE
+    if space.turn is not None and not space.tilts:
+        low, high = space.turn
+        found &= (low - _INSIDE <= places[:, -1]) & (places[:, -1] <= high + _INSIDE)
+    return found
+
+
+def _along(job: Job) -> int:
+    return _ALONG_TILTED if job.workspace.tilts else _ALONG
+
+
+def _places(job: Job, robot: Manipulator, along: int) -> Array:
+    """Return places (N, m): of the tool from the middle, and angles of the platform."""
+    points = _positions(job, along)[:, : len(robot.platform.lengths)]
+    angles = orientations(job, robot)
+    return np.hstack([np.tile(points, (len(angles), 1)), np.repeat(angles, len(points), axis=0)])
+
+
+def _poses_at(robot: Manipulator, places: Array) -> Array:
     count = len(robot.platform.lengths)
-    level = with_tool_in_the_middle(robot, orientations(job, robot))
-    places = _positions(job, along or (_ALONG_TILTED if job.workspace.tilts else _ALONG))
-    found = np.repeat(level[:, None], len(places), axis=1)
-    found[..., :count] += places[:, :count]
-    return found.reshape(-1, robot.freedom)
+    found = with_tool_in_the_middle(robot, places[:, count:])
+    found[:, :count] += places[:, :count]
+    return found
 
 
 def half_sides(job: Job) -> Array:
