@@ -440,6 +440,19 @@ def test_all_assembly_modes_of_one_machine():
     assert [(row["row"], row["mode"]) for row in rows] == [(1, 1)]
 
 
+def test_joints_beyond_their_limits_are_told_beside_the_numbers():
+    told = run("direct delta 1.2 0.1 1.3").stderr
+    assert told == (
+        "Note: beyond the joints' limits: theta1 (1.2 for -1.5 to 0.9 rad), "
+        "theta3 (1.3 for -1.5 to 0.9 rad)\n"
+    )
+    poses = "x,y,z\n0,0,-0.9\n0,0,-1.4\n0,0,-1.42\n"
+    told = run("inverse delta --table -", poses).stderr
+    assert told.startswith("Note: beyond the joints' limits: theta1 (in 2 of 3 rows, ")
+    told = run("forces delta --pose 0 0 -1.4").stderr
+    assert told.startswith("Note: beyond the joints' limits: theta1 (")
+
+
 def test_joints_without_a_pose_fail_alone_and_stay_empty_in_a_table():
     refused("direct quadrupteron 9 0 0 0", "no pose has these joint coordinates")
     text = "t,rho1,rho2,rho3,rho4\n1,9,0,0,0\n2,0,0.001,0,0\n"
@@ -493,10 +506,10 @@ def test_the_working_mode_may_be_chosen():
     assert "force1" in json.loads(done("forces tripteron --pose 0 0 0 --elbows --- --json"))
     # A crank's angle depends on the side of its elbow.
     delta = with_elbows(pteron.load("delta"), [1, -1, 1])
-    row = json.loads(done("inverse delta 0 0 -0.9 --elbows +-+ --json"))
+    row = json.loads(run("inverse delta 0 0 -0.9 --elbows +-+ --json").stdout)
     angles = pteron.inverse_kinematics(delta, [0.0, 0.0, -0.9])
     assert [row[f"theta{i}"] for i in (1, 2, 3)] == angles.tolist()
-    back = frame(done(f"direct delta {' '.join(map(str, angles))} --elbows +-+"))
+    back = frame(run(f"direct delta {' '.join(map(str, angles))} --elbows +-+").stdout)
     assert np.abs(back.select("x", "y", "z").to_numpy() - [0, 0, -0.9]).max(axis=1).min() < 1e-9
     pteron.save(pteron.load("tripteron"), "robot.toml")
     assert json.loads(done("check robot.toml --elbows --+ --json"))["working_mode"] == "--+"
@@ -509,13 +522,13 @@ def test_forces_of_a_table_with_and_without_a_wrench(robot: str):
     table = motion(20, robot)
     table.write_csv("motion.csv")
     states = np.split(table.to_numpy(), 3, axis=1)
-    forces = frame(done(f"forces {robot} --table motion.csv"))[machine.force_names].to_numpy()
+    forces = frame(run(f"forces {robot} --table motion.csv").stdout)[machine.force_names].to_numpy()
     np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states))
     wrench = np.random.default_rng(2).normal(size=(20, m))
     names = {"x": "fx", "y": "fy", "z": "fz", "phi": "mk"}
     loads = pl.DataFrame(wrench, schema=[names[one] for one in machine.coordinates])
     table.hstack(loads).write_csv("loaded.csv")
-    forces = frame(done(f"forces {robot} --table loaded.csv"))[machine.force_names].to_numpy()
+    forces = frame(run(f"forces {robot} --table loaded.csv").stdout)[machine.force_names].to_numpy()
     np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states, wrench))
 
 

@@ -237,13 +237,24 @@ def test_a_platform_of_another_mass_is_as_much_heavier_in_all(program, name):
     assert "(--platform-mass)" in done.stdout
     own = pteron.load(name).platform
     done = program("new", name, "--platform-mass", "0.3", "--limits", "1:2", "--out", "light.toml")
-    assert "still" not in done.stdout
+    assert "still: sections of links, " in done.stdout
+    assert "limits" not in done.stdout
     light = pteron.load("light.toml").platform
     masses = [sum((one.inertia.mass, *(bar.mass for bar in one.bars))) for one in (own, light)]
     assert masses[1] == pytest.approx(0.3, rel=1e-9)
     factor = masses[1] / masses[0]
     expected = factor * np.array(own.inertia.values)
     np.testing.assert_allclose(light.inertia.values, expected, rtol=1e-9, atol=1e-15)
+
+
+def test_what_a_new_machine_keeps_of_the_old_one_is_told(program):
+    stock = "upper=steel-rod:10"
+    done = program("new", "delta", "--crank", "0.2", "--mass-from", stock, "--out", "new.toml")
+    told = " ".join(done.stdout.split())
+    assert "kg (lower) (--mass-from)" in told
+    assert "(upper)" not in told
+    assert "where a crank is at 0, 5.33 deg below horizontal (zero_direction)." in told
+    assert "At 0 cranks point 5.33 deg below horizontal." in program("check", "new.toml").stdout
 
 
 @pytest.mark.parametrize("name", sorted(set(CATALOG) - {"five-bar"}))

@@ -12,6 +12,7 @@ from mechanisms import CATALOG, gated
 import pteron
 from pteron.manipulator import with_dimensions
 from pteron.manipulator.machine_warnings import machine_warnings
+from pteron.manipulator.tool import Tool
 from pteron.manipulator.variants import with_elbows
 from pteron.motion import line_path, with_payload
 from pteron.playback import playback
@@ -92,6 +93,39 @@ def test_bodies_that_pteron_wrote_are_not_doubted(tmp_path):
     (told,) = machine_warnings(odd)  # three legs alike
     assert told.startswith("legs 1, 2 and 3: lower: center_of_mass: ")
     pteron.load(pteron.save(odd, tmp_path / "robot.toml"))  # a warning would be an error
+
+
+def test_a_leg_that_turns_the_other_way_than_all_others_is_doubted():
+    robot = CATALOG["delta"]
+    odd = replace(robot.legs[1], direction=[-x for x in robot.legs[1].direction])
+    legs = (robot.legs[0], odd, robot.legs[2])
+    (told,) = machine_warnings(replace(robot, legs=legs))
+    assert told.startswith("leg 2: direction: opposite to all other legs'")
+
+
+def test_masses_in_grams_and_a_tool_in_millimetres_are_doubted():
+    robot = CATALOG["linear-delta"]
+    (told,) = machine_warnings(with_dimensions(robot, platform_mass=900.0))
+    assert "900 kg" in told
+    assert "is it in grams" in told
+    robot = CATALOG["delta"]
+    lower = robot.legs[0].lower
+    heavy = type(lower).of_values([1e3 * value for value in lower.values])
+    found = machine_warnings(
+        replace(robot, legs=tuple(replace(leg, lower=heavy) for leg in robot.legs))
+    )
+    assert any("lower: mass" in text and "is it in grams" in text for text in found)
+    tools = (Tool("pen", (0.0, 0.0, -45.0)),)
+    (told,) = machine_warnings(replace(robot, tools=tools))
+    assert "point of tools item 1" in told
+    assert "are these mm" in told
+
+
+def test_degrees_of_cranks_are_told_by_their_limits():
+    with pytest.warns(pteron.UnlikelyValue, match="up to 10: are these degrees"):
+        pteron.direct_kinematics("delta", [10.0, 10.0, 10.0])
+    free = replace(CATALOG["delta"], legs=[replace(x, limits=None) for x in CATALOG["delta"].legs])
+    pteron.direct_kinematics(free, [10.0, 10.0, 10.0])  # a crank may turn as often as it likes
 
 
 def test_a_shaft_that_makes_many_turns_has_the_limits_it_has():

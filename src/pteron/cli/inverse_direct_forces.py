@@ -19,7 +19,11 @@ from pteron.errors import DataError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pteron.manipulator import Manipulator
     from pteron.tables import Table
+
+_ROUNDING = 1e-9
+"""Metres or radians by which a joint may be beyond its limits."""
 
 
 def inverse(
@@ -49,7 +53,7 @@ def inverse(
     pteron inverse tripteron --table poses.csv --out joints.csv
     """
     from pteron.kinematics import inverse_kinematics
-    from pteron.manipulator.readings import to_readings
+    from pteron.manipulator.readings import from_readings, to_readings
 
     columns = machine.coordinates
     rows = given_rows(machine, table, pose, "pose", columns)
@@ -63,6 +67,7 @@ def inverse(
         columns,
         on_failure,
     )
+    _note_limits(machine, from_readings(machine, joints))
     result = rows.table.extended(dict(zip(added, joints.T, strict=True)))
     deliver(machine, result, added, out=out, as_json=json, single=rows.single)
 
@@ -112,9 +117,26 @@ def direct(
         columns,
         failure,
     )
+    _note_limits(machine, from_readings(machine, rows.table.numbers(columns, failure)))
     result = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
     deliver(machine, result, shown, out=out, as_json=json)
+
+
+def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
+    """Say which joint coordinates (B, n) are beyond limits: the numbers stand."""
+    import numpy as np
+
+    told = []
+    for name, leg, own in zip(machine.joint_names, machine.legs, joints.T, strict=True):
+        low, high = leg.limits or (-np.inf, np.inf)
+        beyond = np.nan_to_num(np.maximum(low - own, own - high), nan=-np.inf)
+        if beyond.max(initial=0.0) > _ROUNDING:
+            rows = f"in {(beyond > _ROUNDING).sum()} of {len(own)} rows, " if len(own) > 1 else ""
+            limits = f"{low:g} to {high:g} {leg.joint.unit}"
+            told.append(f"{name} ({rows}{own[beyond.argmax()]:.4g} for {limits})")
+    if told:
+        note(f"Note: beyond the joints' limits: {', '.join(told)}")
 
 
 def _modes(table: Table, poses: NDArray[Any], coordinates: tuple[str, ...]) -> Table:
@@ -174,7 +196,7 @@ def forces(
     import numpy as np
 
     from pteron.dynamics import drive_forces, inverse_dynamics
-    from pteron.kinematics import joint_rates
+    from pteron.kinematics import inverse_kinematics, joint_rates
     from pteron.manipulator.readings import reading_scales
     from pteron.motion import overloads
 
@@ -210,6 +232,8 @@ def forces(
 
     served = rows.served(machine, serve, columns, on_failure)
     found = served[:, :n] * reading_scales(machine)
+    poses = rows.table.numbers(columns[:m], on_failure)
+    _note_limits(machine, inverse_kinematics(machine, poses, on_failure="nan"))
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
     result = rows.table.extended(dict(zip(added, found.T, strict=True)))

@@ -239,6 +239,8 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
+    from pteron.manipulator.explained import pointing
+
     rows = (
         (
             *(str(i), leg["type"], _vector(leg["axis"], 2) if leg["axis"] else "along the leg"),
@@ -266,6 +268,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         f"working mode {signs(robot)}",
         table(*headings, rows=rows, numbers=("leg",)),
         *(f"A {joint.noun} {joint.zero}." for joint in joints if joint.zero),
+        *([f"At 0 cranks point {zero}."] if (zero := pointing(robot)) else []),
         *_drives(robot),
         *singular,
         f"Home pose: {_vector(found['home_pose'])}, margin {found['home_reserve']:.2f} of 1",

@@ -13,7 +13,7 @@ from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import COORDINATES
 
 _WOUND = 6.0 * np.pi
-"""Angle of a crank, rad, beyond which it is likelier in degrees: three turns."""
+"""Angle of a crank without limits, rad, beyond which it is likelier in degrees: three turns."""
 
 
 def unlikely_length(robot: Manipulator) -> float:
@@ -37,7 +37,8 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
     for name, leg in zip(robot.joint_names, robot.legs, strict=True):
         far[name] = length
         if leg.joint.unit == "rad":
-            far[name] = max(_turn(leg.limits, 2.0 * np.pi), *turns.values(), _WOUND)
+            least = 2.0 * np.pi if leg.limits else _WOUND
+            far[name] = max((_turn(leg.limits, least), *turns.values()))
             angles.add(name)
     found = []
     for turning, question in (

@@ -115,6 +115,10 @@ class CrankLeg(LegKind):
     def joint_axis(self) -> Vector:
         return self.direction
 
+    @property
+    def at_zero(self) -> Vector:
+        return self.zero_direction
+
     def zero_at(self, zero: float) -> dict[str, Any]:
         return {"zero_direction": self._pointing(zero)}
 

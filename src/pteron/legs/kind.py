@@ -201,6 +201,11 @@ class LegKind(ABC):
         return None
 
     @property
+    def at_zero(self) -> Vector | None:
+        """The unit vector along which it points at coordinate 0; None where it points nowhere."""
+        return None
+
+    @property
     def goes_round(self) -> bool:
         """Whether a whole turn of its joint leads to the same pose again, as a crank's does."""
         return self.joint.unit == "rad" and not self.follows_angle

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pteron.errors import shown
 from pteron.manipulator.dimensions import with_dimensions
 from pteron.manipulator.files import DEFAULT_KIND, document, load
@@ -24,6 +26,9 @@ _FOLLOWS = {
     "platform_mass": "Platform of {} kg: its inertia is in proportion.",
 }
 """The sentence of the file for each argument of `with_dimensions`."""
+
+LEVEL = "horizontal"
+"""The word for cranks that point neither up nor down at 0."""
 
 
 def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
@@ -56,13 +61,41 @@ def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = N
 
 def kept(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
     """Return a sentence on what stays as in a machine, though dimensions change."""
-    mass = robot.platform.inertia.mass + sum(bar.mass for bar in robot.platform.bars)
-    numbers = {
-        "platform_mass": f"the platform of {mass:.4g} kg (--platform-mass)",
-        "limits": "the joints' limits (--limits)",
-    }
-    told = " and ".join(text for key, text in numbers.items() if key not in dimensions)
-    return [f"As in {shown(robot.name, bare=True)} still: {told}."] if told and dimensions else []
+    if not dimensions:
+        return []
+    made = with_dimensions(robot, **dimensions)
+    mass = made.platform.inertia.mass + sum(bar.mass for bar in made.platform.bars)
+    links, zero = _masses(made, dimensions.get("stock", {})), pointing(made)
+    told = []
+    if "platform_mass" not in dimensions:
+        told.append(f"the platform of {mass:.4g} kg (--platform-mass)")
+    if links:
+        told.append(f"sections of links, {links} (--mass-from)")
+    if "limits" not in dimensions:
+        told.append("the joints' limits (--limits)")
+    if zero not in ("", LEVEL):
+        told.append(f"where a crank is at 0, {zero} (zero_direction)")
+    return [f"As in {shown(robot.name, bare=True)} still: {'; '.join(told)}."] if told else []
+
+
+def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
+    """Return the masses of links that no stock is given for, of the first leg."""
+    leg: Any = robot.legs[0]
+    links = {key: leg.bodies[letter].mass for letter, (key, *_) in leg.extents.items()}
+    return " and ".join(f"{mass:.4g} kg ({key})" for key, mass in links.items() if key not in stock)
+
+
+def pointing(robot: Manipulator) -> str:
+    """Return where cranks point at 0 against gravity: 5.33 deg below horizontal; "" if none do."""
+    down = np.array(robot.gravity)
+    zeros = [leg.at_zero for leg in robot.legs if leg.at_zero is not None]
+    if not zeros or not down.any():
+        return ""
+    sines = np.array(zeros) @ down / np.linalg.norm(down)
+    angles = np.degrees(np.arcsin(np.clip(sines, -1.0, 1.0))).round(2) + 0.0
+    if not angles.any():
+        return LEVEL
+    return f"{', '.join(f'{one:g}' for one in dict.fromkeys(angles.tolist()))} deg below horizontal"
 
 
 def _told(value: Any) -> str:

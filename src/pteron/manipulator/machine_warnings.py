@@ -22,6 +22,18 @@ _UNLIKE = 20.0
 """Greatest ratio of a link's central inertia to a uniform bar's, or the inverse: two masses at its
 ends have 3."""
 
+_DENSE = 300.0
+"""Mass of a link over its length, kg/m, beyond which grams are likelier: steel 0.2 m thick."""
+
+_HEAVY = 100.0
+"""Mass of a platform over that of its legs, beyond which grams are likelier."""
+
+_LEGS = 3
+"""Fewest legs of which one may be told from the others."""
+
+_SAME = 1e-6
+"""Greatest difference of directions that are one."""
+
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
 
@@ -55,6 +67,8 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     # Consequences of lengths in millimetres are not listed beside them.
     if bodies and radius > 0.0 and not points and 0 not in far:
         found += [f"platform: {text}" for text in _spread(platform, radius)]
+    if bodies:
+        found += [f"platform: {text}" for text in _grams(platform, robot.legs)]
     axis = platform.rotation_axes[0] if len(platform.rotation_axes) == 1 else None
     alike: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
@@ -64,7 +78,41 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     found += [f"{told_legs(legs)}: {text}" for text, legs in alike.items()]
     if axis is not None:
         found += _turning_offsets(robot.legs, axis, platform.angles[0])
+    found += _odd_one(robot)
     return tuple(found)
+
+
+def _odd_one(robot: Manipulator) -> Iterator[str]:
+    """Yield a leg with a direction opposite to that of all others, seen from the middle."""
+    points = np.array([leg.guide_point for leg in robot.legs])
+    axis = np.array(robot.platform.axis)
+    out = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
+    radii = np.linalg.norm(out, axis=1, keepdims=True)
+    if len(out) < _LEGS or radii.min() < _SAME:
+        return
+    out /= radii
+    frames = np.stack([out, np.cross(axis, out), np.broadcast_to(axis, out.shape)], axis=1)
+    each = [
+        {q.name: q.value for q in leg.quantities if q.role in ("direction", "normal")}
+        for leg in robot.legs
+    ]
+    for name in sorted(set(robot.legs[0].every_key()).intersection(*each)):
+        seen = np.einsum("ijk,ik->ij", frames, [own[name] for own in each])
+        opposite = (np.abs(seen[:, None] + seen).max(axis=-1) < _SAME).sum(axis=1)
+        for i in np.flatnonzero(opposite == len(out) - 1) + 1:
+            yield f"leg {i}: {name}: opposite to all other legs', seen from the axis: is it meant?"
+
+
+def _grams(platform: Platform, legs: Sequence[LegKind]) -> Iterator[str]:
+    """Yield a platform that is far heavier than all that carries it."""
+    mass = platform.inertia.mass
+    bodies: list[Any] = [body for leg in legs for body in leg.bodies.values()]
+    carried = sum(getattr(body, "mass", 0.0) for body in bodies)
+    if carried > 0.0 and mass > _HEAVY * carried:
+        yield (
+            f"mass: {mass:g} kg, {mass / carried:.3g} times that of all legs: is it in grams? kg "
+            "are expected"
+        )
 
 
 def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
@@ -74,6 +122,7 @@ def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
         0: {
             "tool": platform.tool,
             "center_of_mass": platform.inertia.center_of_mass,
+            **{f"point of tools item {i}": t.point for i, t in enumerate(robot.tools, start=1)},
             **{f"hinge of bars item {i}": b.hinge for i, b in enumerate(platform.bars, start=1)},
         }
     }
@@ -123,6 +172,8 @@ def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[st
         body: Any = leg.bodies[letter]
         if text := leg.beyond_ends(letter, body.center_of_mass[0]):
             yield f"{key}: center_of_mass: {text}"
+        if body.mass > _DENSE * (high - low):
+            yield f"{key}: mass: {body.mass:g} kg on {high - low:g} m: is it in grams?"
         yield from (f"{key}: {text}" for text in _unlike_a_bar(body, high - low))
 
 
