@@ -6,7 +6,7 @@ import numpy as np
 
 import pteron
 from pteron.calibration import TOLERANCES
-from pteron.calibration.variations import variations, varied
+from pteron.equations.variations import variations, varied
 from pteron.workspace.margins import distance_to_limits
 
 NOISE = 2e-5

@@ -10,6 +10,9 @@ from mechanisms import CLIENTS
 import pteron
 from pteron.controllers import ComputedTorque
 from pteron.equations.drives import Drives
+from pteron.equations.machine import number_places, numbers
+from pteron.equations.variations import variations, varied, varied_numbers
+from pteron.legs import Elastic
 from pteron.motion import (
     Machines,
     Sensors,
@@ -90,6 +93,81 @@ def test_machines_of_a_seed_do_not_depend_on_how_many_there_are(robot):
     assert len({*more.drives[:, 4].tolist()}) == 30  # coulomb of joint 1
 
 
+@CLIENTS
+def test_machines_of_other_geometry_are_what_simulate_makes_of_them(monkeypatch):
+    """The controller takes all for the machine as drawn; so each errs by its own tolerances."""
+    drawn = pteron.load("delta")
+    drawn = replace(drawn, legs=tuple(replace(leg, drive=DRIVE) for leg in drawn.legs))
+    changes = variations(drawn)
+    amounts = np.random.default_rng(0).uniform(-5e-4, 5e-4, (9, len(changes)))
+    built = [varied(drawn, changes, row) for row in amounts]
+    usual = machines_about(drawn, 9)
+    machines = replace(usual, geometry=np.array([numbers(one) for one in built]))
+    motion = pick_and_place(drawn, home_pose(drawn), least=0.1)
+    given = {"sensors": Sensors(1e-6), "duration": 0.02, "delay": 7e-4}
+    slow = simulate_many(machines.rows(slice(2)), motion, ComputedTorque(), **given)
+    monkeypatch.delenv("PTERON_KERNELS")
+    found = simulate_many(machines, motion, ComputedTorque(), **given)
+    for name in ("rms", "largest", "force"):
+        np.testing.assert_array_equal(getattr(slow, name), getattr(found, name)[:2])
+    for k in (0, 8):
+        alone = simulate(built[k], motion, ComputedTorque(), model=drawn, limits=False, **given)
+        np.testing.assert_allclose(found.largest[k], np.abs(alone.error).max(axis=0), atol=1e-12)
+        assert np.abs(alone.error).max() > 1e-5
+    still = np.tile(home_pose(drawn), (9, 1)), np.full((9, 3), 0.1), np.zeros((9, 3)), 1e-4, 20
+    ahead, *_ = advance(drawn, *still, machines=machines)
+    alone, *_ = advance(built[8], *(part[8] for part in still[:3]), 1e-4, 20)
+    np.testing.assert_allclose(ahead[8], alone, rtol=0.0, atol=1e-13)
+    # Drives that bend begin bent about their own joints.
+    soft = replace(DRIVE, elastic=Elastic(2e4, damping=20.0))
+    bends = replace(drawn, legs=tuple(replace(leg, drive=soft) for leg in drawn.legs))
+    softer = replace(machines_about(bends, 9), geometry=machines.geometry)
+    found = simulate_many(softer, motion, ComputedTorque(), duration=0.02)
+    assert not found.stopped.any()
+    whole = replace(built[8], legs=tuple(replace(leg, drive=soft) for leg in built[8].legs))
+    alone = simulate(whole, motion, ComputedTorque(), model=bends, limits=False, duration=0.02)
+    np.testing.assert_allclose(found.largest[8], np.abs(alone.error).max(axis=0), atol=2e-6)
+
+
+def test_tolerances_of_geometry_are_drawn_about_the_drawing(robot):
+    given = {"masses": 0.1, "friction": 0.3, "payload": (0.0, 1.0), "seed": 2}
+    rigid = machines_about(robot, 3, **given)
+    few, more = (machines_about(robot, n, lengths=1e-3, directions=2e-3, **given) for n in (3, 40))
+    np.testing.assert_array_equal(few.geometry, more.geometry[:3])
+    for name in ("parameters", "drives", "payload"):  # as without tolerances of the geometry
+        np.testing.assert_array_equal(getattr(few, name), getattr(rigid, name))
+    off = more.geometry - numbers(robot)
+    for leg, places in zip(robot.legs, number_places(robot), strict=False):
+        for quantity in leg.quantities:
+            at = places[quantity.name] + np.arange(len(quantity.value))
+            if quantity.role in ("length", "point"):
+                assert 9e-4 < np.abs(off[:, at]).max() <= 1e-3 * (1.0 + 1e-12)
+            elif quantity.role == "direction":
+                np.testing.assert_allclose(np.linalg.norm(more.geometry[:, at], axis=1), 1.0)
+                assert 1e-4 < np.abs(off[:, at]).max() < 5e-3
+    changes = variations(robot)
+    amounts = np.random.default_rng(1).uniform(-1e-3, 1e-3, (2, len(changes)))
+    same = [numbers(varied(robot, changes, row)) for row in amounts]
+    np.testing.assert_allclose(varied_numbers(robot, changes, amounts), same, atol=1e-12)
+
+
+def test_a_machine_that_comes_to_nothing_is_told():
+    """One whose links are too short for the motion ends at its first sample, without figures."""
+    drawn = pteron.load("delta")
+    machines = machines_about(drawn, 2)
+    geometry = np.tile(numbers(drawn), (2, 1))
+    at = number_places(drawn)[1]["lower_length"]
+    geometry[1, at] *= 0.3
+    motion = pick_and_place(drawn, home_pose(drawn), least=0.1)
+    found = simulate_many(
+        replace(machines, geometry=geometry), motion, ComputedTorque(), duration=0.01
+    )
+    assert found.stopped.tolist()[0] == ""
+    assert "reach" in found.stopped[1] or "no forces" in found.stopped[1]
+    assert np.isfinite(found.rms[0]).all()
+    assert np.isnan(found.force[1]).all() or found.samples[1] < found.samples[0]
+
+
 def test_states_go_on_as_their_machines_do(robot):
     machines = machines_about(robot, 3, masses=0.3, friction=0.5, seed=1)
     pose = np.tile(home_pose(robot), (3, 1))
@@ -118,6 +196,8 @@ def test_environments_may_have_a_machine_each(robot):
 def test_mistakes_are_told(robot):
     for wrong, message in (
         ({"count": 0}, "count: 0 given"),
+        ({"count": 2, "lengths": -1e-3}, "lengths: -0.001 given, 0 or more"),
+        ({"count": 2, "directions": np.inf}, "directions: inf given, 0 or more"),
         ({"count": 2, "masses": 1.0}, "masses: 1.0 given, a share"),
         ({"count": 2, "payload": (1.0, 0.5)}, "least and most expected"),
         ({"count": 2, "friction": np.nan}, "friction: nan given"),
@@ -127,6 +207,8 @@ def test_mistakes_are_told(robot):
     many = machines_about(robot, 2)
     with pytest.raises(pteron.DataError, match=r"drives: shape \(2, 3\) given"):
         Machines(robot, many.parameters, np.zeros((2, 3)), many.payload)
+    with pytest.raises(pteron.DataError, match=r"geometry: shape \(2, 5\) given"):
+        replace(many, geometry=np.zeros((2, 5)))
     motion = pick_and_place(robot, home_pose(robot), least=0.1)
     with pytest.raises(pteron.DataError, match="controller"):
         simulate_many(many, motion, "pd")

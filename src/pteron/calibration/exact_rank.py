@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pteron.calibration.guess import Block, Guess
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.residuals import MachineSlopes
-from pteron.calibration.variations import slope_matrix
+from pteron.equations.variations import slope_matrix
 from pteron.kernels import NoSquareRoot, PrimeField, evaluate, general_program
 from pteron.kernels.geometry_slopes import slopes_program
 from pteron.kernels.programs import bare

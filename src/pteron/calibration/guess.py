@@ -14,7 +14,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.measurements import TOOL, Measurements, Place, Plane
-from pteron.calibration.variations import Variation, varied
+from pteron.equations.variations import Variation, varied
 from pteron.manipulator import Manipulator
 
 Array = NDArray[np.float64]

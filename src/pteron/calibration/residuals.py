@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess, across
 from pteron.calibration.measurements import Measurements, length_columns, position_axes
-from pteron.calibration.variations import slope_matrix, slope_terms
 from pteron.equations.machine import numbers
+from pteron.equations.variations import slope_matrix, slope_terms
 from pteron.kernels.geometry_slopes import slope_columns, slopes_kernel
 from pteron.manipulator import Manipulator
 

@@ -7,7 +7,7 @@ from typing import get_args
 
 from pteron.calibration.guess import Block, Unknown
 from pteron.calibration.measurements import TOOL, Measurements
-from pteron.calibration.variations import AXIAL, Group, Variation, axial_variations, variations
+from pteron.equations.variations import AXIAL, Group, Variation, axial_variations, variations
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator
 

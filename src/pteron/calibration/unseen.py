@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess
-from pteron.calibration.variations import AXIAL
+from pteron.equations.variations import AXIAL
 from pteron.reduction.numerical import independent
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from pteron.kernels.choice import VARIABLE
 from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array
 from pteron.kernels.loop_code import LinkedLaw, LoopCode
-from pteron.kernels.programs import bare, motion_program, program
+from pteron.kernels.programs import bare, general_program, motion_program, program
 from pteron.kernels.samples import Ask, Evaluated, Plant, run_samples
 from pteron.kernels.targets import FIXED
 from pteron.manipulator import Manipulator
@@ -38,14 +38,20 @@ class Loop:
         The controller.
     linked : LinkedLaw, optional
         Its C as it runs on the machine, in place of the program's.
+    general : bool
+        Whether the machines' geometry is among their numbers.
     """
 
     def __init__(
-        self, robot: Manipulator, law: Program | None = None, linked: LinkedLaw | None = None
+        self,
+        robot: Manipulator,
+        law: Program | None = None,
+        linked: LinkedLaw | None = None,
+        general: bool = False,
     ) -> None:
         self.kind = DriveKind.of(robot)
-        self.plant = _plant(bare(robot), self.kind)
-        self.sensed = program(robot, "sensed")
+        self.plant = _plant(bare(robot), self.kind, general)
+        self.sensed = general_program(robot, "sensed") if general else program(robot, "sensed")
         self.law, self.linked = law, linked
 
     @property
@@ -115,9 +121,14 @@ class Loop:
 
 
 @lru_cache(maxsize=64)
-def loop(robot: Manipulator, law: Program | None = None, linked: LinkedLaw | None = None) -> Loop:
+def loop(
+    robot: Manipulator,
+    law: Program | None = None,
+    linked: LinkedLaw | None = None,
+    general: bool = False,
+) -> Loop:
     """Return the loop of a machine under a controller, or under given forces; see `Loop`."""
-    return Loop(robot, law, linked)
+    return Loop(robot, law, linked, general)
 
 
 def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, Array]:

@@ -225,22 +225,27 @@ def _built(
     return min(forms, key=lambda form: count_operations(form.function))
 
 
-def motion_program(robot: Manipulator, kind: DriveKind) -> Program:
-    """Return the motion of a machine whose drives are of some kind: `equations.sticking.moved`."""
+def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -> Program:
+    """Return the motion of a machine whose drives are of some kind: `equations.sticking.moved`.
+
+    Of a `general` one geometry and gravity are an input too.
+    """
     layout = bare(robot)
-    return kept(("motion", layout, kind), partial(_motion, layout, kind))
+    key = ("motion", layout, kind, *(["general"] if general else []))
+    return kept(key, partial(_motion, layout, kind, general))
 
 
-def _motion(robot: Manipulator, kind: DriveKind) -> Program:
+def _motion(robot: Manipulator, kind: DriveKind, general: bool) -> Program:
     n = robot.joint_count
     names = [*(("side", "hold") if kind.dry else ()), *(name for name, _ in kind.more)]
     extra = {name: ca.SX.sym(name, n) for name in names}
     extra |= {"brake": ca.SX.sym("brake")} if kind.dry else {}
     extra |= {"pace": ca.SX.sym("pace")} if any(kind.lugre) else {}
     extra["actuators"] = ca.SX.sym("actuators", actuator_count(kind))
-    machine, constants = Machine.of(robot), {"kind": kind}
+    machine, vector = Machine.symbols(robot) if general else (Machine.of(robot), None)
+    constants = {"kind": kind}
     return _program(
-        machine, "driven_motion", None, constants, extra=extra, wrench=True, guarded=True
+        machine, "driven_motion", vector, constants, extra=extra, wrench=True, guarded=True
     )
 
 

@@ -1,4 +1,4 @@
-"""`Machines`: many machines of one geometry that differ in masses, drives and payload."""
+"""`Machines`: many machines of one kind that differ in masses, drives, payload and geometry."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.equations.drives import Drives, drive_numbers
+from pteron.equations.machine import numbers
+from pteron.equations.variations import variations, varied_numbers
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data, parameters
@@ -19,7 +21,7 @@ _MOST = 10_000_000
 
 @dataclass(frozen=True)
 class Machines:
-    """Many machines of one geometry, their numbers a row each.
+    """Many machines of one kind, their numbers a row each.
 
     Attributes
     ----------
@@ -31,12 +33,16 @@ class Machines:
         Numbers of the drives, in the order of `pteron.equations.drives.drive_names`.
     payload : array, shape (B,)
         What the tools carry, kg.
+    geometry : array, shape (B, G), optional
+        Their geometry and gravity, in the order of `pteron.equations.machine.numbers`; by default
+        the robot's.
     """
 
     robot: Manipulator
     parameters: Array
     drives: Array
     payload: Array
+    geometry: Array | None = None
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.payload))
@@ -45,6 +51,8 @@ class Machines:
             "drives": (count, len(drive_numbers(self.robot))),
             "payload": (count,),
         }
+        if self.geometry is not None:
+            sizes["geometry"] = count, len(numbers(self.robot))
         for name, shape in sizes.items():
             given = as_array(getattr(self, name), name, ())
             if given.shape != shape or not np.isfinite(given).all():
@@ -68,7 +76,17 @@ class Machines:
     def rows(self, chosen: slice) -> Machines:
         """Return some of them."""
         parts = self.parameters[chosen], self.drives[chosen], self.payload[chosen]
-        return Machines(self.robot, *parts)
+        return Machines(
+            self.robot, *parts, None if self.geometry is None else self.geometry[chosen]
+        )
+
+    @property
+    def numbers(self) -> dict[str, Array]:
+        """What `pteron.kernels.loops.Loop.run` takes of them."""
+        found = {"plant_parameters": self.loaded, "plant_drives": self.drives}
+        if self.geometry is not None:
+            found |= dict.fromkeys(("plant_geometry", "sensed_geometry"), self.geometry)
+        return {name: np.ascontiguousarray(rows[:, None]) for name, rows in found.items()}
 
 
 def machines_about(
@@ -79,9 +97,11 @@ def machines_about(
     friction: float = 0.0,
     rotors: float = 0.0,
     payload: tuple[float, float] = (0.0, 0.0),
+    lengths: float = 0.0,
+    directions: float = 0.0,
     seed: Seed = 0,
 ) -> Machines:
-    """Return random machines about one: tolerances of masses, drives and payload.
+    """Return random machines about one: tolerances of masses, drives, payload and geometry.
 
     Each body is made of lighter or heavier material (one factor a body, so that it stays a real
     one), and each drive has factors of its dry friction, Stribeck's included, of its viscous
@@ -97,6 +117,9 @@ def machines_about(
         Shares by which they may be off, below 1.
     payload : (least, most)
         kg, uniform between them.
+    lengths, directions : float
+        By how much each length and each coordinate of a point may be off, m, and each direction of
+        a leg or of the platform turned about an axis, rad; uniform. Masses stay on their links.
     seed : int
         Machine i of a seed is the same whatever their number.
 
@@ -123,6 +146,9 @@ def machines_about(
     for name, share in shares.items():
         if not 0.0 <= share < 1.0:
             raise DataError(f"{name}: {share!r} given, a share from 0 to below 1 expected")
+    for name, most_off in (("lengths", lengths), ("directions", directions)):
+        if not 0.0 <= most_off < np.inf:
+            raise DataError(f"{name}: {most_off!r} given, 0 or more expected")
     least, most = as_array(payload, "payload", (2,))
     if not 0.0 <= least <= most < np.inf:
         raise DataError(f"payload: {payload!r} given, least and most expected, 0 kg or more")
@@ -134,16 +160,16 @@ def machines_about(
     # Coulomb's and Stribeck's friction of a joint have one factor.
     rows = [names.index("coulomb" if name == "stribeck" else name) for name in names]
     total = max(place) + 1
-    drawn = np.stack(
-        [
-            np.random.default_rng((seed, i)).uniform(-1.0, 1.0, total + len(names) * n + 1)
-            for i in range(count)
-        ]
-    )
-    drives = drawn[:, total:-1].reshape(count, len(names), n)[:, rows]
+    changes = variations(robot) if lengths or directions else ()
+    ends = np.cumsum([total, len(names) * n, 1, len(changes)])
+    every = [np.random.default_rng((seed, i)).uniform(-1.0, 1.0, ends[-1]) for i in range(count)]
+    bodies_drawn, drawn, carried, off = np.split(np.stack(every), ends[:-1], axis=1)
+    drives = drawn.reshape(count, len(names), n)[:, rows]
+    sizes_off = np.array([directions if one.group == "directions" else lengths for one in changes])
     return Machines(
         robot,
-        parameters(robot) * (1.0 + masses * drawn[:, place]),
+        parameters(robot) * (1.0 + masses * bodies_drawn[:, place]),
         drive_numbers(robot) * (1.0 + scales * drives).reshape(count, -1),
-        least + (most - least) * (0.5 + 0.5 * drawn[:, -1]),
+        least + (most - least) * (0.5 + 0.5 * carried[:, 0]),
+        varied_numbers(robot, changes, sizes_off * off) if changes else None,
     )

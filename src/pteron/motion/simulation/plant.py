@@ -124,7 +124,8 @@ def advance(
         name: np.broadcast_to(part, (*lead, sizes[name])).reshape(batch, 1, -1)
         for name, part in parts.items()
     }
-    made, n, kind = loop(robot), robot.joint_count, DriveKind.of(robot)
+    general = machines is not None and machines.geometry is not None
+    made, n, kind = loop(robot, general=general), robot.joint_count, DriveKind.of(robot)
     count_drives, encoders = n * len(kind.more), n * (2 if kind.bends else 1)
     if drives is None:
         drives = drive_states(robot, whole["pose"], whole["velocity"]).reshape(*lead, count_drives)
@@ -153,8 +154,7 @@ def advance(
                 f"machines: {len(machines)} of {machines.robot.name} given, {batch} of "
                 f"{robot.name} expected, one for each state"
             )
-        arrays["plant_parameters"] = np.ascontiguousarray(machines.loaded[:, None])
-        arrays["plant_drives"] = np.ascontiguousarray(machines.drives[:, None])
+        arrays |= machines.numbers
     if batch:
         times = [step, 0.0, 0.0, step * count]
         made.run(arrays, 1, times, [int(count), 0, 0, 0, 0, 0, 0, 0, 0])

@@ -90,12 +90,9 @@ def encoder_arrays(
     share = 1.0
     if sensors.cutoff is not None:
         share = -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
-    before = joints - period * rates
-    widths = np.where(steps > 0.0, steps, 1.0)
-    before = np.where(steps > 0.0, steps * np.round(before / widths), before)
     at = [encoder_of(leg.drive) for leg in robot.legs]
     found = {
-        "encoders": np.concatenate([joints, np.zeros(len(joints)), before, rates]),
+        "encoders": encoder_memory(joints, rates, steps, period),
         "seen": np.concatenate(list(state.values())),
         "steps": steps,
         "noises": noises,
@@ -107,6 +104,17 @@ def encoder_arrays(
     }
     told = np.zeros((1, behind + 1, 2 * len(joints)))
     return {name: value.reshape(1, 1, -1) for name, value in found.items()} | {"told": told}
+
+
+def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
+    """Return the memory (..., 4 E) of encoders that begin with joints and rates (..., E).
+
+    `steps` (E,) are theirs, `period` is from one sample to the next.
+    """
+    before = joints - period * rates
+    widths = np.where(steps > 0.0, steps, 1.0)
+    before = np.where(steps > 0.0, steps * np.round(before / widths), before)
+    return np.concatenate([joints, np.zeros_like(joints), before, rates], axis=-1)
 
 
 def encoder_noise(

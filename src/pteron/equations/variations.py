@@ -7,7 +7,7 @@ allow, such as a tilt of a planar leg's axis, does not vary.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
@@ -16,7 +16,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.equations.machine import number_places
+from pteron.equations.machine import number_places, numbers
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
@@ -182,6 +182,29 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
     return replace(robot, legs=legs, platform=replace(robot.platform, **new[-1]))
 
 
+def varied_numbers(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> Array:
+    """Return the geometry (B, G) of machines that differ by amounts (B, K), m and rad.
+
+    Each is that of `varied`, in the order of `equations.machine.numbers`, but that a derived axis
+    may be another one in its plane. None is checked, and axial variations are not served.
+    """
+    places, frame = number_places(robot), np.array(robot.platform.frame)
+    geometry = np.tile(numbers(robot), (len(amounts), 1))
+    turns: dict[tuple[int, str], Array] = {}
+    for change, amount in zip(changes, amounts.T, strict=True):
+        if change.group == "directions":
+            turn = turns.setdefault((change.leg, change.key), np.zeros((len(amounts), 3)))
+            turn += amount[:, None] * frame[change.axis or 0]
+        else:
+            geometry[:, places[change.leg][change.key] + (change.axis or 0)] += amount
+    for (leg, key), turn in turns.items():
+        matrices = scipy.spatial.transform.Rotation.from_rotvec(turn).as_matrix()
+        for row in _turned_rows(robot, leg, key, places[leg]):
+            at = slice(row, row + 3)
+            geometry[:, at] = np.einsum("bij,bj->bi", matrices, geometry[:, at])
+    return geometry
+
+
 def turning_with(leg: LegKind, key: str) -> list[str]:
     """Return the fields of a leg that turn with one of its directions: first that itself."""
     keys, roles = leg.every_key(), {q.name: q.role for q in leg.quantities}
@@ -223,16 +246,20 @@ def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
             found.append((at[change.key] + (change.axis or 0), k, (), 1))
             continue
         axis = start + 3 * (change.axis or 0)
-        if change.leg < 0:
-            first = {"axis": "first_axis"}.get(change.key, change.key)
-            turned = [at[first]] if first in at else [start, start + 3, start + 6]
-        else:
-            turned = [at[name] for name in _turned(robot.legs[change.leg], change.key, at)]
-        for row in turned:
+        for row in _turned_rows(robot, change.leg, change.key, at):
             for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                 found.append((row + a, k, (axis + b, row + c), 1))
                 found.append((row + a, k, (axis + c, row + b), -1))
     return found
+
+
+def _turned_rows(robot: Manipulator, leg: int, key: str, at: Mapping[str, int]) -> list[int]:
+    """Return where the vectors begin that turn with a direction, by the places of its owner."""
+    if leg >= 0:
+        return [at[name] for name in _turned(robot.legs[leg], key, at)]
+    first = {"axis": "first_axis"}.get(key, key)
+    start = at["frame"]
+    return [at[first]] if first in at else [start, start + 3, start + 6]
 
 
 def _turned(leg: LegKind, key: str, known: Collection[str]) -> list[str]:
