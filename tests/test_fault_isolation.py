@@ -1,5 +1,6 @@
 """Faults that are told by name, or told to be beyond what a log can show."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,22 @@ from logs_of_motions import log_of
 from mechanisms import CLIENTS, gated
 from test_faults import RATE, brisk, clean, found, late_by, noisy
 
-from pteron.identification import FaultIsolation, LogError, Processing, Terms, identify
+import pteron
+from pteron.controllers import FeedForwardPD
+from pteron.identification import (
+    FaultIsolation,
+    Limits,
+    Log,
+    LogError,
+    Processing,
+    Terms,
+    identify,
+    random_excitation,
+)
 from pteron.identification.logs import Description, KnownPayload
 from pteron.identification.verdict import verdict_of
-from pteron.motion import with_payload
+from pteron.legs import Drive, Elastic
+from pteron.motion import simulate, with_payload
 
 
 def refused(robot, log, reason, *words):
@@ -185,6 +198,33 @@ def test_rotors_heavier_than_what_is_there_are_not_trusted():
 
 
 # Where fault isolation is run ------------------------------------------------------
+
+
+def test_play_is_named_where_a_drives_load_changes_direction(monkeypatch):
+    """One encoder a drive, at the motor: the same drives without play are not accused of it."""
+    monkeypatch.delenv("PTERON_KERNELS", raising=False)  # drives that bend take short steps
+    drawn = pteron.load("five-bar")
+    series = random_excitation(drawn, limits=Limits(2.0, 10.0, type_i=0.3), seed=0)
+    motion = series.at(np.arange(5001) / 1000.0)
+    rng = np.random.default_rng(0)
+    named = {}
+    for play in (0.0, 2e-3):
+        # Rotors about as heavy as the machine at its joints, which swing at 50 Hz.
+        soft = Elastic(3e-3 * (2.0 * np.pi * 50.0) ** 2, 0.6, backlash=play)
+        drive = Drive(rotor_inertia=3e-3, elastic=soft)
+        built = replace(drawn, legs=tuple(replace(leg, drive=drive) for leg in drawn.legs))
+        run = simulate(built, motion, FeedForwardPD())
+        size = 0.01 * np.sqrt((run.forces**2).mean(axis=0))
+        forces = run.forces + size * rng.normal(size=run.forces.shape)
+        result = identify(drawn, Log("log.csv", run.time, run.motors, forces))
+        named[play] = result.fault_isolation.faults
+    assert not any(one.fault == "play" for one in named[0.0])
+    first = named[2e-3][0]
+    assert first.fault == "play"
+    assert first.matters
+    assert first.labels == ("torque1", "torque2")
+    assert "where the load changes direction" in first.message
+    json.dumps(first.as_dict(), allow_nan=False)
 
 
 @CLIENTS

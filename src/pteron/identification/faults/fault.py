@@ -22,10 +22,12 @@ FaultName = Literal[
     "drift",
     "load",
     "passive",
+    "play",
 ]
 """Faults by name: forces that are late, the scale of one force, that of all forces, the direction
 of gravity, its size or the rate of the clock, lengths, friction that falls with speed, elastic
-drives, drifting friction or offsets, friction that grows with load, friction in passive joints."""
+drives, drifting friction or offsets, friction that grows with load, friction in passive joints,
+drives with play."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters."""
@@ -63,6 +65,8 @@ _REMEDY: dict[FaultName, str] = {
     "drift": "warm the machine up, or record shorter",
     "load": "no term of the model has it: keep to loads like those of the log",
     "passive": "--joints each adds it to the model",
+    "play": "take the play out of that drive, or keep to motions whose load does not change "
+    "direction; faults named after it may be its own",
 }
 
 
@@ -77,7 +81,8 @@ class IsolatedFault:
     labels : tuple of str
         The force or the leg of each size.
     sizes, deviations : array, shape (k,)
-        Errors, in s, rad, m, N or m/N, and their standard deviations.
+        Errors, in s, rad, m, N or m/N, and their standard deviations; of play how many times as
+        large the residuals are, and NaN.
     chance : float
         Probability that residuals show it so clearly without it.
     shift : float
@@ -111,7 +116,8 @@ class IsolatedFault:
         """Whether values or forces are off by more than their stated errors allow for."""
         if self.of_sampling:
             return bool((self.cycle > _CYCLE_OF_SAMPLING).any())
-        return self.shift > _SHIFT or bool((self.cycle > _CYCLE).any())
+        # Play is no error of a value: what it makes is in the residuals, wherever it is.
+        return self.fault == "play" or self.shift > _SHIFT or bool((self.cycle > _CYCLE).any())
 
     @property
     def message(self) -> str:
@@ -121,8 +127,9 @@ class IsolatedFault:
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {
-            **picked(self, "fault message labels sizes standard_deviations=deviations chance"),
-            **picked(self, "shift matters"),
+            **picked(self, "fault message labels sizes"),
+            "standard_deviations": [None if np.isnan(v) else float(v) for v in self.deviations],
+            **picked(self, "chance shift matters"),
             "cycle_percent": [None if np.isnan(v) else float(v) for v in self.cycle],
             **picked(self, "speeds"),
         }
@@ -147,6 +154,11 @@ class IsolatedFault:
                 tilt, error = np.degrees([np.linalg.norm(self.sizes), self.deviations.max()])
                 return (
                     f"Gravity is {tilt:.2g} degrees (+- {error:.1g}) off the direction in the model"
+                )
+            case "play":
+                return (
+                    f"Residuals of {', '.join(self.labels)} are {self.sizes.max():.2g} times as "
+                    "large where the load changes direction, as where a drive has play"
                 )
             case "gain":
                 size, error = 100.0 * size, 100.0 * error

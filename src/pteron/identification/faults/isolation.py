@@ -14,10 +14,11 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
 from pteron.identification.faults.fault import FaultName, IsolatedFault
+from pteron.identification.faults.play import Record, knocks
 from pteron.identification.faults.search import FoundFault, cannot_be_told, searched
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import observations_of, stacked
+from pteron.identification.observation import in_motion, observations_of, stacked
 from pteron.identification.plausibility import factor_of_forces, known_values
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import (
@@ -210,8 +211,14 @@ def _isolated(
             labels = tuple(family.sizes(model))
             faults.append(IsolatedFault(family.name, labels, *seen, speeds, step))
 
+    # Play, which no column has
+    play = _play(parts, estimate.values, step)
+    if play is not None:
+        faults.insert(0, play)
+        spoiled = np.hypot(spoiled, play.cycle)
+
     # The scales of all forces and of time, which the residuals cannot show
-    tried = tuple(dict.fromkeys(family.name for family in columns.families))
+    tried = (*dict.fromkeys(family.name for family in columns.families), "play")
     factor = factor_of_forces(model, fits[-1], known)
     if factor is not None:
         tried = (*tried, "gain")
@@ -229,6 +236,32 @@ def _isolated(
     shown = {one.fault for one in faults}
     hidden = tuple(fault for fault in left_open if fault not in shown)
     return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden)
+
+
+def _play(parts: Sequence[_Part], values: Array, step: float) -> IsolatedFault | None:
+    """Return that drives have play, where residuals are large as their loads change direction."""
+    records, band = [], max(part.how.band for part in parts)
+    for part in parts:
+        model, how = part.model.model, part.how
+        carried = np.isin(model.kinds, ("base", "payload"))
+        for block in samples(model.robot, part.log, how):
+            matrix = model.matrix(block.states)
+            moving = in_motion(block.states.joint_rates, how.slow, how.turning) > 0.0
+            residual = block.forces - matrix @ values
+            load = matrix @ np.where(carried, values, 0.0)
+            records.append(Record(block.states.time, load, residual, moving))
+    found = knocks(records, band)
+    if found is None:
+        return None
+    named = np.flatnonzero(~np.isnan(found.times)).tolist()
+    labels = tuple(parts[0].model.robot.force_names[joint] for joint in named)
+    # Knocks come on a cycle as they do in the logs, as far as can be said.
+    forces = np.concatenate([part.log.forces for part in parts])
+    cycle = 100.0 * np.sqrt(found.power) / forces.std(axis=0)
+    unknown = np.full(len(named), np.nan)
+    return IsolatedFault(
+        "play", labels, found.times[named], unknown, found.chance, 0.0, cycle, step=step
+    )
 
 
 def delay_of(

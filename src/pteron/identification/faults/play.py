@@ -1,0 +1,110 @@
+"""Play in a drive with one encoder: residuals that are large where its load changes direction.
+
+While a load passes through zero, gear and joint leave each other and meet again with a knock: the
+motor is without its load, then gets all of it at once. No column of the regressor has that: when
+the teeth meet hangs on the play itself. But it lies around the load's changes of direction, and
+nowhere else, where all that is smooth (elasticity, a delay, wrong masses) spreads over the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import scipy  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+
+from pteron.kernels import Array
+
+_LENGTH = 1.0
+"""Length of a window, over the period of the highest frequency that the forces are seen at."""
+
+_TIMES = 2.5
+"""How many times as large residuals are there where there is play.
+
+What follows the load's rate, as all that is smooth does at most, is 1.6 times as large there."""
+
+_CHANCE = 1e-4
+"""Chance that windows of all joints are so much larger by luck, below which it counts."""
+
+_FEWEST = 4
+"""Least number of windows of a joint, with changes of direction and without."""
+
+
+class Record(NamedTuple):
+    """What a log's part has of each joint, (T, n), at even times."""
+
+    time: Array
+    load: Array
+    """What its transmission passes on, by the fit."""
+    residual: Array
+    moving: NDArray[np.bool_]
+    """Where it moves: as it turns round, dry friction alone makes residuals."""
+
+
+class Knocks(NamedTuple):
+    """How much larger the residuals of joints are where their loads change direction."""
+
+    times: Array
+    """(n,); NaN where too little is seen, or nothing."""
+    chance: float
+    power: Array
+    """Mean square (n,) that this adds to the residuals, over all samples."""
+
+
+def knocks(records: Sequence[Record], band: float) -> Knocks | None:
+    """Return what shows play in joints' drives; None where nothing does, or too little is seen.
+
+    Windows' mean squares are ranked (Mann and Whitney's test, over all joints, each in units of its
+    usual one), and medians compared, so that single outliers, or a few of these changes that
+    fall together with something else, say nothing. `band` is the highest frequency that forces are
+    seen at, Hz.
+    """
+    count = records[0].load.shape[1]
+    times, power = np.full(count, np.nan), np.zeros(count)
+    every: tuple[list[Array], list[Array]] = ([], [])
+    for joint in range(count):
+        near, far, share = _windows(records, band, joint)
+        if min(len(near), len(far)) < _FEWEST:
+            continue
+        usual = max(float(np.median(far)), np.finfo(float).tiny)
+        times[joint] = np.sqrt(np.median(near) / usual)
+        power[joint] = max(float(np.mean(near)) - usual, 0.0) * share
+        every[0].append(near / usual)
+        every[1].append(far / usual)
+    shows = times >= _TIMES
+    if not shows.any():
+        return None
+    both = (np.concatenate(part) for part in every)
+    chance = float(scipy.stats.mannwhitneyu(*both, alternative="greater").pvalue)
+    if chance > _CHANCE:
+        return None
+    return Knocks(np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0))
+
+
+def _windows(records: Sequence[Record], band: float, joint: int) -> tuple[Array, Array, float]:
+    """Return mean squares of windows as a load changes direction, of others, and the first's share.
+
+    A joint moves all through a window.
+    """
+    near, far = [], []
+    covered, samples = 0, 0
+    for record in records:
+        length = max(int(_LENGTH / band / float(np.median(np.diff(record.time)))), 2)
+        square, moving = record.residual[:, joint] ** 2, record.moving[:, joint]
+        turned = np.flatnonzero(np.diff(np.sign(record.load[:, joint])) != 0) + 1
+        free, last = moving.copy(), -length
+        for at in turned.tolist():
+            # The load is not known so well that it could not change a little before.
+            free[max(at - length // 2, 0) : at + 2 * length] = False
+            if at >= last + length and at + length <= len(square):
+                if moving[at : at + length].all():
+                    near.append(float(square[at : at + length].mean()))
+                    covered += length
+                last = at
+        for at in range(0, len(square) - length, length):
+            if free[at : at + length].all():
+                far.append(float(square[at : at + length].mean()))
+        samples += len(square)
+    return np.array(near), np.array(far), covered / samples
