@@ -1,13 +1,16 @@
 """From a log to a running machine: excite, record, identify, export, and run the C on the machine.
 
-The machine is simulated in MuJoCo (`plant`), up to 20 % off what was drawn, with dry friction that
-sticks at rest. It records an exciting motion and a pick-and-place cycle under a controller that
-knows the drawing and no friction; encoders and forces are noisy. The fit is exported to C, which is
-compiled, and asked two things: what the drives must give over the held-out cycle, against the noisy
-record of what they gave; and to run the machine, beside feedback of position and rate, which is
-free of noise and delay.
+The machine is simulated (`plant`), up to 20 % off what was drawn, with dry friction that sticks at
+rest: in MuJoCo; in Pteron under the same controller, ten times in a sample of the log; and in
+Pteron as drives are, under that controller at 1 kHz, with encoders and a delay. It records an
+exciting motion and a pick-and-place cycle under a controller that knows the drawing and no
+friction; encoders and forces are noisy. The fit is exported to C, which is compiled, and asked two
+things: what the drives must give over the held-out cycle, against the noisy record of what they
+gave; and to run the machine, beside feedback of position and rate, which is free of noise and delay
+but in the last of the three.
 
-It prints a table for each; `--quick` has a shorter recording, of the Delta alone.
+It prints a table for each, and how far the first two machines' recordings are apart; `--quick` has
+a shorter recording, of the Delta alone.
 """
 
 from __future__ import annotations
@@ -17,14 +20,15 @@ import json
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import plant
 
 import pteron
-from pteron.identification import Identification, Log, identify, preprocessing_of
+from pteron.identification import Identification, Log, Processing, identify, preprocessing_of
 from pteron.identification.excitation import FourierMotion, Limits, optimal_excitation
 from pteron.identification.observation import in_motion
 from pteron.identification.signals import samples
@@ -44,6 +48,9 @@ _NOISE = 0.01
 _JITTER = 1e-5
 _REST = 0.2
 """Between two cycles, s."""
+
+_DELAY = 2e-4
+"""From a sample to the drives' force for it, where they have one, s."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,23 @@ CASES = (
         Limits(speed=6.0, acceleration=80.0),
     ),
 )
+
+
+def twins(case: Case) -> dict[str, plant.Plant]:
+    """Return the simulated machines of a case, by their simulation."""
+    return {
+        "MuJoCo": plant.simulate,
+        "Pteron": plant.Own(),
+        "as drives are": plant.Own(rate=1000.0, encoder=case.encoder, delay=_DELAY),
+    }
+
+
+@lru_cache
+def exciting_motion(case: Case, seconds: float) -> FourierMotion:
+    """Return the motion that all twins of a case record, after a search of `seconds`."""
+    return optimal_excitation(
+        pteron.load(case.name), limits=case.limits, seconds=seconds, draws=20, starts=4, workers=1
+    ).motion
 
 
 @dataclass(frozen=True)
@@ -158,6 +182,8 @@ class Outcome:
     """Result of the chain for a machine."""
 
     found: Identification
+    recordings: dict[str, plant.Recording]
+    """What the machine did, by the motion's name."""
     prediction: Array
     """Error of the C's forces over the noise of the recorded ones (n,) on the held-out cycle, from
     the motion of the machine, where joints move."""
@@ -177,24 +203,22 @@ class Outcome:
         return np.asarray(self.tracking["nothing"] / self.tracking["exported C"])
 
 
-def run(case: Case, folder: Path, *, duration: float, seconds: float, cycles: int) -> Outcome:
-    """Go the whole way with a machine.
+def run(
+    case: Case, twin: str, folder: Path, *, duration: float, seconds: float, cycles: int
+) -> Outcome:
+    """Go the whole way with a machine, in one of its `twins`.
 
     The exciting motion, whose search takes `seconds`, is recorded for `duration` s.
     """
     drawn = pteron.load(case.name)
     built, n = plant.as_built(drawn), drawn.freedom
-
-    # Excite
-    motion = optimal_excitation(
-        drawn, limits=case.limits, seconds=seconds, draws=20, starts=4, workers=1
-    ).motion
-    exciting, placing = Excited(motion), Cycles(drawn)
+    simulated = twins(case)[twin]
+    exciting, placing = Excited(exciting_motion(case, seconds)), Cycles(drawn)
     length = cycles * (placing.duration + _REST)
 
     # Record: the controller has the drawing, and knows of no friction
     recordings = {
-        name: plant.simulate(
+        name: simulated(
             built, reference, case.friction, duration=length, drawn=drawn, compensation=0.0
         )
         for name, reference, length in (
@@ -210,14 +234,16 @@ def run(case: Case, folder: Path, *, duration: float, seconds: float, cycles: in
     }
     log, held_out = (Log(name, one.time, one.joints, one.forces) for name, one in seen.items())
 
-    # Identify
-    found = identify(drawn, log, held_out=held_out)
+    # Identify: a force that is held from sample to sample is not of the instant of either
+    sampled = isinstance(simulated, plant.Own) and simulated.delay > 0.0
+    processing = Processing(delay="auto") if sampled else Processing()
+    found = identify(drawn, log, held_out=held_out, processing=processing)
     path = folder / "identification.json"
     path.write_text(json.dumps(numbers(found)), encoding="utf-8")
 
     # Export, and predict the held-out cycle
     controller, noise = Controller(drawn, path, folder), seen["pick-and-place cycle"].noise
-    preprocessing = preprocessing_of(drawn, held_out)
+    preprocessing = replace(preprocessing_of(drawn, held_out), delay=found.preprocessing[0].delay)
     true = recordings["pick-and-place cycle"]
     moving = in_motion(true.rates, preprocessing.slow, preprocessing.turning)
     off = (controller(true.joints, true.rates, true.accelerations) - held_out.forces) / noise
@@ -233,7 +259,7 @@ def run(case: Case, folder: Path, *, duration: float, seconds: float, cycles: in
         ("the drawing", None),
         ("exported C", controller),
     ):
-        followed = plant.simulate(
+        followed = simulated(
             built,
             placing,
             case.friction,
@@ -247,6 +273,7 @@ def run(case: Case, folder: Path, *, duration: float, seconds: float, cycles: in
         tracking[name] = np.sqrt((behind**2).mean(axis=0))
     return Outcome(
         found,
+        recordings,
         _rms(off, moving),
         _rms(off),
         _rms((by_encoders - forces) / noise, known),
@@ -275,10 +302,11 @@ def main() -> None:
     )
     outcomes = {}
     for case in cases:
-        with tempfile.TemporaryDirectory() as folder:
-            outcomes[case.name] = run(
-                case, Path(folder), duration=duration, seconds=seconds, cycles=cycles
-            )
+        for twin in twins(case):
+            with tempfile.TemporaryDirectory() as folder:
+                outcomes[case.name, twin] = run(
+                    case, twin, Path(folder), duration=duration, seconds=seconds, cycles=cycles
+                )
     print(
         "Forces of the held-out cycle by the compiled C, worst joint: error over the noise of the "
         "sensors,\nwhere joints move, for dry friction holds them with any force else. By "
@@ -286,24 +314,46 @@ def main() -> None:
         "verdict; their noise is added"
     )
     print(
-        f"{'':<14}{'verdict':<16}{'error':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}"
+        f"{'':<28}{'verdict':<16}{'error':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}"
     )
-    for name, one in outcomes.items():
+    for names, one in outcomes.items():
         print(
-            f"{name:<14}{one.found.verdict.grade:<16}{one.prediction.max():>12.2f}"
+            f"{_row(names)}{one.found.verdict.grade:<16}{one.prediction.max():>12.2f}"
             f"{one.left_out:>10.0%}{one.everywhere.max():>12.2f}{one.sensed.max():>14.2f}"
         )
     print("\nTracking of that cycle: root mean square error of all joints (um or urad)")
-    print(f"{'feed-forward:':<14}{'nothing':>12}{'the drawing':>14}{'exported C':>14}", end="")
+    print(f"{'feed-forward:':<28}{'nothing':>12}{'the drawing':>14}{'exported C':>14}", end="")
     print(f"{'better than nothing':>24}{'worst joint':>14}")
-    for name, one in outcomes.items():
+    for names, one in outcomes.items():
         size = {key: float(np.sqrt((rms**2).mean())) for key, rms in one.tracking.items()}
         cells = [f"{1e6 * size[key]:.0f}" for key in size]
         gain = size["nothing"] / size["exported C"]
         print(
-            f"{name:<14}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}{gain:>22.1f} x"
+            f"{_row(names)}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}{gain:>22.1f} x"
             f"{one.gains.min():>12.1f} x"
         )
+    print(
+        "As drives are: rates are differences of encoders' steps, half a sample late, and feedback "
+        "makes ripple\nin the forces of these steps, which no smoothed position shows: by "
+        "encoders, that is an error"
+    )
+    print("\nPteron's motion less MuJoCo's: root mean squares, over MuJoCo's, worst joint")
+    print(f"{'':<28}{'joints':>12}{'rates':>14}{'accelerations':>16}{'forces':>12}")
+    for case in cases:
+        theirs, ours = (outcomes[case.name, twin].recordings for twin in ("MuJoCo", "Pteron"))
+        for name, recorded in theirs.items():
+            cells = [
+                f"{float((_rms(getattr(ours[name], k) - given) / _rms(given)).max()):.1e}"
+                for k in ("joints", "rates", "accelerations", "forces")
+                for given in [getattr(recorded, k)]
+            ]
+            print(
+                f"{case.name:<13}{name:<23}{cells[0]:>4}{cells[1]:>14}{cells[2]:>16}{cells[3]:>12}"
+            )
+
+
+def _row(names: tuple[str, str]) -> str:
+    return f"{names[0]:<14}{names[1]:<14}"
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from plant.model import (
 from plant.reference import Reference
 from pteron.export import Tree, coordinates
 
-__all__ = ["Recording", "simulate"]
+__all__ = ["Plant", "Recording", "simulate"]
 
 _STEP = 2e-4
 """Step of the integration, s."""
@@ -73,6 +73,24 @@ class Recording:
     forces: Array
     poses: Array
     gap: float
+
+
+class Plant(Protocol):
+    """A simulation of the machine: `simulate` here in MuJoCo, `plant.own.Own` in Pteron."""
+
+    def __call__(
+        self,
+        robot: pteron.Manipulator,
+        reference: Reference,
+        friction: Friction,
+        *,
+        duration: float,
+        drawn: pteron.Manipulator | None,
+        compensation: float,
+        bandwidth: float = BANDWIDTH,
+        feed_forward: FeedForward | None = None,
+    ) -> Recording:
+        """Let the machine follow a reference and record it; arguments are those of `simulate`."""
 
 
 @lru_cache(maxsize=16)
