@@ -183,12 +183,14 @@ def simulate_many(
         made.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
         done = arrays["done"][:, 0]
         gone = np.arange(count) >= done
-        error = np.where(gone[..., None], np.nan, samples["states"][..., :m] - reference.pose)
+        error = samples["states"][..., :m] - reference.pose
+        error[gone] = np.nan
         # Of a machine that came to nothing all are NaN.
         came = np.where(done[:, 0] > 0.0, done[:, 0], np.nan)
         found["rms"].append(np.sqrt(np.nansum(error**2, axis=1) / came[:, None]))
         found["most"].append(np.fmax.reduce(np.abs(error), axis=1))
-        force = np.where(gone[..., None], np.nan, np.abs(samples["forces"]))
+        force = np.abs(samples["forces"])
+        force[gone] = np.nan
         found["force"].append(np.fmax.reduce(force, axis=1))
         found["done"].append(done[:, 0])
         found["fault"].append(arrays["fault"][:, 0, 0])
