@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,7 @@ from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.plots.canvas import (
+    FONT_SIZE,
     INK,
     LEG_COLORS,
     MUTED,
@@ -25,7 +26,6 @@ from pteron.plots.canvas import (
     legend,
     numbered,
     plain_axes,
-    remark,
     spot,
     zero_line,
 )
@@ -102,8 +102,10 @@ def force_speed_figure(
             axes.plot(speeds[:, i], forces[:, i], label=f"leg {i + 1}", **leg_style(i, 1.6))
             spot(axes, rms[0][i], rms[1][i], LEG_COLORS[i], PAPER, 6.5, zorder=5)
         if k == 0:
-            for x, y in ((-1.0, 1.0), (1.0, -1.0)):
-                remark(axes, "brakes", 0.87 * x * sizes[0], (0.915 * y - 0.025) * sizes[1], MUTED)
+            # Held at the corners, so that letters of any size stay inside the axes.
+            for x, y, side, level in ((0.02, 0.98, "left", "top"), (0.98, 0.02, "right", "bottom")):
+                style: dict[str, Any] = {"ha": side, "va": level, "transform": axes.transAxes}
+                axes.text(x, y, "brakes", fontsize=FONT_SIZE, color=MUTED, **style)
     legend(figure, min(len(units), 4))
     return figure
 

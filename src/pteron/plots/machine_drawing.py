@@ -125,7 +125,7 @@ def draw_directions(sheet: MachineAxes, scene: Scene) -> None:
     low, high, size = scene.low, scene.high, scene.size
     if isinstance(sheet, SpaceAxes):
         # At the near corner of the ground, in the upright frame: beside the machine, not in it.
-        near = low + size * np.array([-0.02, -0.10, 0.0])
+        near = low + size * np.array([-0.09, -0.17, 0.0])
         corner = sheet.beside_eye(near, (low + high) / 2.0)
         for axis, name in zip(np.eye(3), "xyz", strict=True):
             sheet.line(np.array([corner, corner + 0.13 * size * axis]), INK, 1.6, raised=1.0)

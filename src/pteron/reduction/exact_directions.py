@@ -81,7 +81,9 @@ class Notes:
         return self.length(f"{name}.x", x), self.length(f"{name}.y", y)
 
     def _recognised(self, name: str, value: float, exact: Surd) -> None:
-        self.recognised.append(f"{name} = {exact} (off by {abs(float(exact) - value):.0e})")
+        error = abs(float(exact) - value)
+        told = f"off by {error:.0e}" if error else "to the last digit"
+        self.recognised.append(f"{name} = {exact} ({told})")
 
     def _approximated(self, name: str, value: float, exact: Surd) -> None:
         error = abs(float(exact) - value)

@@ -79,13 +79,15 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
     whose, told = _forces_told(found)
     name = f" of {recorded.source}" if recorded.source else ""
     time = recorded.motion.time
+    turned = angles_text(robot, recorded.motion.pose[0])
+    begins = f"begins ({turned})" if turned else "begins"
     made = template("motion.html.j2", count=lambda number: f"{number:,}".replace(",", "\u202f"))
     return made.render(
         **stage(
             robot,
             found.frames,
             doing=f"in the motion{name}",
-            still="Where the motion begins, with its way.",
+            still=f"Where the motion {begins}, with its way.",
             force_title=f"{whose} {force(joints).name}",
         ),
         found=found,
@@ -124,7 +126,6 @@ def _figures(found: ShownMotion) -> dict[str, Any]:
         at.guides,
         gravity=gravity_of(robot),
         path=at.points.tool,
-        angle=angles_text(robot, motion.pose[0]),
     )
     joints = [leg.joint for leg in robot.legs]
     some = few(len(motion.time))

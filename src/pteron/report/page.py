@@ -55,12 +55,14 @@ def page(report: Report) -> str:
     )
     tooled = any(robot.platform.tool)
     point, way = "the tool's centre point" if tooled else "P", "cycle" if standard else "motion"
+    turned = angles_text(robot, report.home)
+    home = f"home pose ({turned})" if turned else "home pose"
     return made.render(
         **stage(
             robot,
             report.shown,
             doing="on its pick-and-place cycle" if standard else "in motion",
-            still=f"The home pose, with the way of {point} on the {way}.",
+            still=f"The {home}, with the way of {point} on the {way}.",
             force_title=f"{'Drive' if report.driven else 'Actuator'} {force(joints).name}",
         ),
         report=report,
@@ -220,7 +222,6 @@ def _figures(report: Report) -> dict[str, Any]:
         shown.guides,
         gravity=gravity_of(robot),
         path=shown.points.tool[out],
-        angle=angles_text(robot, report.home),
     )
     whose = "drive" if report.driven else "actuator"
     label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"

@@ -45,6 +45,9 @@ class Picture {
     const rim = machine.planar ? 0.06 * size : 0, step = machine.grid; // a planar machine is seen against its squares
     this.gridLow = [0, 1].map((k) => Math.floor((low[k] - rim) / step) * step);
     this.gridHigh = [0, 1].map((k) => Math.ceil((high[k] + rim) / step) * step);
+    // Where the base frame's directions are drawn: in space beside the squares, whose corner a foot may fill.
+    const off = machine.planar ? 0 : 0.08 * size;
+    this.corner = [this.gridLow[0] - off, this.gridLow[1] - off, this.floor];
     this.center = [(this.gridLow[0] + this.gridHigh[0]) / 2, (this.gridLow[1] + this.gridHigh[1]) / 2, (this.floor + high[2]) / 2];
     const given = machine.radii || {}, own = (name, share) => given[name] || share * size;
     this.radii = { guide: own("guide", 0.008), upper: own("upper", 0.012), lower: own("lower", 0.0085), rod: own("lower", 0.0055), platform: own("platform", 0.008) };
@@ -109,7 +112,7 @@ class Picture {
   #hull() {
     const { gridLow, gridHigh, size } = this;
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, this.floor]);
-    const base = this.baseAxes.map((axis) => add(corners[0], axis, 0.17 * size)), found = new Set(base), all = this.cloud.concat(corners, base);
+    const base = this.baseAxes.map((axis) => add(this.corner, axis, 0.17 * size)), found = new Set(base), all = this.cloud.concat(corners, base);
     for (let i = 0; i < 12; i++) {
       for (const rise of [-1, -0.5, 0, 0.5, 1]) {
         const way = [Math.cos((i * Math.PI) / 6), Math.sin((i * Math.PI) / 6), 2 * rise];
@@ -167,6 +170,7 @@ class Picture {
     pen.textAlign = "center"; pen.textBaseline = "middle";
     pen.strokeStyle = this.colors.paper; pen.lineWidth = 4; pen.lineJoin = "round";
     pen.strokeText(text, x, y); pen.fillStyle = color; pen.fillText(text, x, y);
+    this.written.push([x, y]);
   }
   label(p, text, color) { const q = this.pixel(p); this.write(q[0], q[1], text, color); }
   // A convex solid: only faces towards the eye, shaded by how much they face the light.
@@ -211,7 +215,7 @@ class Picture {
     pen.lineCap = "butt"; pen.strokeStyle = colors.grid; pen.lineWidth = 1;
     for (let x = gridLow[0]; x <= gridHigh[0] + 1e-9; x += step) { this.path([[x, gridLow[1], floor], [x, gridHigh[1], floor]]); pen.stroke(); }
     for (let y = gridLow[1]; y <= gridHigh[1] + 1e-9; y += step) { this.path([[gridLow[0], y, floor], [gridHigh[0], y, floor]]); pen.stroke(); }
-    const corner = [...gridLow, floor];
+    const corner = this.corner;
     this.baseAxes.forEach((axis, k) => {
       this.line(corner, add(corner, axis, 0.13 * size), colors.ink, 1.8);
       this.label(add(corner, axis, 0.17 * size), "xyz"[k], colors.ink);
@@ -290,6 +294,7 @@ class Picture {
     this.queued = false;
     if (!m || !this.width) return;
     pen.clearRect(0, 0, this.width, this.height);
+    this.written = [];
     this.ground();
     if (!machine.planar) this.shadow(m);
     for (const { color, quads } of extra.slice || []) {
@@ -333,7 +338,10 @@ class Picture {
       const a = this.pixel(at), ahead = this.pixel(add(at, along, 0.1)), from = this.pixel(p);
       const across = unit([a[1] - ahead[1], ahead[0] - a[0], 0]);
       const sign = across[0] * (a[0] - from[0]) + across[1] * (a[1] - from[1]) < 0 ? -1 : 1, gap = sign * (0.034 * size * a[3] + 11);
-      this.write(a[0] + gap * across[0], a[1] + gap * across[1], String(i + 1), colors.legs[i], true);
+      // Elsewhere where another letter stands already: feet of two legs may be one in the picture.
+      const places = [1, 1.7, -1, 2.4].map((t) => [a[0] + t * gap * across[0], a[1] + t * gap * across[1]]);
+      const [x, y] = places.find((q) => this.written.every((w) => Math.hypot(q[0] - w[0], q[1] - w[1]) > 15)) || places[0];
+      this.write(x, y, String(i + 1), colors.legs[i], true);
     });
     if (this.drawn) this.drawn();
   }

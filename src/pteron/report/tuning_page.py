@@ -2,24 +2,45 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 import pteron
+from pteron.controllers.feedback import Feedback
+from pteron.manipulator import Manipulator
 from pteron.motion import Tuning
-from pteron.motion.motion import told_pose
+from pteron.motion.trajectories.limits import limits_of
 from pteron.plots import bode_figure, poles_figure, svg
+from pteron.report.quantities import readable
 from pteron.report.typeset import resource, template
 
 if TYPE_CHECKING:
     import polars as pl
 
-_UNITS = {
-    "bandwidth": "bandwidth, rad/s",
-    "delay": "delay, s",
-    "encoder": "encoder step",
-    "stiffness": "stiffness, of the file's",
+_KINDS = {
+    "pd_gravity": "PD with gravity",
+    "feed_forward_pd": "Feed-forward PD",
+    "computed_torque": "Computed torque",
+    "adaptive": "Adaptive",
+    "adaptive_drives": "Adaptive, drives too",
+}
+"""Laws by name, as people read them."""
+
+
+class _Changed(NamedTuple):
+    """What trials change: in a heading, in the column's head with {} for the unit, the factor."""
+
+    many: str
+    one: str
+    factor: float
+
+
+_CHANGED = {
+    "bandwidth": _Changed("bandwidths", "bandwidth (rad/s)", 1.0),
+    "delay": _Changed("delays", "delay (ms)", 1e3),
+    "encoder": _Changed("steps of the encoders", "step ({})", 1e6),
+    "stiffness": _Changed("stiffnesses", "stiffness, over the file's", 1.0),
 }
 
 
@@ -30,20 +51,24 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
     moment = tuning.moments[tuning.worst]
     at = "In the workspace, at rest" if np.isnan(moment) else f"In the motion, at {moment:.3g} s"
     bandwidth = None if controller.bandwidth is None else float(np.max(controller.bandwidth))
-    return template("tuning.html.j2").render(
+    readings = " or ".join(dict.fromkeys(f"\u00b5{leg.joint.unit}" for leg in robot.legs))
+    return template("tuning.html.j2", readable=readable).render(
         robot=robot,
         tuning=tuning,
         controller=controller,
-        kind=controller.what.replace("_", " ").capitalize(),
+        kind=_KINDS.get(controller.what, controller.what.replace("_", " ").capitalize()),
         bandwidth=bandwidth,
         required=tuning.required,
         least=tuning.least,
         gains=tuning.gains(),
+        units=_gain_units(tuning),
+        forces=_force_units(robot),
         each={
             name: np.min([getattr(one, name) for one in tuning.margins], axis=0)
             for name in ("gain", "phase", "delay")
         },
-        where=f"{at}, at pose {told_pose(tuning.states[tuning.worst, 0])}.",
+        at=at,
+        pose=tuning.states[tuning.worst, 0],
         figures={
             "bode": svg(
                 bode_figure(worst.frequencies, worst.drive_loops, robot.joint_names),
@@ -53,12 +78,34 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
             "poles": svg(poles_figure(worst.loop.poles), name="poles", title="Poles of the loop"),
         },
         trials={
-            title: [row for row in trials.to_dicts() if row["changed"] == name]
-            for name, title in _UNITS.items()
+            name: [row for row in trials.to_dicts() if row["changed"] == name]
+            for name in _CHANGED
             if len(trials) and name in trials["changed"]
+        },
+        changed={
+            name: told._replace(one=told.one.format(readings)) for name, told in _CHANGED.items()
         },
         length="rad" if robot.platform.angular.all() else "m",
         degrees=180.0 / np.pi,
         version=pteron.__version__,
         style=resource("page.css"),
     )
+
+
+def _gain_units(tuning: Tuning) -> list[str]:
+    """Return the units of the gains of a joint, one for each kind; empty where joints differ."""
+    own = {(leg.joint.force_unit, leg.joint.unit) for leg in tuning.robot.legs}
+    if tuning.controller.what == "computed_torque":
+        return ["1/s\u00b2", "1/s"]
+    if len(own) > 1:
+        return ["", ""]
+    (force, unit) = own.pop()
+    first = f"{force}/{unit}" if isinstance(tuning.controller, Feedback) else "1/s"
+    return [first, f"{force} s/{unit}"]
+
+
+def _force_units(robot: Manipulator) -> list[str]:
+    """Return the units of the trials' forces: shares where a drive's largest force is known."""
+    known = zip(np.isfinite(limits_of(robot).force), robot.legs, strict=True)
+    units = ("share" if sure else leg.joint.force_unit for sure, leg in known)
+    return list(dict.fromkeys(units))

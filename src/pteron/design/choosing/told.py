@@ -25,7 +25,7 @@ _MARGINS = {"rated_margin": "rated torque", "peak_margin": "peak torque", "speed
 def cells(one: Candidate) -> dict[str, str]:
     """Return a row's numbers by their headings, rounded; of a machine that serves."""
     least = min(one.figures[name] for name in _MARGINS if name in one.figures)
-    found = {"margin": f"{least:.2f}"}
+    found = {"margin": _ratio(least)}
     for name, (heading, factor) in _FIGURES.items():
         if (value := one.figures.get(name)) is not None:
             found[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
@@ -47,8 +47,13 @@ def dimensions(one: Candidate) -> str:
 def margins(one: Candidate) -> str:
     """Return the drives' margins and the place of the least, in a line."""
     known = {word: one.figures[name] for name, word in _MARGINS.items() if name in one.figures}
-    told = ", ".join(f"{word} {value:.2f}" for word, value in known.items())
+    told = ", ".join(f"{word} {_ratio(value)}" for word, value in known.items())
     return f"{told}; least at {one.worst}" if one.worst else told
+
+
+def _ratio(value: float) -> str:
+    """Return a margin, of which three digits mean something."""
+    return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
 
 
 def asked(job: Job) -> list[str]:
