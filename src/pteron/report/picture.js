@@ -89,12 +89,12 @@ class Picture {
   }
   pixel(p) {
     const q = this.project(p), k = this.scale * this.camera.zoom, pan = this.camera.pan;
-    return [this.width / 2 + k * q[0] + pan[0], this.height / 2 + k * (q[1] - this.middle) + pan[1], q[2], k * q[3]];
+    return [this.width / 2 + k * q[0] + pan[0], this.level + k * (q[1] - this.middle) + pan[1], q[2], k * q[3]];
   }
   // The point under a pixel, as far from the eye as another point.
   under(x, y, beside) {
     const near = this.project(beside)[3], k = this.scale * this.camera.zoom, [panX, panY] = this.camera.pan;
-    const right = (x - this.width / 2 - panX) / k / near, rise = -((y - this.height / 2 - panY) / k + this.middle) / near;
+    const right = (x - this.width / 2 - panX) / k / near, rise = -((y - this.level - panY) / k + this.middle) / near;
     const depth = this.project(beside)[2], { yaw, pitch } = this.camera;
     const c = Math.cos(yaw), s = Math.sin(yaw), cp = Math.cos(pitch), sp = Math.sin(pitch);
     const across = add(add([right * c, -right * s, 0], [sp * s, sp * c, cp], rise), [cp * s, cp * c, -sp], depth);
@@ -104,6 +104,9 @@ class Picture {
   fit() {
     const ratio = window.devicePixelRatio || 1, { canvas } = this;
     this.width = canvas.clientWidth; this.height = canvas.clientHeight;
+    // A bar over the picture covers none of the machine: `level` is the middle of what it leaves.
+    const covered = this.bar ? this.bar.offsetHeight : 0;
+    this.clear = this.height - covered; this.level = covered + this.clear / 2;
     canvas.width = Math.round(this.width * ratio); canvas.height = Math.round(this.height * ratio);
     this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.frameAll();
@@ -131,7 +134,7 @@ class Picture {
       }
     }
     // Half the breadth of a leg's number is kept free on every side.
-    this.scale = Math.max(1, Math.min((this.width / 2 - 16) / wide, (this.height - 32) / (bottom - top)));
+    this.scale = Math.max(1, Math.min((this.width / 2 - 16) / wide, (this.clear - 32) / (bottom - top)));
     this.middle = (top + bottom) / 2;
     this.redraw();
   }

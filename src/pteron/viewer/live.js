@@ -28,7 +28,8 @@
     machine = found; trail = []; slice = [];
     if (first) {
       picture = new Picture(the("view"), found.still, found.cloud);
-      Object.assign(picture, { whole: true, grab, space: () => the("play").click() });
+      Object.assign(picture, { whole: true, grab, space: () => the("play").click(), bar: document.querySelector(".top") });
+      picture.fit();
     } else { picture.take(found.still, found.cloud); picture.frameAll(); }
     for (const [name, sliders] of [["pose", found.coordinates], ["joint", found.joints]]) {
       sliders.forEach((one, i) => Object.assign(the(name + i), { min: one.least, max: one.most }));
@@ -146,18 +147,24 @@
       plot.queued = false;
       for (const name of ["forces", "joints", "power"]) {
         const canvas = the("plot-" + name), pen = canvas.getContext("2d"), ratio = window.devicePixelRatio || 1;
-        const width = canvas.clientWidth, height = canvas.clientHeight, left = 46, colors = picture.colors;
+        const width = canvas.clientWidth, height = canvas.clientHeight, colors = picture.colors;
         if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
         pen.setTransform(ratio, 0, 0, ratio, 0, 0); pen.clearRect(0, 0, width, height);
         const known = past.flatMap((row) => row[name]).filter((value) => value !== null);
         if (!known.length) continue;
         let low = Math.min(...known), high = Math.max(...known);
-        const rim = 0.08 * (high - low) || Math.max(1e-3, 0.05 * Math.abs(high)); low -= rim; high += rim;
+        // What differs by rounding alone is drawn as one level, and its numbers have no more digits.
+        const most = Math.max(Math.abs(low), Math.abs(high)), rim = most < 1e-6 ? 1 : Math.max(0.08 * (high - low), 0.02 * most);
+        low -= rim; high += rim;
+        const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(high - low)))), levels = [low + rim, (low + high) / 2, high - rim];
+        const labels = levels.map((v) => minus(v, places)).map((text, i, all) => (all.indexOf(text) === i ? text : ""));
+        pen.font = "11px system-ui, sans-serif";
+        const left = Math.max(46, ...labels.map((text) => pen.measureText(text).width + 8));
         const end = past[past.length - 1].clock, x = (t) => left + ((t - end + _SPAN) / _SPAN) * (width - left - 4), y = (v) => 4 + ((high - v) / (high - low)) * (height - 20);
-        pen.font = "11px system-ui, sans-serif"; pen.fillStyle = colors.muted; pen.textAlign = "right"; pen.textBaseline = "middle";
-        const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(high - low))));
-        for (const v of [low + rim, (low + high) / 2, high - rim]) {
-          pen.fillText(minus(v, places), left - 5, y(v)); pen.strokeStyle = colors.grid; pen.lineWidth = 1;
+        pen.fillStyle = colors.muted; pen.textAlign = "right"; pen.textBaseline = "middle";
+        for (const [i, v] of levels.entries()) {
+          if (!labels[i]) continue;
+          pen.fillText(labels[i], left - 5, y(v)); pen.strokeStyle = colors.grid; pen.lineWidth = 1;
           pen.beginPath(); pen.moveTo(left, y(v)); pen.lineTo(width, y(v)); pen.stroke();
         }
         pen.textBaseline = "alphabetic"; pen.textAlign = "left"; pen.fillText(`${_SPAN} s ago`, left, height - 2); pen.textAlign = "right"; pen.fillText("now", width - 2, height - 2);
