@@ -425,6 +425,28 @@ def test_dark_is_dark_on_the_screen_and_white_on_paper(browser, page_of, kind, n
         assert max(page.evaluate(ink)) < 60 < 200 < min(page.evaluate(shade))
 
 
+BESIDE_TEXT = """() => [...document.querySelectorAll("svg.plot g text")]
+    .filter((text) => text.ownerSVGElement.getBoundingClientRect().width)
+    .map((text) => {
+        const drawn = text.ownerSVGElement, scale = drawn.getBoundingClientRect().width;
+        const size = parseFloat(getComputedStyle(text).fontSize);
+        const own = parseFloat(getComputedStyle(document.body).fontSize);
+        return (size * scale) / drawn.viewBox.baseVal.width / own;
+    })"""
+"""Sizes of the letters in pictures, as shares of those of the text."""
+
+
+@CLIENTS
+@EACH_PAGE
+def test_letters_of_pictures_are_about_as_large_as_the_text(browser, page_of, kind, name):
+    for media, width in (("print", 695), ("screen", 1440)):  # a sheet of A4, and a wide window
+        with opened(browser, page_of(kind, name), width) as page:
+            page.emulate_media(media=media)
+            shares = page.evaluate(BESIDE_TEXT)
+            assert min(shares) > 0.6
+            assert max(shares) < 1.1
+
+
 PRINTED = """() => {
     const all = (what) => [...document.querySelectorAll(what)];
     const figures = all("figure").filter((figure) => figure.querySelector("figcaption"));

@@ -222,6 +222,20 @@ def test_a_damped_spring_only_takes_energy_and_the_free_machine_falls_as_simulat
     assert np.ptp(found) > 0.0
 
 
+def test_a_spring_lifts_a_small_machine_that_has_fallen():
+    session = Session(pteron.load("ball-table"))
+    session.begin_push("free: no force")
+    for _ in range(20):
+        session.advance(1.0 / 30.0)
+    fallen = session.state.pose[0]
+    assert fallen < session.home[0] - 0.02
+    place, _ = session.state.robot.platform.at(session.state.pose)
+    session.push.pull(place, place + np.array([0.0, 0.0, 0.1]))
+    for _ in range(20):
+        session.advance(1.0 / 30.0)
+    assert session.state.pose[0] > fallen + 0.02
+
+
 @pytest.fixture(scope="module")
 def sessions(homes):
     """Sessions by name, to be left as they are found."""
@@ -636,6 +650,15 @@ def test_a_reload_a_second_tab_and_a_link_show_the_same(page, viewer, browser):
         wait_for(page, SHOWN, [-0.3, 0.0, 0.7, 0.9])
 
 
+UNDER_THE_BAR = """() => {
+    const view = document.getElementById('view'), bar = document.querySelector('.top');
+    const tall = Math.floor((bar.offsetHeight * view.height) / view.clientHeight);
+    const { data } = view.getContext('2d').getImageData(0, 0, view.width, tall);
+    return data.some((value, i) => i % 4 === 3 && value > 0);
+}"""
+"""Whether something is drawn where the name and the buttons are."""
+
+
 @CLIENTS
 @pytest.mark.parametrize(("width", "height"), [(390, 780), (800, 700), (1440, 900)])
 def test_the_machine_is_in_sight_at_any_size(browser, viewer, width, height):
@@ -647,6 +670,8 @@ def test_the_machine_is_in_sight_at_any_size(browser, viewer, width, height):
         assert tab.locator("#panel").is_visible() == (width > 760)
         assert len(_colors(tab, tab.locator("#view").screenshot())) > 100
         tab.get_by_role("button", name="Controls").click()
+        tab.wait_for_timeout(300)
+        assert not tab.evaluate(UNDER_THE_BAR)
         other = tab.locator("#view").bounding_box()
         if width < 760:  # the panel takes a part of the window, and the machine the rest
             assert other["height"] > 0.4 * height

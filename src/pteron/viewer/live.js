@@ -113,6 +113,14 @@
       trail: the("show-trail").checked ? trail : [], handles: rings.map((one) => ({ ...one, held: held === one.axis + "" })),
     });
   }
+  // Where a spring takes hold of the platform: all over it, but not at the centre of one that only turns.
+  function grips() {
+    const found = state.now.parts.flatMap(({ hub, corners }) => corners.flatMap((corner, i) => {
+      const spokes = [0.25, 0.5, 0.75, 1].map((t) => add(hub, sub(corner, hub), t)), next = corners[(i + 1) % corners.length];
+      return [...spokes, add(corner, sub(next, corner), 0.5)];
+    }));
+    return machine.lengths ? found.concat(state.now.parts.map((part) => part.hub), [state.now.tool || state.now.position]) : found;
+  }
   // What a pointer takes hold of: a handle, else a part of the platform.
   function grab(x, y) {
     if (!state) return null;
@@ -121,7 +129,7 @@
     const corners = state.now.parts.flatMap((part) => [part.hub, ...part.corners]).concat([state.now.tool || state.now.position]);
     if (state.playing) return null;
     if (state.pushing) {
-      const grip = nearest(corners, (p) => p);
+      const grip = nearest(grips(), (p) => p);
       if (away(grip) > 45) return null;
       const pull = (px, py) => send({ do: "pull", grip, to: picture.given(picture.under(px, py, picture.deep(grip))), stiffness: typed(the("stiffness")) || state.stiffness });
       pull(x, y);
@@ -134,7 +142,8 @@
     const from = picture.under(x, y, picture.deep(at)), start = picture.deep(at);
     held = axis + "";
     return {
-      move: (px, py) => send({ do: "drag", axis, to: add(picture.given(add(start, sub(picture.under(px, py, start), from))), offset) }),
+      // A push that begins meanwhile, once its equations are prepared, is not ended by this drag.
+      move: (px, py) => { if (!state.pushing) send({ do: "drag", axis, to: add(picture.given(add(start, sub(picture.under(px, py, start), from))), offset) }); },
       end: () => { held = null; show(); },
     };
   }

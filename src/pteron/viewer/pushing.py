@@ -27,7 +27,10 @@ _STEP = 5e-4
 """Longest step of the integration, s."""
 
 _RATE = 9.0
-"""Rate of the spring with the machine's moving mass, where none is given, rad/s."""
+"""Least rate of the spring with the machine's moving mass, where none is given, rad/s."""
+
+_SAG = 0.1
+"""Most that the spring gives way under that mass, as a share of the machine's size."""
 
 _DAMPING = 0.3
 """Damping of the spring, over the critical one for that mass."""
@@ -61,7 +64,11 @@ class Push:
         self._step = allowed_step(robot, pose, _STEP, usual=True)
         bodies = [body for leg in robot.legs for body in leg.bodies.values()]
         self._mass = sum(body.values[0] for body in (*bodies, robot.platform.joined))
-        self.stiffness = round(_RATE**2 * self._mass, 1)
+        # A small machine falls as fast as a large one: a spring as slow would not lift it.
+        sag = _SAG * max(leg.size for leg in robot.legs)
+        pull = float(np.linalg.norm(robot.platform.directions @ np.array(robot.gravity)))
+        rate = max(_RATE, np.sqrt(pull / sag))
+        self.stiffness = round(float(rate**2 * self._mass), 1)
         self.forces, self.stops = np.zeros(robot.joint_count), ""
         self._arm: Array | None = None
         self._held = np.zeros(3)
