@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.plots.canvas import (
@@ -155,6 +156,5 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
 
 def _fitting(names: Sequence[str], values: ArrayLike, what: str) -> Array:
     found = np.asarray(values, dtype=float)
-    if found.shape != (len(names),):
-        raise DataError(f"{what}: shape {found.shape} given, ({len(names)},) expected")
+    expect(found.shape == (len(names),), what, f"shape {found.shape}", f"({len(names)},)")
     return found

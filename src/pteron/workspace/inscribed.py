@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
@@ -151,8 +152,7 @@ def largest_cylinder(
     at = checked_one(robot, pose, "pose")
     if robot.platform.planar:
         raise DataError("robot: a planar machine has no cylinder in its workspace; ask for a cube")
-    if not ratio > 0.0:
-        raise DataError(f"ratio: {ratio!r} given, a number above 0 expected")
+    expect(ratio > 0.0, "ratio", repr(ratio), "a number above 0")
     unit = np.array(Cylinder((0.0, 0.0, 0.0), 1.0, 1.0, axis).axis)
     across = np.linalg.svd(unit[None])[2][1:]
     turns = 2.0 * np.pi * np.arange(24) / 24

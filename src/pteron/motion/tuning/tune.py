@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.controllers import Controller, FeedForwardPD
 from pteron.controllers.feedback import Feedback
 from pteron.controllers.joint_masses import light_poses
@@ -57,15 +58,13 @@ class Required:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 1.0 < self.gain < np.inf:
-            raise DataError(f"gain margin: {shown(self.gain)} given, a factor above 1 expected")
+        expect(1.0 < self.gain < np.inf, "gain margin", shown(self.gain), "a factor above 1")
         if not 0.0 < self.phase < np.pi / 2.0:
             raise DataError(
                 f"phase margin: {shown(self.phase)} rad given, {np.degrees(self.phase):.4g} "
                 "degrees; more than 0 and less than 90 degrees expected"
             )
-        if not 0.0 <= self.delay < np.inf:
-            raise DataError(f"delay margin: {shown(self.delay)} given, 0 s or more expected")
+        expect(0.0 <= self.delay < np.inf, "delay margin", shown(self.delay), "0 s or more")
 
     def share(self, found: Margins) -> float:
         """Return the least of margin over required margin; a loop serves from 1 on."""
@@ -212,8 +211,7 @@ def tune(
     True
     """
     robot, controller = as_manipulator(robot), controller or FeedForwardPD()
-    if not 0.0 <= delay < np.inf:
-        raise DataError(f"delay: {shown(delay)} given, 0 s or more expected")
+    expect(0.0 <= delay < np.inf, "delay", shown(delay), "0 s or more")
     if payload:
         robot = with_payload(robot, payload)
     required, sensors = required or Required(), sensors or Sensors()
