@@ -11,6 +11,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
+from pteron.bisection import bisected
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, bare, numeric
@@ -153,10 +154,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
         )
     first = np.flatnonzero((negative[1:] != negative[:-1]) & known[1:] & known[:-1])
     low, high, side = angles[first], angles[first + 1], negative[first]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        before = (measure(middle) < 0.0) == side
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    low, _ = bisected(lambda angle: (measure(angle) < 0.0) == side, low, high, _HALVINGS)
     found = np.abs(measure(low)) <= _ZERO  # else a gap in the reach lies between two samples
     return np.sort(_wrapped(low[found]))
 
