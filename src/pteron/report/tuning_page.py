@@ -6,21 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import pteron
 from pteron.motion import Tuning
 from pteron.motion.motion import told_pose
-from pteron.plots import bode_figure, poles_figure, svg
-from pteron.report.typeset import resource, template
+from pteron.plots import bode_figure, poles_figure
+from pteron.report.typeset import template
 
 if TYPE_CHECKING:
     import polars as pl
-
-_UNITS = {
-    "bandwidth": "bandwidth, rad/s",
-    "delay": "delay, s",
-    "encoder": "encoder step",
-    "stiffness": "stiffness, of the file's",
-}
 
 
 def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
@@ -45,20 +37,10 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
         },
         where=f"{at}, at pose {told_pose(tuning.states[tuning.worst, 0])}.",
         figures={
-            "bode": svg(
-                bode_figure(worst.frequencies, worst.drive_loops, robot.joint_names),
-                name="bode",
-                title="Gain and phase of each drive's loop over the frequency",
-            ),
-            "poles": svg(poles_figure(worst.loop.poles), name="poles", title="Poles of the loop"),
+            "bode": bode_figure(worst.frequencies, worst.drive_loops, robot.joint_names),
+            "poles": poles_figure(worst.loop.poles),
         },
-        trials={
-            title: [row for row in trials.to_dicts() if row["changed"] == name]
-            for name, title in _UNITS.items()
-            if len(trials) and name in trials["changed"]
-        },
+        trials=trials.to_dicts(),
         length="rad" if robot.platform.angular.all() else "m",
         degrees=180.0 / np.pi,
-        version=pteron.__version__,
-        style=resource("page.css"),
     )
