@@ -21,6 +21,7 @@ from pteron.plots.canvas import (
     REACH,
     WARNING,
     blank,
+    groups_of,
     plain_axes,
     spot,
 )
@@ -84,9 +85,7 @@ def parameters_figure(
     known = None if reference is None else _fitting(names, reference, "reference")
     if units and len(units) != len(names):
         raise DataError(f"units: {len(units)} given, {len(names)} expected, one for each name")
-    groups: dict[str, list[int]] = {}
-    for i, unit in enumerate(units or ["value"] * len(names)):
-        groups.setdefault(unit, []).append(i)
+    groups = groups_of(units or ["value"] * len(names))
     counts = [len(own) for own in groups.values()]
     figure = blank(_WIDE, _HEAD * len(groups) + _ROW * len(names))
     grid = figure.add_gridspec(len(groups), 1, height_ratios=[count + 1.0 for count in counts])
