@@ -117,13 +117,8 @@ class Tuning:
     @property
     def least(self) -> dict[str, float]:
         """The least margins of all states: factors, rad, s and the disk margin."""
-        found = self.margins
-        return {
-            "gain": min(float(min(one.gain.min(), one.common_gain)) for one in found),
-            "phase": min(float(one.phase.min()) for one in found),
-            "delay": min(float(min(one.delay.min(), one.common_delay)) for one in found),
-            "disk": min(one.disk for one in found),
-        }
+        each = [one.least for one in self.margins]
+        return {name: min(least[name] for least in each) for name in each[0]}
 
     def gains(self) -> dict[str, list[float]]:
         """Return proportional and derivative gains of each joint, or what else the law has."""
@@ -233,9 +228,9 @@ def tune(
     return Tuning(robot, chosen, required, states, moments, loops, found)
 
 
-def _share(sensors: Sensors | None, period: float) -> float | None:
+def _share(sensors: Sensors, period: float) -> float | None:
     """Return what a difference counts in a rate; None where rates are exact."""
-    if sensors is None or not np.any(sensors.encoder):
+    if not np.any(sensors.encoder):
         return None
     if sensors.cutoff is None:
         return 1.0
@@ -344,16 +339,13 @@ class _Search:
             high = low
 
     def _told(self, controller: Controller, i: int) -> str:
-        found, asked = Margins(self.loop(controller, i)), self.required
-        gain, delay = (
-            min(found.gain.min(), found.common_gain),
-            min(found.delay.min(), found.common_delay),
-        )
+        least, asked = Margins(self.loop(controller, i)).least, self.required
         wanted = f", {1e3 * asked.delay:.3g} ms" if asked.delay else ""
         rate = controller.bandwidth
         with_ = f"with {np.max(rate):.4g} rad/s" if rate is not None else "with these gains"
         return (
             f"{with_}, at pose {told_pose(self.states[i][0])} the margins are a gain of "
-            f"{gain:.3g}, {np.degrees(found.phase.min()):.3g} degrees and {1e3 * delay:.3g} ms; "
+            f"{least['gain']:.3g}, {np.degrees(least['phase']):.3g} degrees and "
+            f"{1e3 * least['delay']:.3g} ms; "
             f"{asked.gain:.3g}, {np.degrees(asked.phase):.3g} degrees{wanted} asked for"
         )
