@@ -21,7 +21,7 @@ from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.samples import Shape, cube
 from pteron.workspace.smooth_conditions import smooth_conditions
-from pteron.workspace.volume import bounding_box
+from pteron.workspace.volume import bounding_box, expect_places
 
 _STARTS = 3
 """Places of a search grid from which the shape is enlarged."""
@@ -181,12 +181,7 @@ def _largest(
     proved: bool,
     given: tuple[Condition, ...] | None,
 ) -> Inscribed:
-    if not robot.platform.lengths:
-        raise ModelError(
-            f"a {robot.platform.motion} platform has no places to move to: it only turns; ask for "
-            "its `largest_tilt`",
-            subject=robot.name,
-        )
+    expect_places(robot, "it only turns; ask for its `largest_tilt`")
     asked = conditions(robot) if given is None else given
     smooth, geometry = smooth_conditions(robot, asked), np.array(numbers(robot))
     lengths = len(robot.platform.lengths)

@@ -20,6 +20,7 @@ from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.largest_proved import largest_proved
 from pteron.workspace.proofs import Proof
+from pteron.workspace.volume import expect_places
 
 _SAMPLES = 4096
 """Poses of a region by which its size is found before it is proved; a third on its rim."""
@@ -196,11 +197,7 @@ def largest_ball(
         If the platform does not tilt and move, or the centre does not serve at that tilt.
     """
     robot, at = _checked(robot, pose)
-    if not robot.platform.lengths:
-        raise ModelError(
-            f"a {robot.platform.motion} platform has no places to move to: it only turns",
-            subject=robot.name,
-        )
+    expect_places(robot, "it only turns")
     expect(0.0 <= tilt < _MOST, "tilt", f"{tilt:g} rad", "one from 0 to below pi/2")
     far = sum(leg.size for leg in robot.legs)
     return _largest(robot, at, far, tolerance, given, lambda radius: (radius, tilt))

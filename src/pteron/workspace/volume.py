@@ -82,6 +82,15 @@ class ReachVolume:
     count: int
 
 
+def expect_places(robot: Manipulator, instead: str) -> None:
+    """Refuse a machine whose platform only turns, with a clause that says what to do instead."""
+    if not robot.platform.lengths:
+        raise ModelError(
+            f"a {robot.platform.motion} platform has no places to move to: {instead}",
+            subject=robot.name,
+        )
+
+
 def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     """Return the box that bounds all positions in reach at the orientation of a pose.
 
