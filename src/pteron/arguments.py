@@ -118,6 +118,21 @@ def expect(holds: object, name: str, given: object, wanted: object) -> None:
         raise DataError(f"{name}: {given} given, {wanted} expected")
 
 
+def number_or_nan(value: object) -> float:
+    """Return what `float` makes of a value, NaN of what is no number.
+
+    Examples
+    --------
+    >>> from pteron.arguments import number_or_nan
+    >>> number_or_nan(2), number_or_nan("two")
+    (2.0, nan)
+    """
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return float("nan")
+
+
 def expect_one_of(
     choices: Sequence[str], error: type[PteronError] = DataError, **given: object
 ) -> None:
