@@ -11,10 +11,10 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
-from pteron.bisection import bisected
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, bare, numeric
+from pteron.kernels.bisection import bisected
 from pteron.kernels.kept import kept_result
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
 from pteron.kinematics.sampling import drawn_poses, type_ii_sizes

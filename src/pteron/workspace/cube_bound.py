@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.bisection import bisected
 from pteron.errors import DataError
+from pteron.kernels.bisection import bisected
 from pteron.workspace.components import Lattice, lattice
 from pteron.workspace.paving import Paving
 

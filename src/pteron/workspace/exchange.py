@@ -15,8 +15,8 @@ from functools import lru_cache
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.bisection import bisected
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.workspace.lattice_minima import failing_between
 from pteron.workspace.samples import Samples, Shape, lattice
 from pteron.workspace.smooth_conditions import SmoothConditions

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.bisection import bisected
 from pteron.equations.machine import closure_of, numbers
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, bounds, numeric
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace.boxes import halved

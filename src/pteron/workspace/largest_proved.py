@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from pteron.bisection import bisected
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.manipulator import Manipulator
 from pteron.workspace.conditions import Condition, keeps
 from pteron.workspace.proofs import Proof, prove

@@ -10,8 +10,8 @@ from itertools import combinations
 
 import numpy as np
 
-from pteron.bisection import bisected
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.arguments import expect, expect_to_fit
-from pteron.bisection import bisected
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.bisection import bisected
 from pteron.equations.drives import drives_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import told_pose

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pteron.bisection import bisected
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 
 _VALLEYS = 3
 """Number of a measure's lowest local minima that are refined."""

@@ -32,7 +32,7 @@ def bisected(
 
     Examples
     --------
-    >>> from pteron.bisection import bisected
+    >>> from pteron.kernels.bisection import bisected
     >>> low, high = bisected(lambda x: x * x < 2.0, 1.0, 2.0, 40)
     >>> print(f"{low:.9f}")
     1.414213562
