@@ -92,6 +92,47 @@ def expect_kinds(
         raise DataError("; ".join(wrong))
 
 
+def expect(holds: object, name: str, given: object, wanted: object) -> None:
+    """Refuse an argument of which a condition does not hold, in the words of all such messages.
+
+    Parameters
+    ----------
+    holds : bool
+        The condition.
+    name, given, wanted : str, object, object
+        The argument, what was given, and what is expected.
+
+    Raises
+    ------
+    DataError
+        If it does not hold.
+
+    Examples
+    --------
+    >>> from pteron.arguments import expect
+    >>> expect(-1.0 >= 0.0, "corner", -1.0, "0 m or more")
+    Traceback (most recent call last):
+    pteron.errors.DataError: corner: -1.0 given, 0 m or more expected
+    """
+    if not holds:
+        raise DataError(f"{name}: {given} given, {wanted} expected")
+
+
+def number_or_nan(value: object) -> float:
+    """Return what `float` makes of a value, NaN of what is no number.
+
+    Examples
+    --------
+    >>> from pteron.arguments import number_or_nan
+    >>> number_or_nan(2), number_or_nan("two")
+    (2.0, nan)
+    """
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return float("nan")
+
+
 def expect_one_of(
     choices: Sequence[str], error: type[PteronError] = DataError, **given: object
 ) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pteron.arguments import number_or_nan
 from pteron.errors import DataError, shown
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -33,10 +34,7 @@ def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] |
 
 
 def _number(message: str, value: object) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        number = np.nan
+    number = number_or_nan(value)
     if isinstance(value, str | bool) or not (np.isfinite(number) and number > 0.0):
         raise DataError(message.format(shown(value)))
     return number

@@ -17,7 +17,7 @@ from pteron.equations.machine import Machine, closure_of
 from pteron.export.descriptions import banner
 from pteron.export.functions import has_drives
 from pteron.export.names import prefix_of
-from pteron.export.start_pose import good_poses, joint_limits, keeps_limits, start_pose
+from pteron.export.start_pose import good_poses, keeps_limits, start_pose
 from pteron.kernels import program, specialised
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
@@ -191,7 +191,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
             function.save(str(path))
             files[target / path.name] = path.read_bytes()
     start, end = _ends(robot)
-    least, most = ([None if v != v else float(v) for v in side] for side in joint_limits(robot))
+    least, most = zip(*(leg.limits or (None, None) for leg in robot.legs), strict=True)
     values = {
         "banner": banner(robot, "CasADi functions"),
         "prefix": prefix,
@@ -203,8 +203,8 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "driven": has_drives(robot),
         "start": start,
         "end": end,
-        "least": least,
-        "most": most,
+        "least": list(least),
+        "most": list(most),
         "forces": [leg.drive.max_force if leg.drive else None for leg in robot.legs],
     }
     for name in ("load", "example"):

@@ -13,35 +13,10 @@ from pteron.kernels import Port
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import has_readings
 
-SUMMARIES = loads((files("pteron.export") / "summaries.toml").read_text(encoding="utf-8"))
-"""Summaries by function; others have that of the library's public function of the same name."""
-
-MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
-"""Added where poses are returned, one a row."""
-
-BRANCHES = (
-    " A leg may be bent the other way in a row: then its inverse kinematics are not the joint "
-    "coordinates given."
+TEXTS: dict[str, dict[str, str]] = loads(
+    (files("pteron.export") / "texts.toml").read_text(encoding="utf-8")
 )
-
-
-PARAMETERS = "The machine's inertial parameters, in the paper's order; SI units."
-
-DRIVES = (
-    "The machine's drives, at the joints: motors' inertia, dry and viscous friction, a constant "
-    "force, what dry friction has more at rest, the speeds by which it is gone, and within which "
-    "dry friction changes its sign; SI units."
-)
-
-GAINS = (
-    "Gains of the law of the same name. With another period, or to tune them, take those of a "
-    "controller of the library."
-)
-
-BASE_PARAMETERS = (
-    "The machine's base parameters, as pteron identify lists them; SI units. A new list of it may "
-    "be put in their place."
-)
+"""All texts of generated code: tables of summaries, notes, meanings; braces are to be filled."""
 
 
 def banner(robot: Manipulator, language: str) -> list[str]:
@@ -62,8 +37,6 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     """Return the meaning of an input or an output, with its unit."""
     platform = robot.platform
     units = [leg.joint.unit for leg in robot.legs]
-    joints = _by_leg(units)
-    forces = _by_leg([leg.joint.force_unit for leg in robot.legs])
     kinds = [
         (names, unit)
         for names, unit in ((platform.lengths, "m"), (platform.angles, "rad"))
@@ -81,54 +54,30 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     inertia = f"Ixx, Ixy, Ixz, Iyy, Iyz, Izz {about}" if platform.tilts else f"I {about}, along k"
     if not platform.angles:
         center, inertia = (f"{text}; forces do not depend on it" for text in (center, inertia))
-    texts = {
-        "pose": f"platform pose: {pose}",
-        "poses": f"poses by rows: {pose}",
-        "found": f"platform pose that has the joint coordinates: {pose}",
-        "velocity": f"the pose's rate: {rates}",
-        "acceleration": f"the pose's acceleration: {seconds}",
-        "joints": f"{told}, {joints}",
-        "joint_rates": f"their rates, {_by_leg([f'{unit}/s' for unit in units])}",
-        "joint_accelerations": "their accelerations, " + _by_leg([f"{unit}/s^2" for unit in units]),
-        "forces": f"actuator forces, {forces}, positive the way the joint coordinates grow",
-        "wrench": f"wrench on the platform at P: {wrench}",
-        "parameters": "inertial parameters, in kg, kg m and kg m^2",
-        "loaded_parameters": "what is to be the inertial parameters with the payload",
-        "mass": "of the payload, kg; 0 for none",
+    words = {
+        "pose": pose,
+        "rates": rates,
+        "accelerations": seconds,
+        "told": told,
+        "joints": _by_leg(units),
+        "joint_rates": _by_leg([f"{unit}/s" for unit in units]),
+        "joint_accelerations": _by_leg([f"{unit}/s^2" for unit in units]),
+        "forces": _by_leg([leg.joint.force_unit for leg in robot.legs]),
+        "wrench": wrench,
         "center": center,
         "inertia": inertia,
-        "base_parameters": "base parameters; see the table of the same name",
-        "loaded_base_parameters": "what is to be the base parameters with the payload",
-        "drives": "numbers of the drives; see the table of the same name",
-        "jacobian": "joint rates per unit of the platform's rates",
-        "regressor": "actuator forces per unit of each parameter",
-        "type_ii": "type-II measure: 0 at a singularity",
-        "bent": "the leg, from 1, that would be bent the other way, of which found is NaN; else 0",
-        "type_i": "type-I measure of each leg: 0 where it is stretched or folded, 1 at best",
-        "margin": "from each leg to the edge of its reach, m; negative beyond it",
     }
     name = port.name.removesuffix("_out")
-    return told_meaning(robot, output) if name == NAMES[output] != "forces" else texts.get(name, "")
+    if name == NAMES[output] != "forces":
+        return told_meaning(robot, output)
+    return TEXTS["ports"].get(name, "").format(**words)
 
 
-def law_meanings(what: str, texts: Mapping[str, str]) -> dict[str, str]:
+def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
     """Return the meanings of a control law's inputs and outputs, from those elsewhere."""
-    remembered = ", ".join(MEMORY_TEXTS[name] for name in MEMORY[what])
-    wanted = ("pose", "velocity", "acceleration")
-    return {
-        **{name: f"wanted now: {texts[name]}" for name in wanted},
-        **{name: f"measured now: {texts[name]}" for name in ("joints", "joint_rates")},
-        "memory": f"next_memory of the last sample: {remembered}; keep it where a status is not 0",
-        "next_memory": "what is to be the memory at the next sample; another array than memory",
-        "gains": f"see the table {what}_gains",
-    }
-
-
-MEMORY_TEXTS = {
-    "measured": "the pose of the joints (at first one that is near it)",
-    "acceleration": "the acceleration wanted last (at first 0)",
-    "learnt": "what is learnt (at first 0)",
-}
+    remembered = ", ".join(TEXTS["memory"][name] for name in MEMORY[what])
+    words = {**meanings, "what": what, "remembered": remembered}
+    return {name: text.format(**words) for name, text in TEXTS["law"].items()}
 
 
 def _by_leg(units: Sequence[str]) -> str:

@@ -2,44 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from importlib.resources import files
+from tomllib import loads
+from typing import Any
 
 from pteron.equations.drives import Drives, drive_numbers
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.platforms import Platform
 
-_UNITS = {
-    "m": {"m": 1},
-    "m/s": {"m": 1, "s": -1},
-    "m/s2": {"m": 1, "s": -2},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "rad/s2": {"rad": 1, "s": -2},
-    "s": {"s": 1},
-    "kg": {"kg": 1},
-    "kg.m2": {"kg": 1, "m": 2},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "N.m": {"kg": 1, "m": 2, "s": -2},
-    "N.s/m": {"kg": 1, "s": -1},
-    "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
-    "1": {},
-}
-"""The units of the variables by the powers of SI's base units, as FMI wants them."""
+_TABLE = loads((files("pteron.export") / "fmu_variables.toml").read_text(encoding="utf-8"))
+"""The blocks of variables, their kinds, and their units; see its head."""
 
-Kind = Literal["TIME", "STATE", "START", "INPUT", "RESULT"]
-"""Kind of a block in the C code: START is set before the simulation begins, and never after."""
-
-_XML: dict[Kind, dict[str, str]] = {
-    "TIME": {"causality": "independent", "variability": "continuous"},
-    "STATE": {"causality": "output", "variability": "continuous", "initial": "exact"},
-    "START": {"causality": "parameter", "variability": "fixed", "initial": "exact"},
-    "INPUT": {"causality": "input", "variability": "continuous"},
-    "RESULT": {"causality": "output", "variability": "continuous", "initial": "calculated"},
-}
-"""Attributes in modelDescription.xml of a block's variables."""
+_Words = dict[str, Any]
+"""The words and the numbers of one variable, by their names in the table."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +38,17 @@ class Block:
     name: str
     first: int
     """The value reference of the first of them."""
-    kind: Kind
+    kind: str
+    """The kind of the variables; see the table."""
     place: str
     """Their place in the C code: a byte offset, or the name of a result."""
     variables: tuple[FmuVariable, ...]
-    rate_of: str = ""
+    rate_of: str
     """The block whose rates these are."""
+    like: str
+    """The block on whose variables these depend, one on one."""
+    depends: tuple[str, ...]
+    """The blocks on all of whose variables each of these depends."""
 
     @property
     def references(self) -> tuple[int, ...]:
@@ -97,7 +80,7 @@ class FmuVariables:
     def units(self) -> dict[str, dict[str, int]]:
         """The units that occur, and what they are made of."""
         used = [variable.unit for block in self.blocks for variable in block.variables]
-        return {unit: _UNITS[unit] for unit in dict.fromkeys(used)}
+        return {unit: _TABLE["units"][unit] for unit in dict.fromkeys(used)}
 
     @property
     def attributes(self) -> Iterator[dict[str, object]]:
@@ -109,7 +92,7 @@ class FmuVariables:
                     "name": variable.name,
                     "valueReference": block.first + k,
                     "description": variable.description,
-                    **_XML[block.kind],
+                    **_TABLE["kinds"][block.kind],
                     **hidden,
                     "unit": variable.unit,
                     "min": variable.least,
@@ -121,158 +104,103 @@ class FmuVariables:
     @property
     def known(self) -> dict[int, tuple[int, ...]]:
         """For each variable that is computed, or is a state, the variables that it depends on."""
-        state = self["pose"] + self["velocity"]
-        forced = state + self["forces"] + self["wrench"]
-        return {
-            **{own: (own,) for own in state},
-            **dict(zip(self["pose_rates"], ((own,) for own in self["velocity"]), strict=True)),
-            **dict.fromkeys(self["acceleration"] + self["velocity_rates"], forced),
-            **dict.fromkeys(self["joints"] + self["reserves"], self["pose"]),
-            **dict.fromkeys(self["joint_rates"], state),
-        }
+        found = {}
+        for block in self.blocks:
+            every = sum((self[name] for name in block.depends), ())
+            for k, own in enumerate(block.references):
+                found[own] = (self[block.like][k],) if block.like else every
+        return found
 
     @property
     def outputs(self) -> tuple[int, ...]:
         """The value references of the outputs."""
-        names = ("pose", "velocity", "acceleration", "joints", "joint_rates", "reserves")
-        return sum((self[name] for name in names), ())
+        shown = (b for b in self.blocks if b.kind in ("STATE", "RESULT") and not b.rate_of)
+        return sum((block.references for block in shown), ())
 
     @property
     def derivatives(self) -> tuple[int, ...]:
         """The value references of the rates of the states."""
-        return self["pose_rates"] + self["velocity_rates"]
+        return sum((block.references for block in self.blocks if block.rate_of), ())
 
     @property
     def computed(self) -> tuple[int, ...]:
         """The value references of what is computed from the start values."""
-        states = self["pose"] + self["velocity"]
-        found = {*self.outputs, *self.derivatives} - {*states}
+        found = {*self.outputs, *self.derivatives} - {*self["pose"], *self["velocity"]}
         return tuple(sorted(found))
 
 
 def fmu_variables(robot: Manipulator, pose: Array, forces: Array) -> FmuVariables:
     """Return the variables of a machine that starts at rest at a pose, held by forces."""
-    blocks: list[Block] = []
-    for name, kind, place, variables, *rate_of in _parts(robot, pose, forces):
-        first = sum(len(block.variables) for block in blocks)
-        blocks.append(Block(name, first, kind, place, tuple(variables), *rate_of))
+    words, blocks, first = _words(robot, pose, forces), list[Block](), 0
+    for row in _TABLE["blocks"]:
+        variables = tuple(_variable(row, {**each, "zero": 0.0}) for each in words[row["each"]])
+        more = row.get("rate_of", ""), row.get("like", ""), tuple(row.get("depends", ()))
+        if variables:
+            blocks.append(Block(row["name"], first, row["kind"], row["place"], variables, *more))
+        first += len(variables)
     return FmuVariables(tuple(blocks))
 
 
-_Part = tuple[str, Kind, str, list[FmuVariable]] | tuple[str, Kind, str, list[FmuVariable], str]
+def _variable(row: dict[str, str], words: _Words) -> FmuVariable:
+    """Return the variable of a row of the table with these words."""
+    name, unit, told = (row[key].format(**words) for key in ("variable", "unit", "description"))
+    start, least = (words.get(row.get(key, "")) for key in ("start", "least"))
+    return FmuVariable(name, unit, told, start, least)
 
 
-def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
-    pairs = list(zip(robot.platform.coordinates, robot.units, strict=True))
-    legs = list(enumerate((leg.joint for leg in robot.legs), start=1))
-    start = dict(zip(robot.platform.coordinates, pose.tolist(), strict=True))
-
-    def of_pose(word: str, per: str, told: str, start: Mapping[str, float]) -> list[FmuVariable]:
-        return [
-            FmuVariable(word.format(name), unit + per, told.format(name), start.get(name))
-            for name, unit in pairs
-        ]
-
-    yield "time", "TIME", "offsetof(Values, time)", [FmuVariable("time", "s", "Time")]
-    states = of_pose("pose.{}", "", "Platform pose, {}", start)
-    yield "pose", "STATE", "offsetof(Values, state)", states
-    states = of_pose("velocity.{}", "/s", "Rate of the pose's {}", dict.fromkeys(start, 0.0))
-    yield "velocity", "STATE", "offsetof(Values, state) + M * sizeof(double)", states
-    results = of_pose("acceleration.{}", "/s2", "Acceleration of the pose's {}", {})
-    yield "acceleration", "RESULT", "ACCELERATION", results
-    results = [FmuVariable(f"{j.coordinate}{i}", j.unit, f"Leg {i}: the {j.noun}") for i, j in legs]
-    yield "joints", "RESULT", "JOINTS", results
-    results = [
-        FmuVariable(f"{j.coordinate}{i}_rate", f"{j.unit}/s", f"Leg {i}: the {j.noun}'s rate")
-        for i, j in legs
-    ]
-    yield "joint_rates", "RESULT", "JOINT_RATES", results
-    text = "Leg {}: the simulation ends where this is 0"
-    results = [FmuVariable(f"reach_reserve{i}", "1", text.format(i)) for i, _ in legs]
-    yield "reserves", "RESULT", "RESERVES", results
-    inputs = [
-        FmuVariable(f"{j.force}{i}", _dotted(j.force_unit), f"Leg {i}: the drive's {j.force}", f)
-        for (i, j), f in zip(legs, forces.tolist(), strict=True)
-    ]
-    yield "forces", "INPUT", "offsetof(Values, forces)", inputs
-    text = "What acts on the platform at P along {}"
-    inputs = [
-        FmuVariable(f"wrench.{name}", unit, text.format(along), 0.0)
-        for name, unit, along in _wrench(robot.platform)
-    ]
-    yield "wrench", "INPUT", "offsetof(Values, wrench)", inputs
-    # Each state's rate is a variable of its own: some tools do not take an output in its place.
-    for name, per, place in (("pose", "/s", "VELOCITY"), ("velocity", "/s2", "ACCELERATION")):
-        rates = of_pose(f"der({name}.{{}})", per, f"Rate of {name}.{{}}", {})
-        yield f"{name}_rates", "RESULT", place, rates, name
-    yield from _payload(robot)
-    yield "drives", "START", "offsetof(Values, drives)", list(_drives(robot))
+def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Words]]:
+    """Return the words of each variable, by what a block has variables for."""
+    platform = robot.platform
+    coordinates = zip(platform.coordinates, robot.units, pose.tolist(), strict=True)
+    legs = enumerate(zip(robot.legs, forces.tolist(), strict=True), start=1)
+    return {
+        "machine": [{}],
+        "coordinates": [{"name": name, "unit": unit, "at": at} for name, unit, at in coordinates],
+        "legs": [
+            {"i": i, **vars(leg.joint), "force_unit": _dotted(leg.joint.force_unit), "held": held}
+            for i, (leg, held) in legs
+        ],
+        "wrench": list(_wrench(platform)),
+        "center": [
+            {"name": x}
+            for x in ("xyz" if platform.tilts else "xy" if platform.rotation_axes else "")
+        ],
+        "inertia": list(_inertia(platform)),
+        "drives": list(_drives(robot)),
+    }
 
 
 def _dotted(unit: str) -> str:
     return unit.replace(" ", ".")
 
 
-def _wrench(platform: Platform) -> Iterator[tuple[str, str, str]]:
+def _wrench(platform: Platform) -> Iterator[_Words]:
     """Yield each part of a wrench: its name, its unit and along what it does work."""
-    if platform.tilts:
-        for name in platform.wrench_columns:
-            axis = f"the base frame's {name[1]}"
-            force = name[0] == "f"
-            yield name, "N" if force else "N.m", axis if force else f"a turn about {axis}"
+    if not platform.tilts:
+        for name, unit in zip(platform.coordinates, platform.units, strict=True):
+            yield {"name": name, "unit": "N.m" if unit == "rad" else "N", "along": name}
         return
-    for name, unit in zip(platform.coordinates, platform.units, strict=True):
-        yield name, "N.m" if unit == "rad" else "N", name
+    for name in platform.wrench_columns:
+        axis, force = f"the base frame's {name[1]}", name[0] == "f"
+        along = axis if force else f"a turn about {axis}"
+        yield {"name": name, "unit": "N" if force else "N.m", "along": along}
 
 
-def _payload(robot: Manipulator) -> Iterator[_Part]:
-    """Yield the payload's parameters: its mass, and what matters where the platform turns."""
-    told = [FmuVariable("payload.mass", "kg", "A body that the platform carries", 0.0, 0.0)]
-    yield "payload.mass", "START", "offsetof(Values, mass)", told
-    platform = robot.platform
-    if platform.rotation_axes:
-        told = [
-            FmuVariable(f"payload.{x}", "m", f"Its centre of mass in the platform frame, {x}", 0.0)
-            for x in ("xyz" if platform.tilts else "xy")
-        ]
-        yield "payload.centre", "START", "offsetof(Values, center)", told
-    if platform.angles:
-        axis = "Its inertia about the axis through its own centre"
-        names = {"nertia": axis}
-        if platform.tilts:
-            pairs = ("xx", "xy", "xz", "yy", "yz", "zz")
-            names = {pair: f"I{pair} about its own centre" for pair in pairs}
-        least = dict.fromkeys(("nertia", "xx", "yy", "zz"), 0.0)
-        told = [
-            FmuVariable(f"payload.i{name}", "kg.m2", text, 0.0, least.get(name))
-            for name, text in names.items()
-        ]
-        yield "payload.inertia", "START", "offsetof(Values, inertia)", told
+def _inertia(platform: Platform) -> Iterator[_Words]:
+    """Yield the parts of a payload's inertia that matter where the platform turns."""
+    if platform.tilts:
+        for pair in ("xx", "xy", "xz", "yy", "yz", "zz"):
+            least = {"least": 0.0} if pair[0] == pair[1] else {}
+            yield {"name": pair, "told": f"I{pair} about its own centre", **least}
+    elif platform.angles:
+        told = "Its inertia about the axis through its own centre"
+        yield {"name": "nertia", "told": told, "least": 0.0}
 
 
-def _drives(robot: Manipulator) -> Iterator[FmuVariable]:
+def _drives(robot: Manipulator) -> Iterator[_Words]:
     """Yield the numbers of the drives, in the order of the table that the C code has."""
-    texts = {
-        "inertia": "the motor's inertia at the joint",
-        "coulomb": "dry friction",
-        "viscous": "viscous friction",
-        "offset": "a constant force",
-        "stribeck": "what dry friction has more at rest",
-        "stribeck_speed": "the speed by which that is gone",
-        "rest_speed": "half the width of the speeds where dry friction changes its sign",
-    }
-    values = iter(drive_numbers(robot))
+    values = iter(drive_numbers(robot).tolist())
     for name in Drives._fields:
         for i, leg in enumerate(robot.legs, start=1):
-            turns = leg.joint.unit == "rad"
-            units = {
-                "inertia": "kg.m2" if turns else "kg",
-                "viscous": "N.m.s/rad" if turns else "N.s/m",
-                "stribeck_speed": f"{leg.joint.unit}/s",
-                "rest_speed": f"{leg.joint.unit}/s",
-            }
-            unit = units.get(name, _dotted(leg.joint.force_unit))
-            least = None if name == "offset" else 1e-12 if "speed" in name else 0.0
-            yield FmuVariable(
-                f"drive{i}.{name}", unit, f"Leg {i}: {texts[name]}", float(next(values)), least
-            )
+            row = _TABLE["drives"][name]
+            yield {"i": i, "name": name, "unit": row[leg.joint.unit], "number": next(values), **row}

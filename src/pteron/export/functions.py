@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 
 from pteron.controllers import CONTROLLERS, Controller
@@ -18,17 +17,7 @@ from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
 from pteron.export.command_units import DRIVEN, Output, at_readings, factors, in_units
-from pteron.export.descriptions import (
-    BASE_PARAMETERS,
-    BRANCHES,
-    DRIVES,
-    GAINS,
-    MODES,
-    PARAMETERS,
-    SUMMARIES,
-    law_meanings,
-    meaning,
-)
+from pteron.export.descriptions import TEXTS, law_meanings, meaning
 from pteron.export.identified_parameters import Identified, base_program, read_identified
 from pteron.export.node_names import node_names
 from pteron.export.tools import tool_tables
@@ -259,11 +248,14 @@ def _exported(
         replace(port, name=f"{port.name}_out") if port.name in taken else port
         for port in given.outputs
     )
-    summary = SUMMARIES.get(what, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize())
+    summary = TEXTS["summaries"].get(
+        what, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize()
+    )
     if base:
         summary = summary.replace(", from the inertial parameters", "") + " From base parameters."
     if name in ("direct_kinematics", "closure_poses"):
-        summary += MODES + ("" if machine.closure.keeps_modes else BRANCHES)
+        summary += TEXTS["notes"]["modes"]
+        summary += "" if machine.closure.keeps_modes else TEXTS["notes"]["branches"]
     elif "pose" in taken and not {"sqrt", "less"} & {node.operation for node in graph.nodes}:
         summary += " It does not ask whether the legs reach."
     meanings = {port.name: meaning(robot, port, output) for port in (*given.inputs, *outputs)}
@@ -287,26 +279,25 @@ def _exported(
 def _without_status(given: Program) -> Program:
     """Return a program without its last output, all others the same to the bit."""
     symbols = given.function.sx_in()
-    names = [port.name for port in given.inputs], [port.name for port in given.outputs[:-1]]
     results = given.function.call(symbols)[:-1]
-    function = ca.Function(given.name, symbols, results, *names)
-    return Program(given.name, function, given.inputs, given.outputs[:-1])
+    return Program.of(given.name, symbols, given.inputs, results, given.outputs[:-1])
 
 
 def _table(
     robot: Manipulator, name: str, base: Identified | None, controller: Controller | None
 ) -> NumberTable:
     """Return the machine's own numbers for a shared input."""
+    comment = TEXTS["tables"][name]
     if name == "gains":
         assert controller is not None
         law = controller.law(robot)
-        return NumberTable(f"{controller.what}_gains", GAINS, law.gain_names, law.gains)
+        return NumberTable(f"{controller.what}_gains", comment, law.gain_names, law.gains)
     if name == "drives":
-        return NumberTable(name, DRIVES, drive_names(robot), drive_numbers(robot))
+        return NumberTable(name, comment, drive_names(robot), drive_numbers(robot))
     if base is not None:
         verdict = f" Verdict of the identification: {base.grade}." if base.grade else ""
-        return NumberTable(name, BASE_PARAMETERS + verdict, base.comments, base.values)
-    return NumberTable(name, PARAMETERS, parameter_names(robot), parameters(robot))
+        return NumberTable(name, comment + verdict, base.comments, base.values)
+    return NumberTable(name, comment, parameter_names(robot), parameters(robot))
 
 
 def _states(

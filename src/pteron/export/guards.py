@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain, count
 
 import numpy as np
@@ -44,6 +44,33 @@ _EXPONENT = "69.0"
 
 _ZERO = "0.0"
 """Zero as LREAL."""
+
+_GUARDS = {
+    "sqrt": ("{0} >= 0.0", "1.0", "Reachable"),
+    "exp": (f"{{0}} <= {_EXPONENT}", "1.0", "Regular"),
+    "atan2": ("({0} <> 0.0) OR ({1} <> 0.0)", _ZERO, "Regular"),
+}
+"""Operations that are done only where a test holds: the test, the value elsewhere, and the flag
+that is false there."""
+
+
+def _of_sum(sizes: Sequence[float]) -> float:
+    most = max(sizes)
+    if most == -math.inf:
+        return most
+    return most + math.log10(sum(10.0 ** (size - most) for size in sizes))
+
+
+_BOUNDS: dict[str, Callable[[Sequence[float]], float]] = {
+    **dict.fromkeys(("add", "sub"), _of_sum),
+    "mul": sum,
+    "sqrt": lambda sizes: max(sizes[0] / 2, 0.0),
+    "exp": lambda _: _FACTOR,
+    **dict.fromkeys(("sin", "cos", "atan2", "less"), lambda _: math.log10(4.0)),
+    "select": lambda sizes: sizes[1],
+}
+"""The power of ten that an operation's value cannot exceed, from those of its arguments; of others
+it is the greatest of these."""
 
 
 class Names:
@@ -112,13 +139,9 @@ class Statements:
             arguments[1] = self._divisor(node.arguments[1])
         name = self._name(k)
         value = _PRINTED[node.operation].format(*arguments)
-        if node.operation == "sqrt":
-            self._guard(f"{arguments[0]} >= 0.0", name, value, "1.0", "Reachable")
-        elif node.operation == "exp":
-            self._guard(f"{arguments[0]} <= {_EXPONENT}", name, value, "1.0", "Regular")
-        elif node.operation == "atan2":
-            test = " OR ".join(f"({argument} <> 0.0)" for argument in arguments)
-            self._guard(test, name, value, _ZERO, "Regular")
+        if node.operation in _GUARDS:
+            test, otherwise, flag = _GUARDS[node.operation]
+            self._guard(test.format(*arguments), name, value, otherwise, flag)
         else:
             self.lines.append(f"{name} := {value};")
         return name
@@ -172,26 +195,11 @@ class Statements:
         if node.operation == CONSTANT:
             return _magnitude(node.value)
         sizes = [self._sizes[i] for i in node.arguments]
-        if node.operation in ("add", "sub"):
-            most = max(sizes)
-            if most == -math.inf:
-                return most
-            return most + math.log10(sum(10.0 ** (size - most) for size in sizes))
-        if node.operation == "mul":
-            return sum(sizes)
         if node.operation == "div":
             divisor = self.graph.nodes[node.arguments[1]]
             constant = divisor.operation == CONSTANT and divisor.value != 0.0
             return sizes[0] - (_magnitude(divisor.value) if constant else _DIVISOR)
-        if node.operation == "sqrt":
-            return max(sizes[0] / 2, 0.0)
-        if node.operation == "exp":
-            return _FACTOR
-        if node.operation in ("sin", "cos", "atan2", "less"):
-            return math.log10(4.0)
-        if node.operation == "select":
-            return sizes[1]
-        return max(sizes)
+        return _BOUNDS.get(node.operation, max)(sizes)
 
     def _divisor(self, k: int) -> str:
         """Return a node as a divisor, with its guard where it needs one."""

@@ -26,7 +26,7 @@ from pteron.kernels import (
     program,
     specialised as with_values,
 )
-from pteron.legs import Drive, Stribeck
+from pteron.legs import Drive, LegKind, Stribeck
 from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
 
@@ -70,7 +70,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         known, drives, kinds = data[_NAME], data["drives"], data["kinds"]
         names, expressions = known["names"], known["expressions"]
         values = np.array(known["values"], dtype=float)
-        found = [_drive(one) for one in drives]
+        legs = [_driven(leg, one) for leg, one in zip(robot.legs, drives, strict=False)]
         all_names, told = data["estimate"]["names"], [str(one) for one in data["expressions"]]
         if not (np.isfinite(values).all() and len(told) >= len(values)):
             raise ValueError("values are missing")
@@ -91,12 +91,13 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         same = list(base.names) == names and list(base.expressions(digits=12)) == expressions
     except ModelError:
         same = False
-    if not same or len(found) != robot.joint_count or values.shape != (base.rank,):
+    if not same or len(drives) != robot.joint_count or values.shape != (base.rank,):
         raise DataError(
             f"{path}: base parameters of another machine ({str(data.get('robot'))[:60]!r}), not of "
             f"{robot.name!r}: names or groupings differ; give the robot that was identified"
         )
-    return Identified(_driven(robot, found), base, values, _comments(base, told), grade)
+    driven = replace(robot, legs=tuple(legs))
+    return Identified(driven, base, values, _comments(base, told), grade)
 
 
 def _object(path: str | Path) -> dict[str, Any]:
@@ -111,28 +112,18 @@ def _object(path: str | Path) -> dict[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def _drive(found: dict[str, Any]) -> Drive:
-    """Return a joint's friction and its rotor's inertia, as at a ratio of 1."""
-    law = found["stribeck"] and Stribeck(found["stribeck"]["force"], found["stribeck"]["speed"])
-    friction = found["coulomb"], found["viscous"], found["offset"]
-    return Drive(*friction, rotor_inertia=found["inertia"], stribeck=law)
-
-
-def _driven(robot: Manipulator, found: list[Drive]) -> Manipulator:
-    """Return a machine with the friction and the rotors' inertia that were found."""
-    legs = []
-    for leg, new in zip(robot.legs, found, strict=True):
-        old = leg.drive or Drive()
-        drive = replace(
-            old,
-            coulomb=new.coulomb,
-            viscous=new.viscous,
-            offset=new.offset,
-            stribeck=new.stribeck,
-            rotor_inertia=new.rotor_inertia / old.gear**2,
-        )
-        legs.append(replace(leg, drive=drive))
-    return replace(robot, legs=tuple(legs))
+def _driven(leg: LegKind, found: dict[str, Any]) -> LegKind:
+    """Return a leg with the friction and the rotor's inertia that were found for its joint."""
+    drive, law = leg.drive or Drive(), found["stribeck"]
+    return replace(
+        leg,
+        drive=replace(
+            drive,
+            **{name: found[name] for name in ("coulomb", "viscous", "offset")},
+            stribeck=law and Stribeck(law["force"], law["speed"]),
+            rotor_inertia=found["inertia"] / drive.gear**2,
+        ),
+    )
 
 
 def _comments(base: BaseParameters, expressions: Sequence[str]) -> tuple[str, ...]:

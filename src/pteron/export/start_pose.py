@@ -11,6 +11,7 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.workspace import home_pose
+from pteron.workspace.margins import joint_distances
 
 _TYPE_I, _TYPE_II = 0.01, 0.001
 """Least type-I and type-II measures of random poses that are tried."""
@@ -72,12 +73,4 @@ def _measures(robot: Manipulator, poses: Array) -> Array:
 def keeps_limits(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
     """Return whether poses (..., m) are in reach with every joint within its limits."""
     joints = inverse_kinematics(robot, poses, on_failure="nan")
-    least, most = joint_limits(robot)
-    return np.asarray((np.isfinite(joints) & ~((joints < least) | (joints > most))).all(axis=-1))
-
-
-def joint_limits(robot: Manipulator) -> tuple[Array, Array]:
-    """Return the joints' limits (n,) each, m or rad; NaN where there are none."""
-    limits = [leg.limits or (np.nan, np.nan) for leg in robot.legs]
-    least, most = np.array(limits).T
-    return least, most
+    return np.asarray((joint_distances(robot, joints) >= 0.0).all(axis=-1))

@@ -48,23 +48,15 @@ def numeric(
     asked.
     """
     columns = None if base is None else columns_of(base)
-    like = ALIKE.get()
-    try:
-        return _known(robot, what, columns, wrench, like)
-    except TypeError:
-        if isinstance(robot, Manipulator):
-            raise
-        return _known(as_manipulator(robot), what, columns, wrench, like)
+    # Nothing is kept under a name: what its file says may change.
+    machine = robot if isinstance(robot, Manipulator) else as_manipulator(robot)
+    return _known(machine, what, columns, wrench, ALIKE.get())
 
 
 @lru_cache(maxsize=512)
 def _known(
-    robot: RobotLike, what: str, columns: Columns | None, wrench: bool, like: Manipulator | None
+    robot: Manipulator, what: str, columns: Columns | None, wrench: bool, like: Manipulator | None
 ) -> Adaptive:
-    if not isinstance(robot, Manipulator):
-        # Nothing is kept under a name: what its file says may change. A call with a machine, whose
-        # kernel is known, never comes here, so that it pays nothing for this.
-        raise TypeError
     kernel = guarded(robot, what, VirtualMachine, columns, wrench=wrench)
     tier = _tier(layout_of(robot), what, columns, wrench, like is not None)
     return Adaptive(kernel, tier)

@@ -170,11 +170,6 @@ class Exact(Kernel):
     vanishes.
     """
 
-    @property
-    def source(self) -> str:
-        """The instructions, one a line, as CasADi prints them."""
-        return str(self.function.str(True))
-
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         given = self._by_name(values, fixed)
         inputs = []

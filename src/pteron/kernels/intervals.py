@@ -52,11 +52,6 @@ class Boxed(Kernel):
     first, and returns an `Enclosure` for each output.
     """
 
-    @property
-    def source(self) -> str:
-        """The instructions, one a line, as CasADi prints them."""
-        return str(self.function.str(True))
-
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         given = self._by_name(values, fixed)
         arrays = []

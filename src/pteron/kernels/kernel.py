@@ -123,9 +123,9 @@ class Kernel(ABC):
         return count_operations(self.function)
 
     @property
-    @abstractmethod
     def source(self) -> str:
-        """The code that runs, as text."""
+        """The code that runs, as text: the instructions, one a line, as CasADi prints them."""
+        return str(self.function.str(True))
 
     def __call__(self, *values: Any, **fixed: Any) -> Any:
         """Evaluate the kernel.

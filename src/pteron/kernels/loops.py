@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
+import numpy as np
+
 from pteron.equations.transmissions import DriveKind
 from pteron.errors import ModelError
 from pteron.kernels.c import c_compiler
@@ -24,6 +26,10 @@ LANES = 8
 
 _FEW = 4
 """Machines that go one by one."""
+
+
+Arrays = dict[str, Array]
+"""Arrays of a run by name."""
 
 
 class Loop:
@@ -114,6 +120,29 @@ class Loop:
             return
         with ThreadPoolExecutor(shares) as pool:
             list(pool.map(part, bounds[:-1], bounds[1:]))
+
+    def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
+        """Return what `run` takes of machines in states (B, 1, Y): no loads, limits or encoders.
+
+        Commands are so many samples late, and readings so many behind.
+        """
+        batch, n = len(state), robot.joint_count
+        encoders = n * (2 if self.kind.bends else 1)
+        own = {"side": n, "memory": 0, "encoders": 4 * encoders}
+        own |= dict.fromkeys(("clock", "done", "fault"), 1)
+        shared = {"given": n, "wrench": len(robot.column_names["wrench"]), "at_motor": 2 * n}
+        shared |= dict.fromkeys(("steps", "noises", "round", "noise"), encoders)
+        return {
+            "state": state,
+            "seen": state.copy(),
+            "queue": np.zeros((batch, late + 2, n)),
+            "told": np.zeros((batch, behind + 1, 2 * encoders)),
+            **{name: np.zeros((batch, 1, size)) for name, size in own.items()},
+            **{name: np.zeros((1, 1, size)) for name, size in shared.items()},
+            "most": np.full((1, 1, n), np.inf),
+            "share": np.ones((1, 1, 1)),
+            **machine_numbers(robot, self.plant, "plant"),
+        }
 
     def code(self, lanes: int) -> LoopCode:
         """Return its C for some machines side by side."""

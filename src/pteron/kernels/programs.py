@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -109,8 +109,8 @@ def program(
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
     like = ALIKE.get()
     if like is not None and columns is None:
-        return _general(like, what, wrench, guarded)
-    return _known(bare(robot), what, columns, wrench, guarded, plain, named)
+        return _general(like, _Form(what, wrench, guarded, plain=True))
+    return _known(bare(robot), _Form(what, wrench, guarded, plain, named), columns)
 
 
 @contextmanager
@@ -182,47 +182,41 @@ def _bare(robot: Manipulator) -> Manipulator:
     return replace(robot, name="any", legs=legs, platform=platform, radii=None, tools=())
 
 
+class _Form(NamedTuple):
+    """A function of the table, and the options of `program` with which it is built."""
+
+    what: str
+    wrench: bool = False
+    guarded: bool = False
+    plain: bool = False
+    named: bool = False
+
+
 @lru_cache(maxsize=512)
-def _known(*asked: Any) -> Program:
-    return kept(asked, partial(_built, *asked))
+def _known(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
+    return kept((robot, form, columns), partial(_built, robot, form, columns))
 
 
-def _built(
-    robot: Manipulator,
-    what: str,
-    columns: Columns | None,
-    wrench: bool,
-    guarded: bool,
-    plain: bool,
-    named: bool,
-) -> Program:
+def _built(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
     machine = Machine.of(robot)
     if columns is None:
-        return _program(machine, what, wrench=wrench, guarded=guarded, plain=plain, named=named)
+        return _program(machine, form=form)
     selection = ca.SX(len(machine.parameters), len(columns))
     for k, members in enumerate(columns):
         for j in members:
             selection[j, k] = 1
-    if what in SELECTED:
-        constants: Symbols = {"selection": selection}
-        return _program(machine, what, constants=constants, guarded=guarded, plain=plain)
+    if form.what in SELECTED:
+        return _program(machine, form=form, constants={"selection": selection})
     base = ca.SX.sym("base_parameters", len(columns))
     # A mass on a platform point may be the leg's or the platform's, whichever costs less.
     given, extra = ca.mtimes(selection, base), {"base_parameters": base}
     forms = [
         _program(
-            machine,
-            what,
-            constants={"parameters": given, "carried": carried},
-            extra=extra,
-            wrench=wrench,
-            guarded=guarded,
-            plain=plain,
-            named=named,
+            machine, form=form, constants={"parameters": given, "carried": carried}, extra=extra
         )
         for carried in (True, False)
     ]
-    return min(forms, key=lambda form: count_operations(form.function))
+    return min(forms, key=lambda one: count_operations(one.function))
 
 
 def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -> Program:
@@ -243,10 +237,8 @@ def _motion(robot: Manipulator, kind: DriveKind, general: bool) -> Program:
     extra |= {"pace": ca.SX.sym("pace")} if any(kind.lugre) else {}
     extra["actuators"] = ca.SX.sym("actuators", actuator_count(kind))
     machine, vector = Machine.symbols(robot) if general else (Machine.of(robot), None)
-    constants = {"kind": kind}
-    return _program(
-        machine, "driven_motion", vector, constants, extra=extra, wrench=True, guarded=True
-    )
+    form = _Form("driven_motion", wrench=True, guarded=True)
+    return _program(machine, vector, form=form, constants={"kind": kind}, extra=extra)
 
 
 def general_program(robot: RobotLike, what: str) -> Program:
@@ -254,36 +246,27 @@ def general_program(robot: RobotLike, what: str) -> Program:
 
     The vector's order is that of `equations.machine.numbers`.
     """
-    return _general(layout_of(robot), what)
+    return _general(layout_of(robot), _Form(what, plain=True))
 
 
 @lru_cache(maxsize=256)
-def _general(robot: Manipulator, what: str, wrench: bool = False, guarded: bool = False) -> Program:
-    key = "general", robot, what, wrench, guarded
-    return kept(key, partial(_generally_built, robot, what, wrench, guarded))
-
-
-def _generally_built(robot: Manipulator, what: str, wrench: bool, guarded: bool) -> Program:
-    machine, vector = Machine.symbols(robot)
-    # Exact arithmetic wants the equations as they stand.
-    return _program(machine, what, vector, wrench=wrench, guarded=guarded, plain=True)
+def _general(robot: Manipulator, form: _Form) -> Program:
+    # The form is plain: exact arithmetic wants the equations as they stand.
+    return kept(("general", robot, form), lambda: _program(*Machine.symbols(robot), form=form))
 
 
 def _program(
     machine: Machine,
-    what: str,
     vector: Expression | None = None,
     constants: Symbols | None = None,
     extra: dict[str, Expression] | None = None,
-    wrench: bool = False,
-    guarded: bool = False,
-    plain: bool = False,
-    named: bool = False,
+    *,
+    form: _Form,
 ) -> Program:
     """Return a function of the table; `constants` stand for inputs, `extra` are more inputs."""
-    entry = TABLE[what]
+    what, entry = form.what, TABLE[form.what]
     asked = [name for name in entry.inputs if name not in (constants or {})]
-    asked += ["wrench"] if wrench else []
+    asked += ["wrench"] if form.wrench else []
     selected = (constants or {}).get("selection", ca.SX.eye(0)).shape[1]
     sizes = {
         "parameters": len(machine.parameters),
@@ -299,27 +282,27 @@ def _program(
     given |= extra or {}
     symbols = {name: given[name] for name in sorted(given, key=_shared_last)}
     known = symbols | (constants or {})
-    if what in _FORCES and not named and vector is None:
+    if what in _FORCES and not form.named and vector is None:
         seen = machine.in_platform_axes(symbols["pose"])
         if seen is not None:
             machine, axes = seen
-            if wrench:
+            if form.wrench:
                 parts = ca.vertsplit(symbols["wrench"], 3)
                 known["wrench"] = ca.vertcat(*(ca.mtimes(axes.T, part) for part in parts))
     built = entry.build(machine, known)
     forms = [{name: _shaped(output) for name, output in built.items()}]
-    if guarded:
+    if form.guarded:
         results = [expression for expression, _ in forms[0].values()]
         statuses = _statuses(machine, entry, symbols, results)
         forms = [{**forms[0], "status": (status, ())} for status in statuses]
     if vector is not None:
         symbols = {"geometry": vector, **symbols}
     # A matrix goes out transposed: CasADi stores columns, NumPy rows.
-    dense = ([ca.densify(expression).T for expression, _ in form.values()] for form in forms)
+    dense = ([ca.densify(expression).T for expression, _ in one.values()] for one in forms)
     names = list(symbols), list(forms[0])
-    functions = (ca.Function(what, list(symbols.values()), ca.cse(form), *names) for form in dense)
+    functions = (ca.Function(what, list(symbols.values()), ca.cse(one), *names) for one in dense)
     function = min(functions, key=count_operations)
-    if not plain:
+    if not form.plain:
         function = optimised(function)
     columns = machine.robot.column_names
     inputs = tuple(

@@ -50,12 +50,8 @@ FIXED: dict[str, Callable[[Manipulator], Array]] = {
 _TRANSPARENT = ("jax", "exact")
 """Targets whose numbers may be traced or fractions, and go into the code as they are given."""
 
-_DTYPES = {
-    "vm": ("float64",),
-    "numba": ("float64",),
-    "exact": ("float64",),
-    "intervals": ("float64",),
-}
+_DOUBLE = ("vm", "numba", "exact", "intervals")
+"""Targets that compute in double precision alone."""
 
 
 @runtime_checkable
@@ -147,7 +143,7 @@ def compile(
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
     if grade not in get_args(Grade):
         raise ModelError(f"grade: {grade!r} is not one of {', '.join(get_args(Grade))}")
-    allowed = _DTYPES.get(target, ("float64", "float32"))
+    allowed = ("float64",) if target in _DOUBLE else ("float64", "float32")
     if dtype not in allowed:
         raise ModelError(f'dtype: {dtype!r} given, target "{target}" has {", ".join(allowed)}')
     if threads < 1:

@@ -167,11 +167,6 @@ reads NumPy's memory in place (about 1 us a call), where a call with matrices ta
 class VirtualMachine(ArrayKernel):
     """A kernel that CasADi's virtual machine executes."""
 
-    @property
-    def source(self) -> str:
-        """The instructions, one a line, as CasADi prints them."""
-        return str(self.function.str(True))
-
     @cached_property
     def _lowered(self) -> ca.Function:
         return _lowered(straight(self.function))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, bare, numeric
+from pteron.kernels.bisection import bisected
 from pteron.kernels.kept import kept_result
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
 from pteron.kinematics.sampling import drawn_poses, type_ii_sizes
@@ -153,10 +154,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
         )
     first = np.flatnonzero((negative[1:] != negative[:-1]) & known[1:] & known[:-1])
     low, high, side = angles[first], angles[first + 1], negative[first]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        before = (measure(middle) < 0.0) == side
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    low, _ = bisected(lambda angle: (measure(angle) < 0.0) == side, low, high, _HALVINGS)
     found = np.abs(measure(low)) <= _ZERO  # else a gap in the reach lies between two samples
     return np.sort(_wrapped(low[found]))
 

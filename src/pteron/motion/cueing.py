@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.arguments import checked_arguments
+from pteron.arguments import checked_arguments, expect
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
@@ -24,8 +24,9 @@ from pteron.motion.motion import Motion
 from pteron.motion.trajectories.replay import rows_of
 from pteron.shapes import Columns, PoseLike
 from pteron.tables import Table
-from pteron.workspace import Box, Proof, conditions, home_pose, prove
-from pteron.workspace.conditions import Condition, keeps
+from pteron.workspace import Box, Proof, conditions, home_pose
+from pteron.workspace.conditions import Condition
+from pteron.workspace.largest_proved import largest_proved
 
 COLUMNS = ("t", "ax", "ay", "az", "wx", "wy", "wz")
 """The columns of a vehicle's motion: s; accelerations without gravity, m/s^2, and angular rates,
@@ -81,8 +82,7 @@ class Washout:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not 0.0 < value < np.inf:
-                raise DataError(f"{name}: {value!r} given, a number above 0 expected")
+            expect(0.0 < value < np.inf, name, repr(value), "a number above 0")
 
 
 @dataclass(frozen=True, repr=False)
@@ -214,19 +214,18 @@ def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tu
     least = 1e-3 * max(float(demand.max()), 1e-3)
     ways = np.random.default_rng(0).uniform(-1.0, 1.0, (_SAMPLES, len(middle)))
     ways[: _SAMPLES // 2] = np.sign(ways[: _SAMPLES // 2])
-    half, low, high = np.maximum(demand, least), 0.0, _ROOM
-    for _ in range(_HALVINGS):
-        size = 0.5 * (low + high)
-        good = keeps(robot, asked, middle + size * half * ways).all()
-        low, high = (size, high) if good else (low, size)
-    for k in range(1, _TRIES):
-        size = low * 0.9**k
-        region = Box(tuple(middle - size * half), tuple(middle + size * half))
-        proof = prove(robot, region, given=asked)
-        if proof.holds:
-            return region, proof
-    raise ModelError(
-        f"no box of poses about {middle.round(6).tolist()} is proved to serve: {proof}; give "
-        "another middle",
-        subject=robot.name,
+    half, shares = np.maximum(demand, least), (0.9**k for k in range(1, _TRIES))
+
+    def region(size: float) -> Box:
+        return Box(tuple(middle - size * half), tuple(middle + size * half))
+
+    size, proof = largest_proved(
+        robot, asked, region, lambda size: middle + size * half * ways, _ROOM, _HALVINGS, shares
     )
+    if not proof.holds:
+        raise ModelError(
+            f"no box of poses about {middle.round(6).tolist()} is proved to serve: {proof}; give "
+            "another middle",
+            subject=robot.name,
+        )
+    return region(size), proof

@@ -280,13 +280,7 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
             low, high = leg.limits or (used[0] - np.pi, used[0] + np.pi)
             angles = np.linspace(low, high, 2 + int((high - low) / _ARC)) - used[0]
             center, end = points.links[i][0, :2]
-            path = center + _turned(end - center, axis, angles)
+            turned = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
+            path = center + turned.apply(end - center)
         found.append(Guide(slides, axis, path))
     return tuple(found)
-
-
-def _turned(vector: Array, axis: Array, angles: Array) -> Array:
-    """Return a vector turned about an axis by angles (K,)."""
-    along = (vector @ axis) * axis
-    x, y = vector - along, np.cross(axis, vector)
-    return np.asarray(along + np.outer(np.cos(angles), x) + np.outer(np.sin(angles), y))

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.kernels import as_array
-from pteron.legs import Drive
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.motion.sizing.drive_margins import drive_margins
 
 
 def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[str, ...]:
@@ -37,23 +37,10 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     ('leg 2: the motion takes up to 25 N, but its drive gives 20 N (max_force)',)
     """
     robot = as_manipulator(robot)
-    found = []
-    peaks = [
-        np.abs(as_array(values, name, (len(robot.legs),))).reshape(-1, len(robot.legs))
-        for name, values in (("forces", forces), ("speeds", speeds))
-    ]
-    # Rows that no pose serves are NaN.
-    force, speed = (np.fmax.reduce(values, axis=0, initial=0.0) for values in peaks)
-    for i, leg in enumerate(robot.legs):
-        drive = leg.drive or Drive()
-        for key, most, unit in (
-            ("max_force", force[i], leg.joint.force_unit),
-            ("max_speed", speed[i], f"{leg.joint.unit}/s"),
-        ):
-            limit = getattr(drive, key)
-            if limit is not None and most > limit:
-                found.append(
-                    f"leg {i + 1}: the motion takes up to {most:.4g} {unit}, but its drive gives "
-                    f"{limit:g} {unit} ({key})"
-                )
-    return tuple(found)
+    sizes = {"peak_force": ("forces", forces), "peak_speed": ("speeds", speeds)}
+    needed = {}
+    for quantity, (name, values) in sizes.items():
+        each = np.abs(as_array(values, name, (len(robot.legs),))).reshape(-1, len(robot.legs))
+        # Rows that no pose serves are NaN.
+        needed[quantity] = np.fmax.reduce(each, axis=0, initial=0.0)
+    return tuple(one.told("") for one in drive_margins(robot, needed) if one.margin < 1.0)

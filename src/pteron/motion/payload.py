@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pteron.arguments import number_or_nan
 from pteron.bodies.inertia import carried_values, inertia_count
 from pteron.bodies.vectors import numbers, vector
 from pteron.errors import DataError, ModelError, warn_unlikely
@@ -140,10 +141,7 @@ def carrying(
     inertia: float | Sequence[float] = 0.0,
 ) -> Manipulator:
     """Return the machine with a body as `with_payload`, without a warning of its mass."""
-    try:
-        carried = float(mass)
-    except (TypeError, ValueError):
-        carried = math.nan
+    carried = number_or_nan(mass)
     if not (math.isfinite(carried) and carried >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
     platform, own = robot.platform, robot.platform.inertia

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.atomic import checked_file, write_bytes
 from pteron.errors import DataError, OutputError, shown
 from pteron.kernels import Array, as_array
@@ -217,8 +218,7 @@ def _told(speed: float) -> str:
 
 
 def _expect_number(name: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:
-        raise DataError(f"{name}: {value:g} given, a number from {low:g} to {high:g} expected")
+    expect(low <= value <= high, name, f"{value:g}", f"a number from {low:g} to {high:g}")
 
 
 def _checked_forces(forces: ArrayLike, motion: Motion, robot: Manipulator) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
@@ -193,8 +194,7 @@ def poses_figure(
     """
     given = [robots] if isinstance(robots, RobotLike) else list(robots)
     machines = [as_manipulator(robot) for robot in given]
-    if not machines:
-        raise DataError("robots: none given, at least 1 expected")
+    expect(machines, "robots", "none", "at least 1")
     first = machines[0]
     shown = np.reshape(checked(first, poses, "poses"), (-1, first.freedom))
     count = max(len(machines), len(shown))
@@ -202,8 +202,7 @@ def poses_figure(
         raise DataError(f"poses: {len(shown)} given for {len(machines)} robots, as many expected")
     if titles and len(titles) != count:
         raise DataError(f"titles: {len(titles)} given, {count} expected, one for each pose")
-    if columns is not None and columns < 1:
-        raise DataError(f"columns: {columns} given, 1 or more expected")
+    expect(columns is None or columns >= 1, "columns", columns, "1 or more")
     path = None if along is None else joint_points(first, along).tool.reshape(-1, 3)
     every = [
         joint_points(machine, pose)

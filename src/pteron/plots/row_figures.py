@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.plots.canvas import (
@@ -20,6 +21,7 @@ from pteron.plots.canvas import (
     REACH,
     WARNING,
     blank,
+    groups_of,
     plain_axes,
     spot,
 )
@@ -83,9 +85,7 @@ def parameters_figure(
     known = None if reference is None else _fitting(names, reference, "reference")
     if units and len(units) != len(names):
         raise DataError(f"units: {len(units)} given, {len(names)} expected, one for each name")
-    groups: dict[str, list[int]] = {}
-    for i, unit in enumerate(units or ["value"] * len(names)):
-        groups.setdefault(unit, []).append(i)
+    groups = groups_of(units or ["value"] * len(names))
     counts = [len(own) for own in groups.values()]
     figure = blank(_WIDE, _HEAD * len(groups) + _ROW * len(names))
     grid = figure.add_gridspec(len(groups), 1, height_ratios=[count + 1.0 for count in counts])
@@ -155,6 +155,5 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
 
 def _fitting(names: Sequence[str], values: ArrayLike, what: str) -> Array:
     found = np.asarray(values, dtype=float)
-    if found.shape != (len(names),):
-        raise DataError(f"{what}: shape {found.shape} given, ({len(names)},) expected")
+    expect(found.shape == (len(names),), what, f"shape {found.shape}", f"({len(names)},)")
     return found

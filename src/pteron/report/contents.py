@@ -236,11 +236,8 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
         whole = reach_slice(robot, home, plane, extent=extent, points=_FINE)
         # The box is that of all planes: this one may be reached in a small part of it.
         cut = reach_slice(robot, home, plane, extent=reached(whole), points=_FINE)
-    poses = np.tile(home, (*cut.status.shape, 1))
-    i, j = cut.places
-    poses[..., i], poses[..., j] = np.meshgrid(cut.first, cut.second)
-    type_i = numeric(robot, "reach")(poses)[1].min(axis=-1)
-    type_ii = _type_ii(robot, poses)
+    type_i = numeric(robot, "reach")(cut.poses)[1].min(axis=-1)
+    type_ii = _type_ii(robot, cut.poses)
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pteron.dynamics import drive_forces
 from pteron.kernels import Array
@@ -14,7 +14,7 @@ from pteron.manipulator import Manipulator
 from pteron.motion import overloads
 from pteron.motion.trajectories.tool import tool_path
 from pteron.playback import Playback
-from pteron.plots import forces_figure, power_figure, robot_figure, svg
+from pteron.plots import forces_figure, power_figure, robot_figure
 from pteron.plots.machine_figures import gravity_of
 from pteron.report.motion_frames import Frames, few, frames
 from pteron.report.moving_picture import stage
@@ -88,6 +88,7 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
             found.frames,
             doing=f"in the motion{name}",
             still=f"Where the motion {begins}, with its way.",
+            picture_title=f"{robot.name} where the motion begins",
             force_title=f"{whose} {force(joints).name}",
         ),
         found=found,
@@ -118,8 +119,8 @@ def _forces_told(found: ShownMotion) -> tuple[str, str]:
     return "Actuator", "what the bodies take; friction is left out."
 
 
-def _figures(found: ShownMotion) -> dict[str, Any]:
-    """Return the pictures as SVG, by their names in the template."""
+def _figures(found: ShownMotion) -> dict[str, Figure]:
+    """Return the pictures, by their names in the template."""
     robot, motion, at = found.robot, found.playback.motion, found.frames
     machine = robot_figure(
         at.still,
@@ -131,22 +132,13 @@ def _figures(found: ShownMotion) -> dict[str, Any]:
     some = few(len(motion.time))
     time = motion.time[some] - motion.time[0]
     return {
-        "robot": svg(machine, name="robot", title=f"{robot.name} where the motion begins"),
-        "forces": svg(
-            forces_figure(time, found.forces[some], ylabel=force(joints).axis),
-            name="forces",
-            title="Forces over time",
-        ),
-        "joints": _over_time(at.time, at.points.coordinates, coordinate(joints), "coordinates"),
-        "power": svg(
-            power_figure(time, found.forces[some] * found.rates[some]),
-            name="power",
-            title="Power of every drive over time",
-        ),
-        "rates": _over_time(time, found.rates[some], speed(joints), "speeds"),
+        "robot": machine,
+        "forces": forces_figure(time, found.forces[some], ylabel=force(joints).axis),
+        "joints": _over_time(at.time, at.points.coordinates, coordinate(joints)),
+        "power": power_figure(time, found.forces[some] * found.rates[some]),
+        "rates": _over_time(time, found.rates[some], speed(joints)),
     }
 
 
-def _over_time(time: Array, values: Array, quantity: JointQuantity, name: str) -> Any:
-    figure = forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)
-    return svg(figure, name=name, title=f"Joint {name} over time")
+def _over_time(time: Array, values: Array, quantity: JointQuantity) -> Figure:
+    return forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)

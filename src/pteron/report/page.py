@@ -24,7 +24,6 @@ from pteron.plots import (
     reach_figure,
     regularity_figure,
     robot_figure,
-    svg,
 )
 from pteron.plots.machine_figures import gravity_of
 from pteron.reduction import BaseParameters
@@ -63,6 +62,7 @@ def page(report: Report) -> str:
             report.shown,
             doing="on its pick-and-place cycle" if standard else "in motion",
             still=f"The {home}, with the way of {point} on the {way}.",
+            picture_title=f"{robot.name} in its home pose",
             force_title=f"{'Drive' if report.driven else 'Actuator'} {force(joints).name}",
         ),
         report=report,
@@ -211,7 +211,7 @@ def _followers(robot: Manipulator) -> list[int]:
 
 
 def _figures(report: Report) -> dict[str, Any]:
-    """Return the pictures as SVG, by their names in the template."""
+    """Return the pictures by their names in the template."""
     robot, cycle, at = report.robot, report.cycle, report.orientations
     shown, standard = report.shown, report.standard
     # The cycle returns on its own path.
@@ -229,38 +229,23 @@ def _figures(report: Report) -> dict[str, Any]:
     some = few(len(cycle.time))
     forces = forces_figure(cycle.time[some], report.forces[some], turning_point=half, ylabel=label)
     made: dict[str, Any] = {
-        "robot": svg(machine, name="robot", title=f"{robot.name} in its home pose"),
-        "forces": svg(forces, name="forces", title="Actuator forces over the motion"),
-        "force_speed": svg(
-            force_speed(report.sizing), name="speeds", title="Force over speed of every drive"
-        ),
-        "power": svg(power(report.sizing), name="power", title="Power of every drive over time"),
-        "reach": [
-            svg(
-                reach_figure(cut, path=path),
-                name=f"reach{''.join(cut.plane)}",
-                title=f"Poses in reach in the {'-'.join(cut.plane)} plane",
-            )
-            for cut in report.slices
-        ],
+        "robot": machine,
+        "forces": forces,
+        "force_speed": force_speed(report.sizing),
+        "power": power(report.sizing),
+        "reach": [reach_figure(cut, path=path) for cut in report.slices],
     }
     if at is not None:
         turns = cycle.pose[:, at.coordinate]
         used = (float(turns.min()), float(turns.max())) if standard else None
         home = float(report.home[at.coordinate])
-        figure = regularity_figure(at.angles, at.type_ii, at.singular, home=home, used=used)
-        title = "The type-II measure over the orientation"
-        made["orientations"] = svg(figure, name="orientations", title=title)
+        made["orientations"] = regularity_figure(
+            at.angles, at.type_ii, at.singular, home=home, used=used
+        )
     if report.measures is not None:
+        measures = report.measures.type_i, report.measures.type_ii
         cut = report.measures.cut
-        made["measures"] = [
-            svg(
-                measure_figure(cut, measure, path=path),
-                name=f"measure{name}",
-                title=f"The type-{name} measure in the {'-'.join(cut.plane)} plane",
-            )
-            for name, measure in (("I", report.measures.type_i), ("II", report.measures.type_ii))
-        ]
+        made["measures"] = [measure_figure(cut, measure, path=path) for measure in measures]
     return made
 
 

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-import pteron
 from pteron.controllers.feedback import Feedback
 from pteron.manipulator import Manipulator
 from pteron.motion import Tuning
 from pteron.motion.trajectories.limits import limits_of
-from pteron.plots import bode_figure, poles_figure, svg
+from pteron.plots import bode_figure, poles_figure
 from pteron.report.quantities import readable
-from pteron.report.typeset import resource, template
+from pteron.report.typeset import template
 
 if TYPE_CHECKING:
     import polars as pl
@@ -70,12 +69,8 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
         at=at,
         pose=tuning.states[tuning.worst, 0],
         figures={
-            "bode": svg(
-                bode_figure(worst.frequencies, worst.drive_loops, robot.joint_names),
-                name="bode",
-                title="Gain and phase of each drive's loop over the frequency",
-            ),
-            "poles": svg(poles_figure(worst.loop.poles), name="poles", title="Poles of the loop"),
+            "bode": bode_figure(worst.frequencies, worst.drive_loops, robot.joint_names),
+            "poles": poles_figure(worst.loop.poles),
         },
         trials={
             name: [row for row in trials.to_dicts() if row["changed"] == name]
@@ -87,8 +82,6 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
         },
         length="rad" if robot.platform.angular.all() else "m",
         degrees=180.0 / np.pi,
-        version=pteron.__version__,
-        style=resource("page.css"),
     )
 
 

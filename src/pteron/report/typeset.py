@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 from importlib.resources import files
 from math import floor, isfinite, log10
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Template
 from markupsafe import Markup, escape
@@ -16,6 +16,9 @@ import pteron
 from pteron.platforms.coordinates import coordinate
 from pteron.short_numbers import power_of_ten
 from pteron.templates import template as any_template
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _TINY, _HUGE = 1e-6, 1e7
 """Sizes below and from which zeros are no longer counted: numbers have a power of ten."""
@@ -139,6 +142,13 @@ def embedded(data: Any) -> Markup:
     return Markup(text.replace("<", "\\u003c"))
 
 
+def _svg(figure: Figure, name: str, title: str, **options: Any) -> Markup:
+    """Return a figure for a page, where `name` is its own and `title` says what it shows."""
+    from pteron.plots import svg  # Matplotlib is behind it, which few pages need.
+
+    return svg(figure, name=name, title=title, **options)
+
+
 def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:
     """Return a page's template, with the style and filters of all pages and some of its own."""
     shared: dict[str, Callable[..., Any]] = {
@@ -148,6 +158,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         "percent": percent,
         "prose": prose,
         "significant": significant,
+        "svg": _svg,
         "triple": triple,
         "symbol": lambda name: coordinate(name).symbol,
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -139,40 +140,32 @@ def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
     """Return a paving as a lattice, as fine as the smallest boxes, or as `most` cells allow."""
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
     start, whole = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
-    depths, places = [], []
-    for boxes in (paving.inner, paving.boundary):
-        depth = np.round(np.log2(whole / (boxes[:, 1] - boxes[:, 0]))).astype(np.int64)
-        depths.append(depth)
-        places.append(np.round((boxes[:, 0] - start) / whole * 2.0**depth).astype(np.int64))
-    finest = np.concatenate(depths).max(axis=0, initial=0)
+    sizes = [list(paving.by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
+    finest = np.array([depth for depth, _ in chain(*sizes)]).max(axis=0, initial=0)
     every = np.concatenate([paving.inner, paving.boundary])
     low, high = (every[:, 0].min(axis=0) - start) / whole, (every[:, 1].max(axis=0) - start) / whole
     while np.prod(np.ceil((high - low) * 2.0**finest) + 1.0) > most:
         finest[finest.argmax()] -= 1
     first = np.floor(low * 2.0**finest + _ROUNDING).astype(np.int64)
     shape = np.ceil(high * 2.0**finest - _ROUNDING).astype(np.int64) - first
-    inner, undecided = (
-        _filled(*boxes, finest, first, tuple(shape)) for boxes in zip(depths, places, strict=True)
-    )
+    inner, undecided = (_filled(boxes, finest, first, tuple(shape)) for boxes in sizes)
     size = whole / 2.0**finest
     full = inner > 1.0 - _ROUNDING
     return Lattice(start + first * size, size, full, inner + undecided > 0.0)
 
 
 def _filled(
-    depths: NDArray[np.int64],
-    places: NDArray[np.int64],
+    sizes: list[tuple[NDArray[np.int64], NDArray[np.int64]]],
     finest: NDArray[np.int64],
     first: NDArray[np.int64],
     shape: tuple[int, ...],
 ) -> Array:
-    """Return which share of each cell boxes fill, given by how often each side was halved."""
+    """Return which share of each cell boxes fill, given as by `Paving.by_size`."""
     found = np.zeros(int(np.prod(shape)))
     strides = np.cumprod(np.append(1, shape[:0:-1]))[::-1]
-    for depth in np.unique(depths, axis=0):
-        chosen = places[(depths == depth).all(axis=1)]
+    for depth, places in sizes:
         wide = 2 ** np.maximum(finest - depth, 0)
-        corner = ((chosen >> np.maximum(depth - finest, 0)) * wide - first) @ strides
+        corner = ((places >> np.maximum(depth - finest, 0)) * wide - first) @ strides
         within = np.array(list(np.ndindex(*wide))) @ strides
         cells = (corner[:, None] + within).ravel()
         found += 0.5 ** float(np.maximum(depth - finest, 0).sum()) * np.bincount(

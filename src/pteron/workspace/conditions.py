@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect
 from pteron.equations.edges import Edge, edges
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
@@ -108,8 +109,7 @@ def conditions(
     """
     robot = as_manipulator(robot)
     for name, floor in (("type_i", type_i), ("type_ii", type_ii)):
-        if not 0.0 <= floor < math.inf:
-            raise DataError(f"{name}: {floor!r} given, a floor of 0 or more expected")
+        expect(0.0 <= floor < math.inf, name, repr(floor), "a floor of 0 or more")
     pose = ca.SX.sym("pose", robot.freedom)
     found = [
         Condition(edge.leg, _clause(edge), "room", "room", k)

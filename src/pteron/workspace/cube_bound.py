@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.kernels import Array
-from pteron.workspace.components import lattice
+from pteron.kernels.bisection import bisected
+from pteron.workspace.components import Lattice, lattice
 from pteron.workspace.paving import Paving
 
 _HALVINGS = 30
@@ -50,25 +50,17 @@ def cube_bound(paving: Paving) -> float:
     if not len(paving.inner) + len(paving.boundary):
         return 0.0
     cells = lattice(paving)
-    filled = np.pad(cells.possible, 1).astype(np.int64)
-    for axis in range(filled.ndim):
-        filled = filled.cumsum(axis=axis)
-    low, high = 0.0, float((cells.size * cells.possible.shape).min() + 2.0 * cells.size.max())
-    for _ in range(_HALVINGS):
-        edge = 0.5 * (low + high)
-        low, high = (edge, high) if _has_block(filled, edge, cells.size) else (low, edge)
-    return high * (1.0 + _WIDER)
+    widest = float((cells.size * cells.possible.shape).min() + 2.0 * cells.size.max())
+    edge = bisected(lambda edge: _has_block(cells, edge), 0.0, widest, _HALVINGS)[1]
+    return float(edge) * (1.0 + _WIDER)
 
 
-def _has_block(filled: NDArray[np.int64], edge: float, size: Array) -> bool:
-    """Return whether some block as a cube of this edge must hold is filled, by summed cells."""
-    counts = np.maximum(np.floor(edge / size).astype(int) - 1, 0)
+def _has_block(cells: Lattice, edge: float) -> bool:
+    """Return whether some block as a cube of this edge must hold may be all inside."""
+    counts = np.maximum(np.floor(edge / cells.size).astype(int) - 1, 0)
     if not counts.all():
         return True
-    if (counts > np.array(filled.shape) - 2).any():
+    if (counts > cells.possible.shape).any():
         return False
-    for axis, count in enumerate(counts):
-        length = filled.shape[axis]
-        after, before = (np.arange(start, length - count + start) for start in (count, 0))
-        filled = filled.take(after, axis=axis) - filled.take(before, axis=axis)
-    return bool((filled == counts.prod()).any())
+    possible = cells.possible.astype(np.uint8)
+    return bool(scipy.ndimage.minimum_filter(possible, counts, mode="constant").any())

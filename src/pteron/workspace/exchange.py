@@ -16,6 +16,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.workspace.lattice_minima import failing_between
 from pteron.workspace.samples import Samples, Shape, lattice
 from pteron.workspace.smooth_conditions import SmoothConditions
@@ -187,13 +188,9 @@ def _feasible_step(program: Program, samples: Samples, good: Array, z: Array) ->
     """Return how far one may go from good unknowns to others, as a share of the step."""
     if program.keeps(samples, z):
         return 1.0
-    low, high = 0.0, 1.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (
-            (middle, high) if program.keeps(samples, good + middle * (z - good)) else (low, middle)
-        )
-    return low
+    way = z - good
+    kept = bisected(lambda share: program.keeps(samples, good + share * way), 0.0, 1.0, _HALVINGS)
+    return float(kept[0])
 
 
 def _cut_step(program: Program, samples: Samples, good: Array, z: Array, length: float) -> float:

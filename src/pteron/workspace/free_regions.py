@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of, numbers
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, bounds, numeric
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace.boxes import halved
@@ -164,12 +165,13 @@ def _sampled(robot: Manipulator, region: Array) -> Array | None:
     count = min(len(one), len(other))
     if not count:
         return None
-    low, high = one[:count], other[:count]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        below = (_in_reach(robot, middle) < 0.0)[:, None]
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return _singular(robot, low)
+    negative, _ = bisected(
+        lambda poses: (_in_reach(robot, poses) < 0.0)[:, None],
+        one[:count],
+        other[:count],
+        _HALVINGS,
+    )
+    return _singular(robot, negative)
 
 
 def _stepped(robot: Manipulator, region: Array, boxes: Array) -> Array | None:

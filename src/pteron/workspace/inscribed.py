@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
@@ -20,7 +21,7 @@ from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.samples import Shape, cube
 from pteron.workspace.smooth_conditions import smooth_conditions
-from pteron.workspace.volume import bounding_box
+from pteron.workspace.volume import bounding_box, expect_places
 
 _STARTS = 3
 """Places of a search grid from which the shape is enlarged."""
@@ -151,8 +152,7 @@ def largest_cylinder(
     at = checked_one(robot, pose, "pose")
     if robot.platform.planar:
         raise DataError("robot: a planar machine has no cylinder in its workspace; ask for a cube")
-    if not ratio > 0.0:
-        raise DataError(f"ratio: {ratio!r} given, a number above 0 expected")
+    expect(ratio > 0.0, "ratio", repr(ratio), "a number above 0")
     unit = np.array(Cylinder((0.0, 0.0, 0.0), 1.0, 1.0, axis).axis)
     across = np.linalg.svd(unit[None])[2][1:]
     turns = 2.0 * np.pi * np.arange(24) / 24
@@ -181,12 +181,7 @@ def _largest(
     proved: bool,
     given: tuple[Condition, ...] | None,
 ) -> Inscribed:
-    if not robot.platform.lengths:
-        raise ModelError(
-            f"a {robot.platform.motion} platform has no places to move to: it only turns; ask for "
-            "its `largest_tilt`",
-            subject=robot.name,
-        )
+    expect_places(robot, "it only turns; ask for its `largest_tilt`")
     asked = conditions(robot) if given is None else given
     smooth, geometry = smooth_conditions(robot, asked), np.array(numbers(robot))
     lengths = len(robot.platform.lengths)

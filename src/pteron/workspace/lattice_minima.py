@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 
@@ -39,9 +40,11 @@ def failing_between(
     """
     count = len(axes)
     values = np.nan_to_num(rows, nan=-1.0)
-    lowest = values == _of_neighbours(np.minimum, values)
+    # Each point and its neighbours, also across corners, row by row.
+    around = (*[3] * count, 1)
+    lowest = values == scipy.ndimage.minimum_filter(values, around)
     # A row that rises by less to the neighbours than to zero has none between them.
-    near = values < _of_neighbours(np.maximum, values) - values
+    near = values < scipy.ndimage.maximum_filter(values, around) - values
     found = np.argwhere(lowest & near & (values >= -_DEPTH))
     if not len(found):
         return np.empty((0, count))
@@ -67,14 +70,3 @@ def failing_between(
         step = (_BEYOND * value[:, None] / steep + _FURTHER * cell.min()) * slope / steep
         places = np.clip(places - np.where(moving, step, 0.0), least, most)
     return np.asarray(places[failing])
-
-
-def _of_neighbours(extreme: np.ufunc, values: Array) -> Array:
-    """Return the least, or the greatest, of each point's value and those of its neighbours."""
-    for axis in range(values.ndim - 1):
-        along = np.moveaxis(values, axis, 0)
-        values = values.copy()
-        found = np.moveaxis(values, axis, 0)
-        extreme(found[1:], along[:-1], out=found[1:])
-        extreme(found[:-1], along[1:], out=found[:-1])
-    return values

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.errors import DataError
+from pteron.arguments import expect
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.sampling import joint_limits, type_ii_sizes
@@ -164,8 +164,7 @@ def joint_ranges(robot: RobotLike, poses: PoseLike) -> JointRanges:
     """
     robot = as_manipulator(robot)
     joints = inverse_kinematics(robot, poses).reshape(-1, robot.joint_count)
-    if not len(joints):
-        raise DataError("poses: none given, at least one expected")
+    expect(len(joints), "poses", "none", "at least one")
     return JointRanges(
         joints.min(axis=0),
         joints.max(axis=0),

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike
@@ -140,10 +141,10 @@ def _crossing(one: Paving, own: IntervalTest, k: int, low: Array, high: Array) -
         least, most, _ = own.bounds(k, poses, poses)
         if not ((least > 0.0).any() and (most < 0.0).any()):
             continue
-        inside, beyond = poses[least.argmax()], poses[most.argmin()]
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (inside + beyond)
-            serves = condition_margins(one.robot, one.conditions, middle)[k] >= 0.0
-            inside, beyond = (middle, beyond) if serves else (inside, middle)
-        return np.asarray(inside)
+        ends = poses[least.argmax()], poses[most.argmin()]
+        return bisected(
+            lambda pose: condition_margins(one.robot, one.conditions, pose)[k] >= 0.0,
+            *ends,
+            _HALVINGS,
+        )[0]
     return None

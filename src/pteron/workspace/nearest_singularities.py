@@ -14,8 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect
 from pteron.equations.machine import closure_of
-from pteron.errors import DataError, ModelError
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.architecture import architecture, expect_regular
@@ -121,8 +122,7 @@ def nearest_singularities(
     """
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
-    if most < 1:
-        raise DataError(f"most: {most} given, 1 box at least expected")
+    expect(most >= 1, "most", most, "1 box at least")
     expect_regular(robot)
     inverse_kinematics(robot, at)
     found: list[NearestSingularity] = []

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.errors import DataError, ModelError
+from pteron.arguments import expect
+from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.evaluate import checked_one
@@ -18,6 +21,7 @@ from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halved
 from pteron.workspace.conditions import Condition, IntervalTest, conditions, interval_test
 from pteron.workspace.enclosing import enclosing_box
+from pteron.workspace.volume import expect_places
 
 _SLICE = 1 << 16
 """Boxes between two looks at whether the tolerance is met."""
@@ -107,19 +111,26 @@ class Paving:
         shares = {str(c): float(s) for c, s in zip(self.conditions, alone, strict=True) if s}
         return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
-    @cached_property
-    def _cells(self) -> list[tuple[int, Array, Array]]:
-        """Boxes of one size: the verdict, how often each side was halved, and their keys."""
+    def by_size(self, boxes: Array) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Yield the places (P, k) of boxes (B, 2, k) of one size, in the lattice of all such boxes.
+
+        Before them comes how often each side of the whole was halved, (k,).
+        """
         moving = np.flatnonzero(self.box[0] < self.box[1])
         start, size = self.box[0, moving], (self.box[1] - self.box[0])[moving]
-        found = []
-        for boxes, value in ((self.inner, 1), (self.boundary, 0)):
-            depths = np.round(np.log2(size / (boxes[:, 1] - boxes[:, 0])))
-            for depth in np.unique(depths, axis=0):
-                least = boxes[(depths == depth).all(axis=1), 0]
-                cells = np.round((least - start) / size * 2.0**depth)
-                found.append((value, depth, np.sort(_keys(cells, depth))))
-        return found
+        depths = np.round(np.log2(size / (boxes[:, 1] - boxes[:, 0]))).astype(np.int64)
+        for depth in np.unique(depths, axis=0):
+            least = boxes[(depths == depth).all(axis=1), 0]
+            yield depth, np.round((least - start) / size * 2.0**depth).astype(np.int64)
+
+    @cached_property
+    def _cells(self) -> list[tuple[int, NDArray[np.int64], Array]]:
+        """Boxes of one size: the verdict, how often each side was halved, and their keys."""
+        return [
+            (value, depth, np.sort(_keys(cells, depth)))
+            for boxes, value in ((self.inner, 1), (self.boundary, 0))
+            for depth, cells in self.by_size(boxes)
+        ]
 
     def locate(self, poses: ArrayLike) -> NDArray[np.int8]:
         """Return 1 for poses (..., m) that are proved inside, -1 outside, 0 where undecided.
@@ -146,7 +157,7 @@ class Paving:
         return found.reshape(given.shape[:-1])
 
 
-def _keys(cells: Array, depth: Array) -> Array:
+def _keys(cells: NDArray[Any], depth: NDArray[np.int64]) -> Array:
     """Return a number for each cell (P, k) of a lattice; what is beyond it has no cell's number."""
     weights = np.cumprod(np.append(1.0, 2.0 ** depth[:-1] + 2.0))
     return np.asarray(np.clip(cells + 1.0, 0.0, 2.0**depth + 1.0) @ weights)
@@ -206,14 +217,10 @@ def paving(
     """
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
-    if not tolerance > 0.0:
-        raise DataError(f"tolerance: {tolerance!r} given, a share above 0 expected")
+    expect(tolerance > 0.0, "tolerance", repr(tolerance), "a share above 0")
     expect_regular(robot)
-    if within is None and not robot.platform.lengths:
-        raise ModelError(
-            f"a {robot.platform.motion} platform has no places to move to: say within which angles",
-            subject=robot.name,
-        )
+    if within is None:
+        expect_places(robot, "say within which angles")
     box = region_box(robot, at, within)
     asked = conditions(robot) if given is None else given
     inner, boundary, complete = _refined(interval_test(robot, asked), box, tolerance, most)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
@@ -150,8 +151,7 @@ def prove(
     True
     """
     robot = as_manipulator(robot)
-    if not isinstance(region, Region):
-        raise DataError(f"region: {type(region).__name__} given, a Box or a Cylinder expected")
+    expect(isinstance(region, Region), "region", type(region).__name__, "a Box or a Cylinder")
     box = region.box
     if box.shape[1] != robot.freedom:
         names = ", ".join(robot.coordinates)

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.arguments import expect_to_fit
-from pteron.errors import DataError
+from pteron.arguments import expect, expect_to_fit
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -80,8 +80,7 @@ def quadrature_volume(
     0.008
     """
     robot = as_manipulator(robot)
-    if lines < 2 or lines % 2:
-        raise DataError(f"lines: {lines} given, an even number of them expected")
+    expect(lines >= 2 and not lines % 2, "lines", lines, "an even number of them")
     at = checked_one(robot, pose, "pose")
     box = bounding_box(robot, at)
     across = box.shape[1] - 1
@@ -124,10 +123,7 @@ def _lengths(
     line, k = np.nonzero(seen[:, 1:] != seen[:, :-1])
     leaves = seen[line, k]
     low, high = x[np.maximum(k - 1, 0)], x[np.minimum(k, _SAMPLES - 1)]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        before = inside(middle, line) == leaves
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    low, high = bisected(lambda x: inside(x, line) == leaves, low, high, _HALVINGS)
     found = np.zeros(len(places))
     np.add.at(found, line, np.where(leaves, 1.0, -1.0) * 0.5 * (low + high))
     return found

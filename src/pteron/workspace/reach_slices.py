@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.arguments import expect_to_fit
+from pteron.arguments import expect, expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked_one
@@ -145,8 +145,7 @@ def reach_slice(
     elif plane not in planes:
         valid = ", ".join(f'"{one}"' for one in planes)
         raise DataError(f"plane: {plane!r} is not one of {valid}")
-    if points < 2:
-        raise DataError(f"points: {points} given, at least 2 expected")
+    expect(points >= 2, "points", points, "at least 2")
     expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + robot.joint_count))
     pose = checked_one(robot, center, "center")
     i, j = (robot.coordinates.index(name) for name in names)

@@ -9,6 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pteron.arguments import expect
 from pteron.errors import DataError, shown
 from pteron.kernels import Array
 
@@ -66,8 +67,7 @@ class Box:
         With a margin (m,), or one for all coordinates, it is so much wider on each side.
         """
         given = np.asarray(poses, dtype=float)
-        if given.ndim < 1 or not given.size:
-            raise DataError("poses: none given, at least one expected")
+        expect(given.ndim >= 1 and given.size, "poses", "none", "at least one")
         flat = given.reshape(-1, given.shape[-1])
         return cls(tuple(flat.min(axis=0) - margin), tuple(flat.max(axis=0) + margin))
 

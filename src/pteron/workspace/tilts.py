@@ -10,14 +10,17 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from pteron.arguments import expect
 from pteron.bodies.vectors import PARALLEL_TOLERANCE, dot
-from pteron.errors import DataError, ModelError
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
-from pteron.workspace.proofs import Proof, prove
+from pteron.workspace.largest_proved import largest_proved
+from pteron.workspace.proofs import Proof
+from pteron.workspace.volume import expect_places
 
 _SAMPLES = 4096
 """Poses of a region by which its size is found before it is proved; a third on its rim."""
@@ -194,13 +197,8 @@ def largest_ball(
         If the platform does not tilt and move, or the centre does not serve at that tilt.
     """
     robot, at = _checked(robot, pose)
-    if not robot.platform.lengths:
-        raise ModelError(
-            f"a {robot.platform.motion} platform has no places to move to: it only turns",
-            subject=robot.name,
-        )
-    if not 0.0 <= tilt < _MOST:
-        raise DataError(f"tilt: {tilt:g} rad given, one from 0 to below pi/2 expected")
+    expect_places(robot, "it only turns")
+    expect(0.0 <= tilt < _MOST, "tilt", f"{tilt:g} rad", "one from 0 to below pi/2")
     far = sum(leg.size for leg in robot.legs)
     return _largest(robot, at, far, tolerance, given, lambda radius: (radius, tilt))
 
@@ -239,22 +237,16 @@ def _largest(
         radius, tilt = sizes(size)
         return TiltedBall(tuple(at.tolist()), radius, tilt, lengths, angles)
 
-    def served(size: float) -> bool:
-        return bool(keeps(robot, asked, region(size).sampled()).all())
-
-    low, high = 0.0, most
-    if not served(low):
+    if not keeps(robot, asked, region(0.0).sampled()).all():
         raise ModelError(
             f"not even the middle, pose {region(0.0).sampled()[-1].tolist()}, serves",
             subject=robot.name,
         )
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if served(middle) else (low, middle)
-    for k in range(1, _SHARES + 1):
-        size = low * (1.0 - tolerance) ** k
-        proof = prove(robot, region(size), given=asked)
-        if proof.holds:
-            radius, tilt = sizes(size)
-            return LargestTilt(tilt, radius, region(size), proof)
-    raise ModelError(f"nothing is proved about pose {at.tolist()}: {proof}", subject=robot.name)
+    shares = ((1.0 - tolerance) ** k for k in range(1, _SHARES + 1))
+    size, proof = largest_proved(
+        robot, asked, region, lambda size: region(size).sampled(), most, _HALVINGS, shares
+    )
+    if not proof.holds:
+        raise ModelError(f"nothing is proved about pose {at.tolist()}: {proof}", subject=robot.name)
+    radius, tilt = sizes(size)
+    return LargestTilt(tilt, radius, region(size), proof)

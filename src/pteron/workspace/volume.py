@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.arguments import expect_to_fit
-from pteron.errors import DataError, ModelError
+from pteron.arguments import expect, expect_to_fit
+from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
@@ -80,6 +80,15 @@ class ReachVolume:
     unit: str
     box: Array
     count: int
+
+
+def expect_places(robot: Manipulator, instead: str) -> None:
+    """Refuse a machine whose platform only turns, with a clause that says what to do instead."""
+    if not robot.platform.lengths:
+        raise ModelError(
+            f"a {robot.platform.motion} platform has no places to move to: {instead}",
+            subject=robot.name,
+        )
 
 
 def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
@@ -241,8 +250,7 @@ def reach_volume(
         If there are no samples.
     """
     robot = as_manipulator(robot)
-    if count < 1:
-        raise DataError(f"count: {count} given, at least 1 expected")
+    expect(count >= 1, "count", count, "at least 1")
     expect_to_fit("count", count, 4.0 * count * robot.freedom)
     given = checked_one(robot, pose, "pose")
     box = bounding_box(robot, given)

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from pteron.equations.kinematics import passive_joints
-from pteron.equations.machine import Machine
+from pteron.export.descriptions import TEXTS
 from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
+from pteron.kinematics.limits import limited_joints
 
 _DIGITS = 15
 """Decimals that are written, of m, rad or components of a unit vector: others are rounding."""
@@ -82,22 +81,13 @@ def material(body: TreeBody) -> str:
 
 def left_out(opened: Tree, kept: Sequence[str]) -> list[str]:
     """Return a note on numbers of drives and passive joints that a file lacks; `kept` it has."""
-    drives = {
-        "inertia": "the motors' inertia",
-        "viscous": "viscous friction",
-        "coulomb": "dry friction",
-        "offset": "friction's constant part",
-        "stribeck": "what dry friction has more at rest",
-        "max_force": "the drives' greatest forces",
-        "max_speed": "the drives' greatest speeds",
-    }
     found = [
-        what
-        for key, what in drives.items()
+        told
+        for key, told in TEXTS["left_out"].items()
         if key not in kept and any(getattr(motor.drive, key) for motor in opened.motors)
     ]
-    _, *legs = passive_joints(Machine.of(opened.robot), ca.DM(opened.home))
-    nouns = sorted({joint.noun for joints in legs for joint in joints})
+    limited = limited_joints(opened.robot, opened.home)
+    nouns = sorted({joint.noun for joint in limited if joint.leg and not joint.actuated})
     found += [f"the limits of passive joints ({', '.join(nouns)})"] if nouns else []
     return [f"Left out: {', '.join(found)}."] if found else []
 

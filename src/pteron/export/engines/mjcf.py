@@ -15,12 +15,11 @@ from pteron.export.engines.formatting import (
     from_parent,
     head,
     left_out,
-    number,
     row,
     small,
     within,
 )
-from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody, TreeJoint
+from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
@@ -86,41 +85,31 @@ def export_mjcf(
 def mjcf(opened: Tree, *, step: float = STEP) -> str:
     """Return a machine as MJCF, for an integration by this step, s."""
     opened = dressed(opened)
-    bodies, robot = opened.bodies, opened.robot
-    children: list[list[int]] = [[] for _ in bodies]
+    children: list[list[int]] = [[] for _ in opened.bodies]
     roots: list[int] = []
-    for k, body in enumerate(bodies):
+    for k, body in enumerate(opened.bodies):
         (roots if body.parent == BASE else children[body.parent]).append(k)
-    offset = any(motor.drive.offset for motor in opened.motors)
     return rendered(
         "pteron.export",
         "robot.mjcf.j2",
         **FORMATS,
         head=head(opened, "MJCF"),
         notes=_notes(opened),
-        name=identifier(robot),
+        name=identifier(opened.robot),
         step=step,
         rate=STIFFNESS / step,
-        gravity=robot.gravity,
-        offset=offset,
-        size=opened.size,
-        base=opened.base,
-        bodies=bodies,
+        opened=opened,
         children=children,
         roots=roots,
         sites=_sites(opened),
-        closings=opened.closings,
-        coupled=[joint for joint in opened.joints if joint.follows is not None],
-        motors=[_motor(opened, k) for k in range(len(opened.motors))],
-        names=[motor.name for motor in opened.motors],
-        home=[joint.home for joint in opened.joints],
+        motors={joint.name: None for joint in opened.joints}
+        | {motor.joint: motor for motor in opened.motors},
         hold=_hold(opened),
         local=lambda body, points: points if body is None else within(body, points),
         same=lambda shape: np.ptp(shape.ends, axis=0).max() < _SAME,
         half=lambda shape: float(np.linalg.norm(shape.ends[1] - shape.ends[0])) / 2.0,
-        inertia=_inertia,
+        moments=_moments,
         placed=lambda body: _placed(opened, body),
-        joint_of=lambda body, joint: _joint(opened, body, joint),
         **_scene(opened),
     )
 
@@ -136,60 +125,16 @@ def _notes(opened: Tree) -> list[str]:
     return [*said, *left_out(opened, kept)]
 
 
-def _placed(opened: Tree, body: TreeBody) -> str:
-    """Return where a body is in the frame of the one before."""
+def _placed(opened: Tree, body: TreeBody) -> tuple[str, str]:
+    """Return where a body is in the frame of the one before, and how it is turned there."""
     there = from_parent(opened.bodies, body)
     x, y, z, w = scipy.spatial.transform.Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)
-    text = f'pos="{row(there[:3, 3])}"'
-    turned = row([w, x, y, z])
-    return text if turned == "1 0 0 0" else f'{text} quat="{turned}"'
+    return row(there[:3, 3]), row([w, x, y, z])
 
 
-def _inertia(body: TreeBody) -> str:
+def _moments(body: TreeBody) -> list[str]:
     """Return a body's moments of inertia, and its products if there are any."""
-    if not body.products.any():
-        return f'diaginertia="{" ".join(map(small, body.moments))}"'
-    return f'fullinertia="{" ".join(map(small, [*body.moments, *body.products]))}"'
-
-
-def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> str:
-    """Return a joint's attributes; its `ref` makes the file's pose the home pose."""
-    parts = [
-        f'name="{joint.name}"',
-        f'type="{"slide" if joint.slides else "hinge"}"',
-        f'axis="{row(joint.axis @ body.axes)}"',
-    ]
-    place = within(body, joint.point)
-    if not joint.slides and row(place) != "0 0 0":
-        parts.append(f'pos="{row(place)}"')
-    if number(joint.home) != "0":
-        parts.append(f'ref="{number(joint.home)}"')
-    for motor in opened.motors:
-        if motor.joint != joint.name:
-            continue
-        drive, ratio = motor.drive, motor.ratio
-        values = {
-            "armature": ratio**2 * drive.inertia,
-            "damping": ratio**2 * drive.viscous,
-            "frictionloss": abs(ratio) * drive.coulomb,
-        }
-        parts += [f'{name}="{number(value)}"' for name, value in values.items() if value]
-    if joint.limits is not None:
-        parts.append(f'range="{row(joint.limits)}"')
-    return " ".join(parts)
-
-
-def _motor(opened: Tree, k: int) -> str:
-    """Return an actuator, whose control is the force at the actuated joint."""
-    motor = opened.motors[k]
-    parts = [f'name="{motor.name}" joint="{motor.joint}" gear="{number(motor.ratio)}"']
-    most = motor.drive.max_force
-    if most is not None:
-        parts.append(f'ctrlrange="{number(-most)} {number(most)}"')
-    if motor.drive.offset:
-        bias = f'gainprm="1" biastype="affine" biasprm="{number(-motor.drive.offset)} 0 0"'
-        return f"<general {parts[0]} {bias}{' ' + parts[1] if most is not None else ''}/>"
-    return f"<motor {' '.join(parts)}/>"
+    return list(map(small, [*body.moments, *(body.products if body.products.any() else ())]))
 
 
 def _hold(opened: Tree) -> Array:

@@ -15,12 +15,11 @@ import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
-from pteron.export.engines.formatting import FORMATS, frame, head, inverse, left_out, number
-from pteron.export.engines.parts import BASE, Tree, TreeBody, at_zero
+from pteron.export.engines.formatting import FORMATS, from_parent, head, left_out, number
+from pteron.export.engines.parts import Tree, TreeBody, at_zero
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.extras import install_command
-from pteron.kernels import Array
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -124,7 +123,7 @@ def pinocchio_source(opened: Tree) -> str:
             "constrained dynamics have none; export it as MJCF, SDF or URDF",
             subject=robot.name,
         )
-    bodies = _without_gears(at_zero(opened))
+    every = at_zero(opened)
     armature = {motor.joint: motor.ratio**2 * motor.drive.inertia for motor in opened.motors}
     notes = left_out(opened, ("inertia",))
     if coupled:
@@ -139,10 +138,10 @@ def pinocchio_source(opened: Tree) -> str:
         notes=notes,
         name=identifier(robot),
         opened=opened,
-        bodies=bodies,
+        bodies=_without_gears(every),
         armature=armature,
         joints={joint.name: joint for joint in opened.joints},
-        place_of=lambda body: _from_parent(opened, bodies, body)[:3],
+        place_of=lambda body: from_parent(every, body)[:3],
         symmetric=lambda body: body.tensor[np.tril_indices(3)],
         bound=_bound,
         list=_list,
@@ -176,13 +175,6 @@ def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
     about += body.mass * gear.mass / mass * float(apart @ apart)
     moments = np.array([0.6, 0.7, 1.0]) * about
     return replace(body, mass=mass, center=center, moments=moments)
-
-
-def _from_parent(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> Array:
-    if body.parent == BASE:
-        return frame(body)
-    before = next(b for b in bodies if b.name == opened.bodies[body.parent].name)
-    return np.asarray(inverse(frame(before)) @ frame(body))
 
 
 def _bound(value: float | None, infinite: str) -> str:

@@ -1,4 +1,4 @@
-"""Sections of Klipper's generic_cartesian: for machines whose joints are linear in the pose.
+"""Values of a configuration of Klipper's generic_cartesian: joints that are linear in the pose.
 
 The formulas are those of klippy/kinematics/generic_cartesian.py, kinematic_stepper.py and
 klippy/chelper/kin_generic.c.
@@ -6,8 +6,8 @@ klippy/chelper/kin_generic.c.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from pteron.errors import ModelError
 from pteron.export.printers.bed import tool_of
 from pteron.export.printers.sections import (
     INSTEAD,
-    PINS,
-    SPEEDS,
-    ConfigSection,
     reading_comment,
     rotation_distance,
     signed,
@@ -35,8 +32,8 @@ _LEAST_DETERMINANT = 1e-5
 axes."""
 
 
-def cartesian(robot: Manipulator) -> Iterator[ConfigSection]:
-    """Yield the sections of `generic_cartesian`: each stepper a sum of x, y and z.
+def cartesian(robot: Manipulator) -> dict[str, Any]:
+    """Return the values of `generic_cartesian`: each stepper a sum of x, y and z.
 
     Raises
     ------
@@ -55,7 +52,6 @@ def cartesian(robot: Manipulator) -> Iterator[ConfigSection]:
             f"{robot.name}: its directions are so close to a plane (det(J^T J) = {size:.1e}) that "
             f"Klipper, which asks for 1e-5, refuses them; {INSTEAD}"
         )
-    yield ConfigSection("printer", (("kinematics", "generic_cartesian"), *SPEEDS))
     box, comments = _box(robot, rows, offsets, tool)
     straight = ((np.abs(rows) > ZERO).sum(axis=1) == 1).all()
     homing = (
@@ -64,31 +60,24 @@ def cartesian(robot: Manipulator) -> Iterator[ConfigSection]:
         else "The sliders move along oblique directions, but Klipper homes x, y and z: an end stop "
         "at a slider is none of an axis. Home with [homing_override] and SET_KINEMATIC_POSITION."
     )
-    for axis, (least, most) in zip("xyz", box, strict=True):
-        yield ConfigSection(
-            f"carriage {axis}",
-            (
-                ("position_min", least),
-                ("position_max", most),
-                ("position_endstop", None),
-                ("endstop_pin", None),
-            ),
-            (homing, *comments) if axis == "x" else (),
+    steppers = []
+    for i, joint in enumerate(robot.joint_names):
+        place = f"Its position is {joint} in mm {signed(-offsets[i])} mm."
+        steppers.append(
+            {
+                "comments": (place, *reading_comment(robot, i, "rotation_distance")),
+                "name": joint,
+                "carriages": _sum(rows[i]),
+                "turn": rotation_distance(robot, i),
+            }
         )
-    for i, (leg, row, offset) in enumerate(zip(robot.legs, rows, offsets, strict=True), start=1):
-        joint = f"{leg.joint.coordinate}{i}"
-        yield ConfigSection(
-            f"stepper {joint}",
-            (
-                ("carriages", _sum(row)),
-                ("rotation_distance", rotation_distance(robot, i - 1)),
-                *PINS,
-            ),
-            (
-                f"Its position is {joint} in mm {signed(-offset)} mm.",
-                *reading_comment(robot, i - 1, "rotation_distance"),
-            ),
-        )
+    return {
+        "kinematics": "generic_cartesian",
+        "comments": (),
+        "box": (homing, *comments),
+        "carriages": dict(zip("xyz", box, strict=True)),
+        "steppers": steppers,
+    }
 
 
 def _sum(row: Array) -> str:

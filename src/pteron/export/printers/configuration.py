@@ -7,8 +7,8 @@ joints are linear in the pose, and Deltas as regular as its few numbers can desc
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from pteron.atomic import write_texts
 from pteron.equations.machine import Machine
@@ -19,7 +19,7 @@ from pteron.export.printers.cartesian import cartesian
 from pteron.export.printers.centers import Center
 from pteron.export.printers.delta import delta
 from pteron.export.printers.rotary_delta import rotary
-from pteron.export.printers.sections import INSTEAD, ConfigSection
+from pteron.export.printers.sections import INSTEAD
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
@@ -68,19 +68,18 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
             f"{robot.name}: Klipper moves x, y and z alone, and this machine's pose is {pose}; "
             f"{INSTEAD}"
         )
-    sections = tuple(_sections(robot))
-    prefix = prefix_of(robot)
     text = rendered(
         "pteron.export",
         "klipper.cfg.j2",
         banner=[line for line in banner(robot, "Klipper configuration") if "SI units" not in line],
-        sections=sections,
+        found=_values(robot),
         tool=any(robot.platform.tool),
     )
-    return write_texts(folder, {f"{prefix}.cfg": text})
+    return write_texts(folder, {f"{prefix_of(robot)}.cfg": text})
 
 
-def _sections(robot: Manipulator) -> Iterator[ConfigSection]:
+def _values(robot: Manipulator) -> dict[str, Any]:
+    """Return the values of the template of the kinematics that the machine has."""
     machine = Machine.of(robot)
     if all(leg.row_is_constant for leg in machine.legs):
         return cartesian(robot)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.bodies.vectors import Vector, vector
 from pteron.errors import DataError, ModelError, shown
 from pteron.legs import Drive, LegKind
@@ -100,8 +101,7 @@ def setting(config: configparser.RawConfigParser, section: str, key: str) -> flo
         value = float(text)
     except ValueError:
         raise DataError(f"[{section}] {key}: {shown(text)} given, a number expected") from None
-    if not math.isfinite(value):
-        raise DataError(f"[{section}] {key}: {shown(text)} given, a finite number expected")
+    expect(math.isfinite(value), f"[{section}] {key}", shown(text), "a finite number")
     return value
 
 

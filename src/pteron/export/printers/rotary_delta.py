@@ -1,10 +1,10 @@
-"""Configuration sections of Klipper's kinematics `rotary_delta`, see its rotary_delta.py."""
+"""Values of a configuration of Klipper's kinematics `rotary_delta`, see its rotary_delta.py."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from pteron.export.printers.bed import bed, told_bed
 from pteron.export.printers.centers import SAME, Center, common, degrees, end_stop
 from pteron.export.printers.sections import (
     INSTEAD,
-    PINS,
-    SPEEDS,
-    ConfigSection,
     differs,
     mm,
     number,
@@ -74,8 +71,8 @@ class _Arm(NamedTuple):
         return self.upper * math.sin(angle) - math.sqrt(self.lower**2 - across**2)
 
 
-def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSection]:
-    """Yield the sections of `rotary_delta`: arms that turn in vertical planes through z."""
+def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
+    """Return the values of `rotary_delta`: arms that turn in vertical planes through z."""
     arms = [_Arm.of(robot, center) for center in centers]
     radii = [float(np.hypot(*arm.shoulder[:2])) for arm in arms]
     radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
@@ -85,38 +82,32 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSect
     tops = [arm.top(radius) for arm in arms]
     highest = min((top for top in tops if top is not None), default=0.0)
     level, comments = _bed(robot, arms, radius, height, highest)
-    yield ConfigSection(
-        "printer",
-        (
-            ("kinematics", "rotary_delta"),
-            *SPEEDS,
-            ("shoulder_radius", mm(radius)),
-            ("shoulder_height", mm(height - level)),
-            ("minimum_z_position", None),
-        ),
-        (*comments, "For another bed change shoulder_height and the end stops."),
-    )
-    for k, (name, arm, top) in enumerate(zip("abc", arms, tops, strict=True)):
+    steppers = []
+    for k, (arm, top) in enumerate(zip(arms, tops, strict=True)):
         end = None if top is None else mm(height + top - level)
         joint = f"{'' if arm.lift > 0.0 else '-'}{robot.joint_names[k]}"
-        yield ConfigSection(
-            f"stepper_{name}",
-            (
-                ("angle", number(degrees(arm.shoulder))),
-                ("upper_arm_length", mm(arm.upper)),
-                ("lower_arm_length", mm(arm.lower)),
-                ("position_endstop", end),
-                ("gear_ratio", _gear(robot, k)),
-                ("endstop_pin", None),
-                *PINS,
-            ),
-            (
-                f"Its position is {joint} in rad {signed(arm.zero)} rad: 0 where the arm is level, "
-                "growing as it lifts.",
-                *end_stop(end, "arm"),
-                *reading_comment(robot, k, "gear_ratio"),
-            ),
+        place = (
+            f"Its position is {joint} in rad {signed(arm.zero)} rad: 0 where the arm is level, "
+            "growing as it lifts."
         )
+        reading = reading_comment(robot, k, "gear_ratio")
+        steppers.append(
+            {
+                "comments": (place, *end_stop(end, "arm"), *reading),
+                "angle": number(degrees(arm.shoulder)),
+                "upper": mm(arm.upper),
+                "lower": mm(arm.lower),
+                "end": end,
+                "gear": _gear(robot, k),
+            }
+        )
+    return {
+        "kinematics": "rotary_delta",
+        "comments": (*comments, "For another bed change shoulder_height and the end stops."),
+        "radius": mm(radius),
+        "height": mm(height - level),
+        "steppers": steppers,
+    }
 
 
 def _outside(robot: Manipulator, arms: Sequence[_Arm], height: float) -> None:

@@ -1,9 +1,8 @@
-"""Sections of a Klipper configuration: entries, number formats, comments and refusals."""
+"""What configurations of firmware share: number formats, comments and refusals."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from pteron.errors import ModelError
 from pteron.legs import Reading
@@ -11,27 +10,6 @@ from pteron.manipulator import Manipulator
 
 INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 """Advice at the end of error messages."""
-
-
-@dataclass(frozen=True)
-class ConfigSection:
-    """A section of the configuration: entries, with None for what only the builder knows."""
-
-    title: str
-    entries: tuple[tuple[str, str | None], ...]
-    comments: tuple[str, ...] = ()
-
-
-SPEEDS: tuple[tuple[str, None], ...] = (("max_velocity", None), ("max_accel", None))
-"""Settings of every printer."""
-
-PINS: tuple[tuple[str, None], ...] = (
-    ("step_pin", None),
-    ("dir_pin", None),
-    ("enable_pin", None),
-    ("microsteps", None),
-)
-"""Settings of every stepper."""
 
 
 def differs(robot: Manipulator, leg: int, told: str, taker: str) -> ModelError:

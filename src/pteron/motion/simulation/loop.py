@@ -13,7 +13,7 @@ from pteron.dynamics import drive_accelerations
 from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError
 from pteron.kernels import Array, Program
-from pteron.kernels.loops import loop, machine_numbers
+from pteron.kernels.loops import Loop, loop, machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion, told_pose
 from pteron.motion.simulation.exported import ExportedLaw
@@ -99,7 +99,7 @@ class Timing:
     def parts(self, period: float, samples: int) -> tuple[list[float], list[int]]:
         """Return what `pteron.kernels.loops.Loop.run` takes: times and counts, without the last."""
         (late, whole), (old, behind) = (
-            _divided(min(delay, period * samples), period)  # later than the end is never
+            divided(min(delay, period * samples), period)  # later than the end is never
             for delay in (self.delay, self.sensing)
         )
         look = period - old
@@ -112,7 +112,7 @@ class Timing:
         return [*lengths, period], [*counts, before, int(look > late), whole, behind]
 
 
-def _divided(delay: float, period: float) -> tuple[float, int]:
+def divided(delay: float, period: float) -> tuple[float, int]:
     """Return a delay's part of a sample, and its whole samples."""
     whole = int(delay / period + _WHOLE)
     part = max(delay - whole * period, 0.0)
@@ -143,7 +143,7 @@ def run(
         expect_sensed(robot, law.program)
     made = loop(robot, None if law is None else law.program, linked)
     memory = np.empty(0) if isinstance(source, np.ndarray) else source.memory(*start)
-    arrays = loop_arrays(robot, start, reference, law, sensors, counts)
+    arrays = loop_arrays(made, robot, start, reference, law, sensors, counts)
     arrays |= {"wrench": loads.wrench[None], **encoder_noise(sensors, robot, count)}
     if isinstance(source, np.ndarray):
         arrays["given"] = source[None]
@@ -174,14 +174,13 @@ def run(
             break
     done, fault = int(arrays["done"].item()), arrays["fault"].item()
     columns = {name: value[0, :done] for name, value in found.items()}
-    pose, velocity, *more = np.split(columns["states"], np.cumsum([m, m, n, n]), axis=1)
+    pose, velocity, *more = np.split(columns.pop("states"), np.cumsum([m, m, n, n]), axis=1)
+    columns |= {"pose": pose, "velocity": velocity, "memory": columns.pop("memories")}
+    columns["joint_rates"] = columns.pop("rates")
     bends = DriveKind.of(robot).elastic
-    motors, motor_rates = columns["joints"], columns["rates"]
-    if any(bends):
-        motors, motor_rates = (
-            np.where(bends, more[0], motors),
-            np.where(bends, more[1], motor_rates),
-        )
+    for k, name in enumerate(("joints", "joint_rates")):
+        motor = name.replace("joint", "motor")
+        columns[motor] = np.where(bends, more[k], columns[name]) if any(bends) else columns[name]
     why = None
     if fault == _ASKED:
         why = (
@@ -203,27 +202,22 @@ def run(
     stopped = None if why is None else f"at {min(clock, time[end - 1]):.4g} s: {why}"
     if timing.method == "dop853":
         columns["acceleration"] = _accelerations(loads, pose, velocity, columns["forces"])
+    shown = {name: values[:end] for name, values in columns.items()}
+    if ask is not None:
+        shown["memory"] = np.array(memories[1 : end + 1])
     return Simulation(
         robot,
         time[:end],
-        pose[:end],
-        velocity[:end],
-        columns["acceleration"][:end],
-        columns["joints"][:end],
-        columns["rates"][:end],
-        motors[:end],
-        motor_rates[:end],
-        columns["forces"][:end],
-        columns["asked"][:end],
-        Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),
-        loads.masses[:end],
-        np.array(memories[1 : end + 1]) if ask is not None else columns["memories"][:end],
-        min(timing.step, period) if timing.method == "rk4" else float("nan"),
-        stopped,
+        reference=Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),
+        payload=loads.masses[:end],
+        step=min(timing.step, period) if timing.method == "rk4" else float("nan"),
+        stopped=stopped,
+        **shown,
     )
 
 
 def loop_arrays(
+    made: Loop,
     robot: Manipulator,
     start: tuple[Array, Array],
     reference: Motion,
@@ -231,7 +225,7 @@ def loop_arrays(
     sensors: Sensors,
     counts: Sequence[int],
 ) -> dict[str, Array]:
-    """Return what `pteron.kernels.loops.Loop.run` takes of a machine under a law, or without.
+    """Return what a loop's `run` takes of a machine under a law, or without.
 
     `counts` are those of `Timing.parts`.
     """
@@ -239,17 +233,12 @@ def loop_arrays(
     parts = reference.pose, reference.velocity, reference.acceleration
     state = dict(zip(("pose", "velocity"), start, strict=True))
     state |= motor_states(robot, *start, reference.acceleration[0])
-    whole, behind = counts[-2:]
-    arrays = {
-        "state": np.concatenate(list(state.values())).reshape(1, 1, -1),
-        "side": np.zeros((1, 1, robot.joint_count)),
-        "memory": np.zeros((1, 1, 0)),
-        "queue": np.zeros((1, whole + 2, robot.joint_count)),
+    begun = np.concatenate(list(state.values())).reshape(1, 1, -1)
+    arrays = made.idle(robot, begun, *counts[-2:])
+    arrays |= {
         "most": limits_of(robot).force.reshape(1, 1, -1),
         "reference": np.hstack(parts)[None],
-        "given": np.zeros((1, 1, robot.joint_count)),
-        **{name: np.zeros((1, 1, 1)) for name in ("clock", "done", "fault")},
-        **encoder_arrays(sensors, robot, period, state, behind),
+        **encoder_arrays(sensors, robot, period, state),
     }
     if law is not None:
         arrays |= {**law.numbers, "memory": np.array(law.memory(*start)).reshape(1, 1, -1)}

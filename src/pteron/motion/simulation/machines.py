@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.equations.drives import Drives, drive_numbers
 from pteron.equations.machine import numbers
 from pteron.equations.variations import variations, varied_numbers
@@ -140,15 +141,12 @@ def machines_about(
     (3, (3, 31))
     """
     robot = as_manipulator(robot)
-    if not 1 <= count <= _MOST:
-        raise DataError(f"count: {count!r} given, a whole number from 1 to {_MOST} expected")
+    expect(1 <= count <= _MOST, "count", repr(count), f"a whole number from 1 to {_MOST}")
     shares = {"masses": masses, "friction": friction, "rotors": rotors}
     for name, share in shares.items():
-        if not 0.0 <= share < 1.0:
-            raise DataError(f"{name}: {share!r} given, a share from 0 to below 1 expected")
+        expect(0.0 <= share < 1.0, name, repr(share), "a share from 0 to below 1")
     for name, most_off in (("lengths", lengths), ("directions", directions)):
-        if not 0.0 <= most_off < np.inf:
-            raise DataError(f"{name}: {most_off!r} given, 0 or more expected")
+        expect(0.0 <= most_off < np.inf, name, repr(most_off), "0 or more")
     least, most = as_array(payload, "payload", (2,))
     if not 0.0 <= least <= most < np.inf:
         raise DataError(f"payload: {payload!r} given, least and most expected, 0 kg or more")

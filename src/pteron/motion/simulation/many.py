@@ -14,7 +14,7 @@ from pteron.controllers import Controller, Custom
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kernels.loop_code import STATE
-from pteron.kernels.loops import Loop, loop, machine_numbers
+from pteron.kernels.loops import Loop, loop
 from pteron.kernels.samples import Evaluated
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import RobotLike, as_manipulator
@@ -163,11 +163,8 @@ def simulate_many(
     law = controller.law(robot if model is None else as_manipulator(model))
     expect_sensed(robot, law.program)
     made = loop(robot, law.program, general=machines.geometry is not None)
-    alone = loop_arrays(
-        robot, (reference.pose[0], reference.velocity[0]), reference, law, sensors, counts
-    )
-    alone |= machine_numbers(robot, made.plant, "plant")
-    alone["wrench"] = np.zeros((1, 1, len(robot.column_names["wrench"])))
+    begun = reference.pose[0], reference.velocity[0]
+    alone = loop_arrays(made, robot, begun, reference, law, sensors, counts)
     folder = None if out is None else _empty(out)
     size, files = max(8, _ROWS // count // 8 * 8), list[Path]()
     found: dict[str, list[Array]] = {name: [] for name in ("done", "fault", "rms", "most", "force")}

@@ -10,13 +10,14 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.dynamics import inverse_dynamics, mass_matrix
 from pteron.equations.drives import drives_of
 from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError, PteronError, shown
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.kernel import broadcast_lead
-from pteron.kernels.loops import loop, machine_numbers
+from pteron.kernels.loops import loop
 from pteron.kinematics import inverse_kinematics, jacobian, joint_rates
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.simulation.machines import Machines
@@ -104,8 +105,7 @@ def advance(
     """
     robot = as_manipulator(robot)
     span = as_array([step, count], "step, count", (2,))
-    if not np.isfinite(span[0]):
-        raise DataError(f"step: {shown(step)} given, a time in s expected")
+    expect(np.isfinite(span[0]), "step", shown(step), "a time in s")
     if not span[1] >= 0.0 or span[1] % 1.0:
         raise DataError(f"count: {shown(count)} given, a whole number of 0 or more expected")
     ones = {"pose": pose, "velocity": velocity, "forces": forces}
@@ -125,29 +125,16 @@ def advance(
         for name, part in parts.items()
     }
     general = machines is not None and machines.geometry is not None
-    made, n, kind = loop(robot, general=general), robot.joint_count, DriveKind.of(robot)
-    count_drives, encoders = n * len(kind.more), n * (2 if kind.bends else 1)
+    made = loop(robot, general=general)
+    count_drives = robot.joint_count * len(made.kind.more)
     if drives is None:
         drives = drive_states(robot, whole["pose"], whole["velocity"]).reshape(*lead, count_drives)
     begun = as_array(drives, "drives", (count_drives,))
     begun = np.broadcast_to(begun, (*lead, count_drives)).reshape(batch, 1, count_drives)
-    arrays = {
-        "state": np.concatenate([whole["pose"], whole["velocity"], begun], axis=-1),
-        "side": np.zeros((batch, 1, n)),
-        "memory": np.zeros((batch, 1, 0)),
-        "encoders": np.zeros((batch, 1, 4 * encoders)),
-        "queue": np.zeros((batch, 2, n)),
-        "told": np.zeros((batch, 1, 2 * encoders)),
-        **{name: np.zeros((batch, 1, 1)) for name in ("clock", "done", "fault")},
-        "given": np.ascontiguousarray(whole["forces"]),
-        "wrench": np.ascontiguousarray(whole.get("wrench", np.zeros((1, 1, sizes["wrench"])))),
-        "most": np.full((1, 1, n), np.inf),
-        **dict.fromkeys(("steps", "noises", "round", "noise"), np.zeros((1, 1, encoders))),
-        "at_motor": np.zeros((1, 1, 2 * n)),
-        "share": np.ones((1, 1, 1)),
-        **machine_numbers(robot, made.plant, "plant"),
-    }
-    arrays["seen"] = arrays["state"].copy()
+    state = np.concatenate([whole["pose"], whole["velocity"], begun], axis=-1)
+    arrays = made.idle(robot, state) | {"given": np.ascontiguousarray(whole["forces"])}
+    if wrench is not None:
+        arrays["wrench"] = np.ascontiguousarray(whole["wrench"])
     if machines is not None:
         if len(machines) != batch or machines.robot != robot:
             raise DataError(

@@ -67,12 +67,12 @@ class Sensors:
 
 
 def encoder_arrays(
-    sensors: Sensors, robot: Manipulator, period: float, state: Mapping[str, Array], behind: int
+    sensors: Sensors, robot: Manipulator, period: float, state: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return what a control loop takes of encoders that begin in a state: numbers and memory.
 
-    Readings are so many samples `behind`. The angle of a crank that may go all the way round jumps
-    by a turn: its readings go on by the shorter way.
+    The angle of a crank that may go all the way round jumps by a turn: its readings go on by the
+    shorter way.
     """
     pose, velocity = state["pose"], state["velocity"]
     joints = inverse_kinematics(robot, pose)
@@ -93,7 +93,6 @@ def encoder_arrays(
     at = [encoder_of(leg.drive) for leg in robot.legs]
     found = {
         "encoders": encoder_memory(joints, rates, steps, period),
-        "seen": np.concatenate(list(state.values())),
         "steps": steps,
         "noises": noises,
         "round": round_,
@@ -102,8 +101,7 @@ def encoder_arrays(
             [*(float(e == "motor") for e in at), *(float(e in ("motor", "both")) for e in at)]
         ),
     }
-    told = np.zeros((1, behind + 1, 2 * len(joints)))
-    return {name: value.reshape(1, 1, -1) for name, value in found.items()} | {"told": told}
+    return {name: value.reshape(1, 1, -1) for name, value in found.items()}
 
 
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:

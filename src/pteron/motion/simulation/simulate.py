@@ -8,6 +8,7 @@ from typing import Protocol, get_args, runtime_checkable
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
@@ -158,8 +159,7 @@ def simulate(
     period = period if controller is None else controller.period
     check_positive(period=period, step=step, tolerance=tolerance)
     check_delay(delay)
-    if method not in get_args(Method):
-        raise DataError(f'method: {method!r} given, "rk4" or "dop853" expected')
+    expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
 
     if method == "dop853" and not DriveKind.of(robot).plain:
         raise DataError(
@@ -224,8 +224,7 @@ def _expect_controller(controller: object) -> None:
 
 def check_delay(delay: float) -> None:
     """Refuse what is no delay."""
-    if not _is_number(delay) or delay < 0.0:
-        raise DataError(f"delay: {shown(delay)} given, 0 s or more expected")
+    expect(_is_number(delay) and delay >= 0.0, "delay", shown(delay), "0 s or more")
 
 
 def _is_number(value: object) -> bool:
@@ -235,14 +234,12 @@ def _is_number(value: object) -> bool:
 def check_positive(**positive: float) -> None:
     """Refuse what is no number above 0."""
     for name, value in positive.items():
-        if not _is_number(value) or value <= 0.0:
-            raise DataError(f"{name}: {shown(value)} given, a number above 0 expected")
+        expect(_is_number(value) and value > 0.0, name, shown(value), "a number above 0")
 
 
 def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array, Array]:
     """Return a pose and a velocity, (m,) each."""
-    if len(start) != len(_STATE):
-        raise DataError(f"start: {len(start)} parts given, a pose and a velocity expected")
+    expect(len(start) == len(_STATE), "start", f"{len(start)} parts", "a pose and a velocity")
     pose, velocity = (checked_one(robot, v, name) for v, name in zip(start, _STATE, strict=True))
     return pose, velocity
 
@@ -308,10 +305,8 @@ def _of_time(
 
     def numbers(value: PoseLike, told: str) -> Array:
         found = as_array(by_name(value, columns, told), told, (size,))
-        if found.ndim != 1:
-            raise DataError(f"{told}: shape {found.shape} given, ({size},) expected")
-        if not np.isfinite(found).all():
-            raise DataError(f"{told}: {shown(found.tolist())} given, finite numbers expected")
+        expect(found.ndim == 1, told, f"shape {found.shape}", f"({size},)")
+        expect(np.isfinite(found).all(), told, shown(found.tolist()), "finite numbers")
         return found
 
     if callable(given):

@@ -45,7 +45,7 @@ class DriveMargin(NamedTuple):
 def drive_margins(robot: Manipulator, needed: Mapping[str, PerJoint]) -> tuple[DriveMargin, ...]:
     """Return the margins of the limits that the file has, leg by leg.
 
-    `needed` has what a cycle takes of each joint (n,), by quantity.
+    `needed` has what a cycle takes of each joint (n,), by quantity: of some or of all.
     """
     found = []
     for i, leg in enumerate(robot.legs):
@@ -58,6 +58,6 @@ def drive_margins(robot: Manipulator, needed: Mapping[str, PerJoint]) -> tuple[D
         found += [
             DriveMargin(i + 1, key, quantity, most, float(needed[quantity][i]), unit)
             for key, quantity, most, unit in limits
-            if most is not None
+            if most is not None and quantity in needed
         ]
     return tuple(found)

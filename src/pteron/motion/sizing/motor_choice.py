@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.errors import DataError
+from pteron.arguments import expect
 from pteron.motion.sizing.drive_loads import Sizing, best_ratio
 from pteron.motion.sizing.gearing import Span, peak_span, rated_span, speed_span, torques
 from pteron.motion.sizing.motors import Motor
@@ -109,8 +109,7 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
     >>> fit.fits, round(fit.ratio), round(fit.rated_margin, 1)
     (True, 295, 2.1)
     """
-    if not 1.0 <= margin < math.inf:
-        raise DataError(f"margin: {margin} given, a number of 1 or more expected")
+    expect(1.0 <= margin < math.inf, "margin", margin, "a number of 1 or more")
     found = []
     for leg in range(1, sizing.robot.joint_count + 1):
         fits = [_fit(sizing, leg, motor, margin) for motor in motors]

@@ -16,7 +16,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.arguments import checked_arguments
+from pteron.arguments import checked_arguments, expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -275,8 +275,7 @@ def _inside(region: Region, poses: Array) -> NDArray[np.bool_]:
 
 def checked(robot: Manipulator, places: Sequence[Place]) -> tuple[Place, ...]:
     """Return places, after refusing none, and those that have not the machine's coordinates."""
-    if not places:
-        raise DataError("places: none given, at least one expected")
+    expect(places, "places", "none", "at least one")
     for i, place in enumerate(places):
         if len(place.pose) != robot.freedom:
             raise DataError(

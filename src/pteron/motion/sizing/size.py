@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, told_pose
@@ -102,8 +103,7 @@ def size(
         )
     for one, rest in zip(motions, rests, strict=True):
         _check(robot, one, float(rest))
-    if not (np.isfinite(friction) and friction >= 0.0):
-        raise DataError(f"friction: {friction} given, a share of 0 or more expected")
+    expect(np.isfinite(friction) and friction >= 0.0, "friction", friction, "a share of 0 or more")
     load = None if wrench is None else np.asarray(wrench, dtype=float)
     if load is not None and load.shape != (robot.freedom,):
         raise DataError(
@@ -171,8 +171,7 @@ def _check(robot: Manipulator, motion: Motion, dwell: float) -> None:
                 f"row for each time, and {' '.join(robot.coordinates)} of {robot.name}"
             )
     motion.expect_ascending()
-    if not (np.isfinite(dwell) and dwell >= 0.0):
-        raise DataError(f"dwell: {dwell} given, 0 s or more expected")
+    expect(np.isfinite(dwell) and dwell >= 0.0, "dwell", dwell, "0 s or more")
     speeds = np.abs(motion.velocity)
     if dwell and (speeds[-1] > _AT_REST * speeds.max()).any():
         raise DataError(

@@ -9,15 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
-from pteron.equations.kinematics import passive_joints
-from pteron.equations.machine import Machine, closure_of
+from pteron.equations.machine import closure_of
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.architecture import expect_regular
+from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, told_pose
 from pteron.motion.trajectories.minima import first_below, least_along
@@ -126,13 +125,13 @@ class _Curve(NamedTuple):
     poses: Callable[[Array], Array]
     place: Callable[[float], str]
 
-    def pose(self, at: float) -> Array:
-        """Return the pose (m,) there."""
-        return np.asarray(self.poses(np.array([at]))[0])
+    def value(self, what: str, at: Array, output: int = 0) -> Array:
+        """Return an output of a function of the pose at parameters (K,)."""
+        return np.asarray(numeric(self.robot, what)(self.poses(at))[output])
 
     def told(self, at: float) -> str:
         """Return where that is, and the pose."""
-        return f"{self.place(at)}, pose {told_pose(self.pose(at))}"
+        return f"{self.place(at)}, pose {told_pose(self.poses(np.array([at]))[0])}"
 
 
 class _Failure(NamedTuple):
@@ -143,19 +142,16 @@ class _Failure(NamedTuple):
 
 
 def _failed_reach(curve: _Curve, marks: Array) -> _Failure | None:
-    robot = curve.robot
-
     def squares(at: Array) -> Array:
-        found = numeric(robot, "squared_type_i")(curve.poses(at))[0]
-        return np.asarray(np.nan_to_num(found, nan=-1.0))
+        return np.nan_to_num(curve.value("squared_type_i", at), nan=-1.0)
 
     found = first_below(squares, marks, TYPE_I**2)
     if found is None:
         return None
     at, i, square = found
     fine = np.linspace(marks[0], marks[-1], _SAMPLES)
-    missed = -float(np.nanmin(numeric(robot, "reach")(curve.poses(fine))[0][:, i]))
-    leg = robot.legs[i]
+    missed = -float(np.nanmin(curve.value("reach", fine)[:, i]))
+    leg = curve.robot.legs[i]
     error: PteronError
     if missed <= _ROUNDING:
         error = SingularPose(
@@ -182,16 +178,14 @@ def _failed_reach(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _failed_limit(curve: _Curve, marks: Array) -> _Failure | None:
-    robot = curve.robot
-
     def margin(at: Array) -> Array:
-        return joint_distances(robot, numeric(robot, "joint_coordinates")(curve.poses(at))[0])
+        return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
     found = first_below(margin, marks, -_ROUNDING)
     if found is None:
         return None
     at, i, _ = found
-    leg = robot.legs[i]
+    leg = curve.robot.legs[i]
     assert leg.limits is not None
     beyond = -float(least_along(margin, marks, -_ROUNDING)[1][i])
     unit, (low, high) = leg.joint.unit, leg.limits
@@ -202,29 +196,24 @@ def _failed_limit(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _failed_passive(curve: _Curve, marks: Array) -> _Failure | None:
-    robot = curve.robot
-
     def margin(at: Array) -> Array:
-        return np.asarray(numeric(robot, "passive_room")(curve.poses(at))[1])
+        return curve.value("passive_room", at, 1)
 
     found = first_below(margin, marks, -_ROUNDING)
     if found is None:
         return None
     at, i, _ = found
     places, least = least_along(margin, marks, -_ROUNDING)
-    shared, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(curve.pose(float(places[i])))))
-    for joint in (*shared, *legs[i]):
-        value = float(joint.value)
-        if joint.least <= value <= joint.most:
-            continue
-        low = "at most " if joint.only_most else f"{joint.least:g} to "
-        whose = "" if joint in shared else f"leg {i + 1}: its "
-        told = f"{whose}{joint.noun} comes to {value:.4g} {joint.unit}"
-        told += f", its limits are {low}{joint.most:g}"
-        return _beyond(curve, at, 0 if joint in shared else i + 1, told, -float(least[i]))
-    return _beyond(
-        curve, at, i + 1, f"leg {i + 1} passes a passive joint's limits", -float(least[i])
-    )
+    worst = curve.poses(places[i : i + 1])[0]
+    leg, told = i + 1, f"leg {i + 1} passes a passive joint's limits"
+    for joint in limited_joints(curve.robot, worst):
+        own = not joint.actuated and joint.leg in (0, i + 1)
+        if own and not joint.least <= joint.value <= joint.most:
+            leg, whose = joint.leg, f"leg {i + 1}: its " if joint.leg else ""
+            told = f"{whose}{joint.noun} comes to {joint.value:.4g} {joint.unit}, its limits are "
+            told += joint.limits_text("{:g}".format)
+            break
+    return _beyond(curve, at, leg, told, -float(least[i]))
 
 
 def _beyond(curve: _Curve, at: float, leg: int, told: str, metres: float) -> _Failure:
@@ -233,16 +222,11 @@ def _beyond(curve: _Curve, at: float, leg: int, told: str, metres: float) -> _Fa
 
 
 def _failed_type_ii(curve: _Curve, marks: Array) -> _Failure | None:
-    robot = curve.robot
-    if closure_of(robot).vanishes() is False and not robot.platform.angles:
+    if closure_of(curve.robot).vanishes() is False and not curve.robot.platform.angles:
         return None
-
-    def measure(at: Array) -> Array:
-        return np.asarray(numeric(robot, "type_ii")(curve.poses(at))[0])
-
     # Its sign is that of the beginning, as far as the actuators hold the platform.
-    side = 1.0 if float(measure(marks[:1])[0]) > 0.0 else -1.0
-    found = first_below(lambda at: side * measure(at)[:, None], marks, TYPE_II)
+    side = 1.0 if float(curve.value("type_ii", marks[:1])[0]) > 0.0 else -1.0
+    found = first_below(lambda at: side * curve.value("type_ii", at)[:, None], marks, TYPE_II)
     if found is None:
         return None
     at = found[0]
@@ -250,7 +234,7 @@ def _failed_type_ii(curve: _Curve, marks: Array) -> _Failure | None:
         f"{curve.told(at)}: comes to a singularity (type II), where the actuators no longer hold "
         "the platform; take another path, or go round it",
         kind="II",
-        measure=float(np.abs(measure(np.array([at])))[0]),
+        measure=float(np.abs(curve.value("type_ii", np.array([at])))[0]),
         index=(),
     )
     return _Failure(at, error)

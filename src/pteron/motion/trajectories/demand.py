@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pteron.equations.drives import drives_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import told_pose
@@ -123,10 +124,11 @@ def _reversals(
     known = rates(at)
     k, joints = np.nonzero(known[1:] * known[:-1] < 0.0)
     ahead, low, high = known[k, joints] > 0.0, at[k], at[k + 1]
-    for _ in range(_HALVINGS if len(k) else 0):
-        middle = 0.5 * (low + high)
-        before = (rates(middle)[np.arange(len(k)), joints] > 0.0) == ahead
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    if len(k):
+        each = np.arange(len(k))
+        low, _ = bisected(
+            lambda places: (rates(places)[each, joints] > 0.0) == ahead, low, high, _HALVINGS
+        )
     rest, still = np.nonzero((known[1:-1] == 0.0) & (known[2:] * known[:-2] < 0.0))
     return np.concatenate([low, at[rest + 1]]), np.concatenate([joints, still])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.arguments import checked_arguments
+from pteron.arguments import checked_arguments, number_or_nan
 from pteron.errors import DataError, shown
 from pteron.kernels import Array
 from pteron.legs import Drive
@@ -120,10 +120,7 @@ def per_joint(
 
 
 def _positive(name: str, value: object) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        number = math.nan
+    number = number_or_nan(value)
     if not number > 0.0:
         given = value if isinstance(value, float) else shown(value)
         raise DataError(f"{name}: {given} given, a number above 0 expected")

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
 
 _VALLEYS = 3
 """Number of a measure's lowest local minima that are refined."""
@@ -63,8 +64,5 @@ def first_below(
     i = int(below[k].argmax())
     low, high = all_marks[max(k - 1, 0)], all_marks[k]
     if k:
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            inside = float(measure(np.array([middle]))[0, i]) >= least
-            low, high = (middle, high) if inside else (low, middle)
+        _, high = bisected(lambda at: measure(at[None])[0, i] >= least, low, high, _HALVINGS)
     return float(high), i, float(measure(np.array([high]))[0, i])

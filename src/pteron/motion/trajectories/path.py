@@ -14,6 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
@@ -151,8 +152,7 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
         raise DataError(
             f"poses: shape {given.shape} given, (K, {robot.freedom}) expected, K at least 2"
         )
-    if not (np.isfinite(corner) and corner >= 0.0):
-        raise DataError(f"corner: {corner} given, 0 m or more expected")
+    expect(np.isfinite(corner) and corner >= 0.0, "corner", corner, "0 m or more")
     places, _, _ = tool_motion(robot.platform, given, np.zeros_like(given), np.zeros_like(given))
     directions = np.diff(places, axis=0)
     sizes = np.linalg.norm(directions * path_weights(robot.platform), axis=-1)

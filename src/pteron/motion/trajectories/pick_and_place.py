@@ -8,7 +8,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
-from pteron.arguments import expect_to_fit
+from pteron.arguments import expect, expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
@@ -117,8 +117,7 @@ def pick_and_place(
     for name, value in {"scale": scale, "duration": duration, "peak": peak}.items():
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise DataError(f"{name}: {value} given, a number above 0 expected")
-    if samples < 2:
-        raise DataError(f"samples: {samples} given, at least 2 expected")
+    expect(samples >= 2, "samples", samples, "at least 2")
     expect_to_fit("samples", samples, 10.0 * samples * robot.freedom)
     middle = home_pose(robot) if around is None else checked_one(robot, around, "around")
     if scale is None:

@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 import scipy  # type: ignore[import-untyped]
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import follow
@@ -118,8 +119,7 @@ def _read(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
     """Return times (T,), from 0, and columns (T, K)."""
     values = rows.numbers([TIME, *columns])
     time = values[:, 0]
-    if len(time) < 2:
-        raise DataError(f"{rows.source}: one row given, at least two expected")
+    expect(len(time) >= 2, rows.source, "one row", "at least two")
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if len(back):
         k = int(back[0]) + 1

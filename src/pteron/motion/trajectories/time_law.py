@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -238,6 +239,5 @@ def sampled(states: Callable[[Array], Curve], duration: float, step: float = STE
 
 
 def _expect_time(name: str, value: float) -> float:
-    if not (np.isfinite(value) and value > 0.0):
-        raise DataError(f"{name}: {value} given, a time above 0 s expected")
+    expect(np.isfinite(value) and value > 0.0, name, value, "a time above 0 s")
     return value

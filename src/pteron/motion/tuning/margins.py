@@ -105,6 +105,16 @@ class Margins:
         perron = np.abs(np.linalg.eigvals(np.abs(middle))).max(axis=-1)
         return self._stable and float(1.0 / np.minimum(greatest, perron).max())
 
+    @property
+    def least(self) -> dict[str, float]:
+        """The least of each kind, of single drives and of all at once: factors, rad and s."""
+        return {
+            "gain": float(min(self.gain.min(), self.common_gain)),
+            "phase": float(self.phase.min()),
+            "delay": float(min(self.delay.min(), self.common_delay)),
+            "disk": self.disk,
+        }
+
     @cached_property
     def slowest(self) -> float:
         """The rate at which the slowest pole decays, 1/s; negative where it grows."""

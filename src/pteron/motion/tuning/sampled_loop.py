@@ -9,11 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from pteron.kernels import Array
+from pteron.motion.simulation.loop import divided
 from pteron.motion.tuning.linear_law import LinearLaw
 from pteron.motion.tuning.linear_plant import LinearPlant
-
-_WHOLE = 1e-9
-"""Part of a sample by which a delay of whole samples may miss them, from rounding."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +49,7 @@ class SampledLoop:
         asked for that still wait; u are forces asked for, `more` is a delay, s, beyond the loop's.
         """
         period, law, n = self.period, self.law, self.plant.inputs.shape[1]
-        delay = self.delay + more
-        whole = int(delay / period + _WHOLE)
-        late = max(delay - whole * period, 0.0)
+        late, whole = divided(self.delay + more, period)
         moved, after = self.plant.held(period - late)
         early, before = self.plant.held(late)
         free, before = moved @ early, moved @ before

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect
 from pteron.controllers import Controller
 from pteron.errors import DataError, PteronError
 from pteron.kernels import Array
@@ -193,8 +194,7 @@ def bends(robot: Manipulator) -> bool:
 
 def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
     """Return the machine with all its transmissions so much stiffer."""
-    if not 0.0 < factor < np.inf:
-        raise DataError(f"stiffnesses: {factor:g} given, factors above 0 expected")
+    expect(0.0 < factor < np.inf, "stiffnesses", f"{factor:g}", "factors above 0")
 
     def changed(drive: Drive | None) -> Drive | None:
         if drive is None or drive.elastic is None:

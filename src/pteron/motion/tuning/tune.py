@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.controllers import Controller, FeedForwardPD
 from pteron.controllers.feedback import Feedback
 from pteron.controllers.joint_masses import light_poses
@@ -57,15 +58,13 @@ class Required:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 1.0 < self.gain < np.inf:
-            raise DataError(f"gain margin: {shown(self.gain)} given, a factor above 1 expected")
+        expect(1.0 < self.gain < np.inf, "gain margin", shown(self.gain), "a factor above 1")
         if not 0.0 < self.phase < np.pi / 2.0:
             raise DataError(
                 f"phase margin: {shown(self.phase)} rad given, {np.degrees(self.phase):.4g} "
                 "degrees; more than 0 and less than 90 degrees expected"
             )
-        if not 0.0 <= self.delay < np.inf:
-            raise DataError(f"delay margin: {shown(self.delay)} given, 0 s or more expected")
+        expect(0.0 <= self.delay < np.inf, "delay margin", shown(self.delay), "0 s or more")
 
     def share(self, found: Margins) -> float:
         """Return the least of margin over required margin; a loop serves from 1 on."""
@@ -118,13 +117,8 @@ class Tuning:
     @property
     def least(self) -> dict[str, float]:
         """The least margins of all states: factors, rad, s and the disk margin."""
-        found = self.margins
-        return {
-            "gain": min(float(min(one.gain.min(), one.common_gain)) for one in found),
-            "phase": min(float(one.phase.min()) for one in found),
-            "delay": min(float(min(one.delay.min(), one.common_delay)) for one in found),
-            "disk": min(one.disk for one in found),
-        }
+        each = [one.least for one in self.margins]
+        return {name: min(least[name] for least in each) for name in each[0]}
 
     def gains(self) -> dict[str, list[float]]:
         """Return proportional and derivative gains of each joint, or what else the law has."""
@@ -212,8 +206,7 @@ def tune(
     True
     """
     robot, controller = as_manipulator(robot), controller or FeedForwardPD()
-    if not 0.0 <= delay < np.inf:
-        raise DataError(f"delay: {shown(delay)} given, 0 s or more expected")
+    expect(0.0 <= delay < np.inf, "delay", shown(delay), "0 s or more")
     if payload:
         robot = with_payload(robot, payload)
     required, sensors = required or Required(), sensors or Sensors()
@@ -235,9 +228,9 @@ def tune(
     return Tuning(robot, chosen, required, states, moments, loops, found)
 
 
-def _share(sensors: Sensors | None, period: float) -> float | None:
+def _share(sensors: Sensors, period: float) -> float | None:
     """Return what a difference counts in a rate; None where rates are exact."""
-    if sensors is None or not np.any(sensors.encoder):
+    if not np.any(sensors.encoder):
         return None
     if sensors.cutoff is None:
         return 1.0
@@ -346,16 +339,13 @@ class _Search:
             high = low
 
     def _told(self, controller: Controller, i: int) -> str:
-        found, asked = Margins(self.loop(controller, i)), self.required
-        gain, delay = (
-            min(found.gain.min(), found.common_gain),
-            min(found.delay.min(), found.common_delay),
-        )
+        least, asked = Margins(self.loop(controller, i)).least, self.required
         wanted = f", {1e3 * asked.delay:.3g} ms" if asked.delay else ""
         rate = controller.bandwidth
         with_ = f"with {np.max(rate):.4g} rad/s" if rate is not None else "with these gains"
         return (
             f"{with_}, at pose {told_pose(self.states[i][0])} the margins are a gain of "
-            f"{gain:.3g}, {np.degrees(found.phase.min()):.3g} degrees and {1e3 * delay:.3g} ms; "
+            f"{least['gain']:.3g}, {np.degrees(least['phase']):.3g} degrees and "
+            f"{1e3 * least['delay']:.3g} ms; "
             f"{asked.gain:.3g}, {np.degrees(asked.phase):.3g} degrees{wanted} asked for"
         )

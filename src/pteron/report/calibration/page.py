@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
-from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from pteron.calibration import Calibration
 from pteron.errors import ModelError, PteronError
@@ -16,7 +16,6 @@ from pteron.plots import (
     differences_figure,
     measure_figure,
     row_residuals_figure,
-    svg,
     tool_errors_figure,
 )
 from pteron.plots.canvas import nice_step
@@ -39,11 +38,11 @@ _FINE = 1e-4
 
 
 class ErrorMap(NamedTuple):
-    """The tool's error on a slice, before and after, as SVG, with its greatest value as text."""
+    """The tool's error on a slice, before and after, with its greatest value as text."""
 
-    plane: str
-    before: Markup
-    after: Markup
+    plane: tuple[str, ...]
+    before: Figure
+    after: Figure
     greatest: list[str]
     units: list[str]
 
@@ -80,7 +79,7 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
     """
     robot, home = result.drawn, home_pose(result.drawn)
     lengths = set(robot.platform.lengths)
-    kind, what = ("position", "tool") if lengths else ("angle", "angles")
+    kind = "position" if lengths else "angle"
     planes = slice_planes(robot)
     level = [plane for plane in planes if set(plane) <= lengths]
     found = []
@@ -94,15 +93,13 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
                 continue
             drawn, units = [], []
             most = [float(error[reached].max()) for error in errors]
-            for error, greatest, when in zip(errors, most, ("before", "after"), strict=True):
+            for error, greatest in zip(errors, most, strict=True):
                 factor, unit = _unit(greatest, kind)
                 values = np.where(reached, factor * error, np.nan).reshape(cut.status.shape)
-                figure = measure_figure(cut, values, levels=levels(values))
-                title = f"The error of the {what} {when} in the {'-'.join(plane)} plane, {unit}"
-                drawn.append(svg(figure, name=f"{when}{''.join(plane)}", title=title))
+                drawn.append(measure_figure(cut, values, levels=levels(values)))
                 units.append(unit)
             told = [scaled(value, kind) for value in most]
-            found.append(ErrorMap("-".join(plane), drawn[0], drawn[1], told, units))
+            found.append(ErrorMap(tuple(plane), drawn[0], drawn[1], told, units))
     return found
 
 
@@ -117,24 +114,16 @@ def levels(values: Array) -> list[float]:
 def _figures(result: Calibration) -> dict[str, Any]:
     fit, robot = result.fit, result.drawn
     kinds = [*["position"] * 3, *["angle"] * int(robot.platform.angular.sum())]
-    residuals = row_residuals_figure(
-        fit.residuals, [*kinds, "height", "distance"], fit.measured, fit.kept, result.noise
-    )
-    made: dict[str, Any] = {
-        "residuals": svg(residuals, name="residuals", title="Residuals by row"),
-        "machine": None,
-        "arrows": None,
-    }
+    rows = [*kinds, "height", "distance"]
+    residuals = row_residuals_figure(fit.residuals, rows, fit.measured, fit.kept, result.noise)
+    made: dict[str, Any] = {"residuals": residuals, "machine": None, "arrows": None}
     with suppress(PteronError):  # the found machine does not reach the drawn one's home
-        figure = differences_figure(robot, result.robot)
-        made["machine"] = svg(figure, name="machine", title="The machine drawn and found")
+        made["machine"] = differences_figure(robot, result.robot)
     if robot.platform.lengths:
         poses = random_poses(robot, _ARROWS, seed=0)
         errors, _ = result.errors(poses)
         if np.abs(errors).max(initial=0.0, where=np.isfinite(errors)) > 0.0:
             place, axes = robot.platform.at(poses)
             tools = place + robot.platform.tool @ axes
-            figure = tool_errors_figure(robot, tools, errors)
-            title = "The tool's errors as drawn, enlarged"
-            made["arrows"] = svg(figure, name="arrows", title=title)
+            made["arrows"] = tool_errors_figure(robot, tools, errors)
     return made

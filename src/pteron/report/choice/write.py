@@ -12,7 +12,7 @@ from pteron.design.choosing.candidate import Candidate
 from pteron.design.choosing.job import OBJECTIVES
 from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
 from pteron.json_values import json_text
-from pteron.plots import fronts_figure, svg
+from pteron.plots import fronts_figure
 from pteron.report.typeset import template
 
 
@@ -66,8 +66,7 @@ def page(choice: Choice) -> str:
         first, second = list(serving[0].front[0])[:2]
         fronts = {one.kind: np.array([list(p.values())[:2] for p in one.front]) for one in serving}
         units = [OBJECTIVES[first], OBJECTIVES[second]]
-        drawn = fronts_figure(fronts, [first, second], units)
-        figure = svg(drawn, name="fronts", title="The best designs of each kind")
+        figure = fronts_figure(fronts, [first, second], units)
     return template("choice/page.html.j2").render(
         choice=choice,
         serving=serving,

@@ -20,7 +20,6 @@ from pteron.plots import (
     histogram_figure,
     residual_speed_figure,
     residual_time_figure,
-    svg,
 )
 from pteron.report.identification.contents import Contents, PageRecording, contents
 from pteron.report.quantities import force, nouns
@@ -53,7 +52,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
 
 
 def figures(found: Contents) -> dict[str, Any]:
-    """Return the pictures as SVG; those of residuals are None where an estimator keeps none."""
+    """Return the pictures; those of residuals are None where an estimator keeps none."""
     rows = found.parameters
     joints = [leg.joint for leg in found.result.robot.legs]
     names = [row.name for row in rows]
@@ -66,25 +65,12 @@ def figures(found: Contents) -> dict[str, Any]:
         "fitted": _panels(found.fitted[0], "fitted", joints, speed=not found.drawn),
         "histogram": None,
         "autocorrelation": None,
-        "certainty": svg(
-            certainty_figure(names, ratios, weak, found.result.model.base.rank),
-            name="certainty",
-            title="Size of each value over its standard deviation",
-        ),
-        "correlation": svg(
-            correlation_figure(names, found.result.estimate.correlation),
-            name="correlation",
-            title="Correlations of the identified values",
-            widest=np.inf,  # it scrolls
-        ),
+        "certainty": certainty_figure(names, ratios, weak, found.result.model.base.rank),
+        "correlation": correlation_figure(names, found.result.estimate.correlation),
     }
     if np.isfinite(found.residuals).any():
-        figure = histogram_figure(found.residuals)
-        title = "Distribution of the residuals against the normal one"
-        made["histogram"] = svg(figure, name="histogram", title=title)
-        figure = autocorrelation_figure(found.correlations, found.bound)
-        title = "Autocorrelation of the residuals"
-        made["autocorrelation"] = svg(figure, name="autocorrelation", title=title)
+        made["histogram"] = histogram_figure(found.residuals)
+        made["autocorrelation"] = autocorrelation_figure(found.correlations, found.bound)
     return made
 
 
@@ -98,24 +84,17 @@ def _panels(
     forces, over_speed = [], []
     for i in range(p.measured.shape[1]):
         given, predicted, rigid = (one[:, i] for one in series)
-        used = p.used[part, i]
         look: Any = {"leg": i, "joint": joints[i]}
-        figure = comparison_figure(p.time[part], given, predicted, rigid, used, **look)
-        title = f"Measured and predicted force of actuator {i + 1} in {shown.name}"
-        forces.append(svg(figure, name=f"{name}forces{i + 1}", title=title))
+        used = p.used[part, i]
+        forces.append(comparison_figure(p.time[part], given, predicted, rigid, used, **look))
         if speed:
             over = p.speed[:, i], rest[:, i], p.used[:, i]
-            figure = residual_speed_figure(*over, **look)
-            title = f"Residual of actuator {i + 1} over its joint's speed in {shown.name}"
-            over_speed.append(svg(figure, name=f"{name}speed{i + 1}", title=title))
-    errors = errors_figure(p.nrms, p.nrms_without_friction, p.floor)
-    time = residual_time_figure(p.time, rest, p.used, joints)
-    title = f"Errors of the prediction of {shown.name}"
-    over_time = f"Residuals of all actuators over time in {shown.name}"
+            over_speed.append(residual_speed_figure(*over, **look))
     return {
         "shown": shown,
+        "name": name,
         "forces": forces,
         "speed": over_speed,
-        "errors": svg(errors, name=f"{name}errors", title=title),
-        "time": svg(time, name=f"{name}time", title=over_time),
+        "errors": errors_figure(p.nrms, p.nrms_without_friction, p.floor),
+        "time": residual_time_figure(p.time, rest, p.used, joints),
     }

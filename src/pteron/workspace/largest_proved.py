@@ -1,0 +1,40 @@
+"""The largest region of a family that is proved to lie in the workspace.
+
+Its size is found by samples of its poses, and then made smaller until a proof holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from pteron.kernels import Array
+from pteron.kernels.bisection import bisected
+from pteron.manipulator import Manipulator
+from pteron.workspace.conditions import Condition, keeps
+from pteron.workspace.proofs import Proof, prove
+from pteron.workspace.regions import Region
+
+
+def largest_proved(
+    robot: Manipulator,
+    given: tuple[Condition, ...],
+    region: Callable[[float], Region],
+    poses: Callable[[float], Array],
+    most: float,
+    halvings: int,
+    shares: Iterable[float],
+) -> tuple[float, Proof]:
+    """Return the size of the largest region that is proved to keep conditions, and its proof.
+
+    `region` and `poses` return the region of a size and poses (K, m) of it. The size is sought up
+    to `most` by bisection, and the proof with these shares of it, the largest first. The proof does
+    not hold where none does.
+    """
+    size = float(
+        bisected(lambda size: keeps(robot, given, poses(size)).all(), 0.0, most, halvings)[0]
+    )
+    for share in shares:
+        proof = prove(robot, region(share * size), given=given)
+        if proof.holds:
+            break
+    return share * size, proof
