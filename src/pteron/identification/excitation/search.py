@@ -251,18 +251,16 @@ class _Search:
         weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
         with closing(improved(tasks, workers)) as stages:
             for one in stages:
-                share[one.number] = 1.0 if one.ended else one.stage / (plan.stages + 1)
-                self.take(one, starts[one.number])
+                share[one.number] = 1.0 if one.ended else one.done / (plan.stages + 1)
+                start = starts[one.number]
+                start.finished = start.finished or (one.finished and plan.thorough)
+                if one.found is not None:
+                    start.best = min(start.best, self.judged(one.found), key=self.cost)
                 self.report(seen + weight * sum(share) / len(share))
 
     def report(self, share: float) -> None:
         self.seen = share
         self.progress(share)
-
-    def take(self, one: Improvement, start: _Started) -> None:
-        start.finished = start.finished or (one.finished and one.plan.thorough)
-        if one.improved:
-            start.best = min(start.best, self.judged(one.safe), key=self.cost)
 
     def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:
         random = min(self.drawn, key=self.cost)
