@@ -18,9 +18,6 @@ from pteron.manipulator import Manipulator, parameter_data, parameter_names, par
 from pteron.reduction import BaseParameters
 from pteron.reduction.sharing import share
 
-_ROUNDING = 1e-12
-"""Share of an inertia that counts as rounding."""
-
 _SMALL_PLATFORM = 0.25
 """Size of a platform whose points are all at P, as a share of a link's, for its scale."""
 
@@ -60,9 +57,9 @@ class Bodies:
 
     @cached_property
     def moments(self) -> tuple[Array, ...]:
-        """What takes each body's matrix out of the columns, (d, d, k); a real one has no negative.
+        """The matrix of each body as a function of the columns, linear: (d, d, k).
 
-        The matrix of a body is `_moments`: it is positive semidefinite where the body is real.
+        It is positive semidefinite where the body is real; see `_moments`.
         """
         unit = np.eye(len(self.columns))
         return tuple(
@@ -91,9 +88,9 @@ class Bodies:
 def _moments(values: Mapping[str, Any]) -> list[list[Any]]:
     """Return the matrix of a body, linear in its values by kind.
 
-    Of a body that turns about any axis they are its second moments (4, 4); of one that turns in a
-    plane [[I, 0, hx], [0, I, hy], [hx, hy, m]], whose least eigenvalue is that of
-    [[m, |h|], [|h|, I]]; of one that does not turn its mass.
+    A body that turns about any axis has its second moments (4, 4); one that turns in a plane
+    [[I, 0, hx], [0, I, hy], [hx, hy, m]], whose least eigenvalue is that of [[m, |h|], [|h|, I]];
+    one that does not turn has its mass.
     """
     if "Izz" in values:
         return SpatialInertia.second_moments(values)
@@ -169,27 +166,19 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
     >>> values = pteron.parameters(robot)
     >>> values[0] = -0.1
     >>> real_bodies(robot, values)
-    ('p1: mass -0.1 kg is not positive',)
+    ('p1: mass: -0.1 kg is not positive; give a value above 0 kg',)
     """
     vector = parameters(robot) if values is None else parameters_of(robot, values, "parameters")
-    lines = []
-    for name, place in body_places(parameter_data(robot)).items():
-        body = {kind: float(vector[column]) for kind, column in place.items()}
-        m, inertia = body["m"], body.get("I")
-        if m > 0.0 and "Izz" in body:
-            try:
-                SpatialInertia.of_values(list(body.values()))
-            except ModelError as error:
-                lines.append(f"{name}: {error}")
-        if m <= 0.0:
-            lines.append(f"{name}: mass {m:.4g} kg is not positive")
-        elif inertia is not None:
-            least = (body.get("mgx", 0.0) ** 2 + body.get("mgy", 0.0) ** 2) / m
-            if inertia <= 0.0 or inertia < least * (1.0 - _ROUNDING):
-                lines.append(
-                    f"{name}: inertia {inertia:.4g} kg m^2 is {least - inertia:.2g} below "
-                    f"{least:.4g}, the least with its mass and centre of mass"
-                )
+    data, lines = parameter_data(robot), []
+    for name, place in body_places(data).items():
+        columns = list(place.values())
+        first = data[columns[0]]
+        legs, platform = robot.legs, robot.platform
+        kind = legs[first.legs[0] - 1].bodies[first.body] if first.legs else platform.joined
+        try:
+            kind.of_values(vector[columns].tolist())
+        except ModelError as error:
+            lines.append(f"{name}: {error}")
     return tuple(lines)
 
 
