@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import combinations, product
 
@@ -27,7 +28,7 @@ from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cen
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model, identification_model
 from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
-from pteron.identification.plausibility import left_over
+from pteron.identification.plausibility import left_over, unseen
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.manipulator import Manipulator
@@ -208,27 +209,30 @@ def estimated(
     return total(observations, column_errors(model, logs[0], preprocessing[0]))
 
 
-def with_findings(error: PteronError, whole: Sequence[Recording]) -> PteronError:
-    """Return an error with the logs' findings behind it, which may explain it."""
-    findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
-    findings += [finding.message for one in whole for finding in one.findings]
-    if findings:
-        error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
-    return error
+@contextmanager
+def findings_told(whole: Sequence[Recording]) -> Iterator[None]:
+    """Put the findings of logs behind an error that is raised within, which they may explain."""
+    try:
+        yield
+    except PteronError as error:
+        findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
+        findings += [finding.message for one in whole for finding in one.findings]
+        if findings:
+            error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
+        raise
 
 
-def too_little_motion(
-    model: Model,
-    hidden: tuple[str, ...],
-    estimate: Estimate,
-    preprocessing: Sequence[Preprocessing],
-    first: Recording,
-) -> LogError:
-    """Return the error for a motion that leaves most base parameters unseen."""
+def check_motion(
+    model: Model, estimate: Estimate, preprocessing: Sequence[Preprocessing], first: Recording
+) -> tuple[str, ...]:
+    """Return the base parameters that a motion leaves unseen; refuse one that leaves most so."""
+    hidden, too_many = unseen(model, estimate.deviations)
+    if not too_many:
+        return hidden
     rank = model.base.rank
     names = ", ".join(hidden) if len(hidden) < rank else "all"
     cause = left_over(estimate, preprocessing)
-    return LogError(
+    raise LogError(
         "too little motion",
         first.source,
         f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
