@@ -84,11 +84,10 @@ class FourierMotion:
         n = self.robot.freedom
         for name in ("center", "cosines", "sines"):
             object.__setattr__(self, name, as_array(getattr(self, name), name, (n,)).copy())
-        if self.center.shape != (n,) or self.cosines.ndim != 2:
-            raise DataError(f"center, cosines: shapes ({n},) and (H, {n}) expected")
-        if self.cosines.shape != self.sines.shape or not len(self.cosines):
+        shapes, h = (self.center.shape, self.cosines.shape, self.sines.shape), len(self.cosines)
+        if shapes != ((n,), (h, n), (h, n)) or not h:
             raise DataError(
-                f"cosines, sines: shapes {self.cosines.shape} and {self.sines.shape} given, the "
+                f"center, cosines, sines: shapes {shapes} given, ({n},) and twice (H, {n}) of the "
                 "same number of harmonics expected, at least one"
             )
         if self.mode < 0:
