@@ -24,17 +24,13 @@ from pteron.kinematics.unlikely_values import unlikely_length, unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings
 from pteron.tables import Dialect, Table, listed, open_table, whole_table
+from pteron.tables.units import FACTORS
 from pteron.toml import told
 
 Array = NDArray[np.float64]
 
 _POSITION = ("x", "y", "z")
 _NAMED = ("mark", "plane", "anchor")
-_UNITS = {
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "°": np.pi / 180.0},
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-}
 _WITH_UNIT = re.compile(r"(.*?)[ _]*[\[(]([^\])]*)[\])]|(.*)_(mm|cm|um|deg|mrad|ms)")
 """A column's name with its unit: "x (mm)", "x [mm]", "x_mm"."""
 
@@ -128,9 +124,9 @@ def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _O
         if name not in units:
             unread.append(column)
             continue
-        factor = _UNITS.get(units[name], {}).get(unit.strip("[]() ") or units[name])
+        factor = FACTORS.get(units[name], {}).get(unit.strip("[]() ") or units[name])
         if factor is None and units[name]:
-            valid = ", ".join(_UNITS[units[name]])
+            valid = ", ".join(FACTORS[units[name]])
             faults.append(f"column {shown(column, bare=True)}: its unit is none of {valid}")
         elif name in columns:
             faults.append(f"two columns are {name}: {listed([columns[name][0], column])}")
