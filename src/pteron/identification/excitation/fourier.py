@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect_one_of
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
 from pteron.identification.signals.states import FullMotion, home_mode
@@ -72,8 +73,7 @@ class FourierMotion:
     mode: int = -1
 
     def __post_init__(self) -> None:
-        if self.space not in get_args(Space):
-            raise DataError(f'space: {self.space!r} is neither "platform" nor "joints"')
+        expect_one_of(get_args(Space), space=self.space)
         if self.space == "joints" and not closure_of(self.robot).closed_form:
             raise DataError(
                 'space: "joints" given, but direct kinematics of '

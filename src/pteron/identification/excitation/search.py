@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
+from pteron.arguments import expect_one_of
 from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import (
     Conditioning,
@@ -276,8 +277,7 @@ class _Search:
 
 
 def _check(criterion: str, starts: int, draws: int, seconds: float) -> None:
-    if criterion not in get_args(Criterion):
-        raise DataError(f'criterion: {criterion!r} is neither "condition" nor "logdet"')
+    expect_one_of(get_args(Criterion), criterion=criterion)
     for name, value in (("starts", starts), ("draws", draws)):
         if value < 1:
             raise DataError(f"{name}: {value} given, 1 or more expected")
