@@ -40,6 +40,9 @@ _EXPLAINED = 0.2
 """Error of a fit, over the forces, below which joints in another order count as the right ones
 where those of the log have no pose."""
 
+NO_COLUMN = "no payload column; declare one that is 0 without payload and 1 with it"
+"""The fault of a log that does not tell when a payload is carried."""
+
 _LOOK = 12_000
 """Rows, at most, in which other orders of joints are tried."""
 
@@ -73,19 +76,16 @@ def check_recordings(
                 f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
                 f"description, or find them with identify_drive_gains{other}",
             )
-    for one, again in combinations(whole, 2):
+    twice = "the same samples as {}; give them once"
+    held = (
+        "is held out, but the same samples are fitted; hold out another motion, or nothing: then "
+        "the end of each log is"
+    )
+    pairs = [(*pair, twice.format(pair[0].source)) for pair in combinations(whole, 2)]
+    pairs += [(*pair, held) for pair in product(whole, others)]
+    for one, again, said in pairs:
         if same(one, again):
-            raise LogError(
-                "twice", again.source, f"the same samples as {one.source}; give them once"
-            )
-    for one, again in product(whole, others):
-        if same(one, again):
-            raise LogError(
-                "twice",
-                again.source,
-                "is held out, but the same samples are fitted; hold out another motion, or "
-                "nothing: then the end of each log is",
-            )
+            raise LogError("twice", again.source, said)
     for log in (one.log for one in whole):
         period = wanted.period
         if isinstance(log, Log) and period and log.duration < period * (1.0 - 1e-3):
@@ -101,20 +101,14 @@ def check_payload(fit: Sequence[Recording]) -> None:
     """Refuse recordings that do not tell when a payload is carried, or carry several."""
     heads = [one.head() for one in fit]
     masses = {head.payload_mass: head.source for head in heads if head.payload_mass is not None}
+    said = ""
     if len(masses) > 1:
         several = ", ".join(f"{mass:g} kg in {source}" for mass, source in masses.items())
-        raise LogError(
-            "no payload",
-            fit[0].source,
-            f"several payloads, {several}; identify one at a time, each with the log without it",
-        )
-    if all(head.payload is None for head in heads):
-        raise LogError(
-            "no payload",
-            fit[0].source,
-            "no payload column; declare one that is 0 without payload and 1 with it, or identify "
-            "without the payload",
-        )
+        said = f"several payloads, {several}; identify one at a time, each with the log without it"
+    elif all(head.payload is None for head in heads):
+        said = f"{NO_COLUMN}, or identify without the payload"
+    if said:
+        raise LogError("no payload", fit[0].source, said)
 
 
 def preprocessing_for(

@@ -17,6 +17,7 @@ from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.faults import FaultIsolation, isolate_faults
 from pteron.identification.fitting import (
+    NO_COLUMN,
     balanced,
     check_columns,
     check_motion,
@@ -361,7 +362,7 @@ def _check_phases(log: Log) -> None:
     phases = [] if log.payload is None else np.unique(log.payload).tolist()
     if len(phases) > 1:
         return
-    said = "no payload column; declare one that is 0 without payload and 1 with it"
+    said = NO_COLUMN
     if phases:
         which = "one without payload" if phases[0] else "one where a payload is carried"
         said = f"its payload column has phase {phases[0]} only, 0 and 1 are expected; add {which}"

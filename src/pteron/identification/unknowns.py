@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.extended_model import extended
-from pteron.identification.model import Model
+from pteron.identification.model import Model, diagonal
 from pteron.identification.observation import LinearModel, Observations, scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
@@ -185,19 +185,15 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         weighed = plain.matrix / noise[:, None]
         basis = np.linalg.qr(scaled(weighed.reshape(-1, p))[0])[0]
         forces = (plain.forces / noise).ravel()
-        own = np.zeros((*plain.forces.shape, n, _COLUMNS))
-        for i in range(n):
-            own[:, i, i] = rows.matrix[:, i, p:] / noise[i]
-        own = own.reshape(len(forces), -1)
+        each = rows.matrix[..., p:] / noise[:, None]
+        own = np.einsum("ric,ij->rijc", each, np.eye(n)).reshape(len(forces), -1)
         inner = basis.T @ own
         gram = (own.T @ own - inner.T @ inner).reshape(n, _COLUMNS, n, _COLUMNS)
         image = (own.T @ forces - inner.T @ (basis.T @ forces)).reshape(n, _COLUMNS)
         chosen = _coordinatewise(spline, gram, image)
         speeds = np.where(chosen >= 0, usual * tried[np.maximum(chosen, 0)], np.inf)
-        seen = np.flatnonzero(chosen >= 0)
-        extra = np.zeros((*plain.forces.shape, len(seen)))
-        for k, i in enumerate(seen.tolist()):
-            extra[:, i, k] = rows.matrix[:, i, p:] @ spline[chosen[i]]
+        falls = np.einsum("ric,ic->ri", rows.matrix[..., p:], spline[chosen])
+        extra = diagonal(falls)[..., chosen >= 0]
         whole = plain.with_matrix(np.concatenate([plain.matrix, extra], axis=-1))
         noise = actuator_noise(whole, weighted(whole).values)
     return speeds
