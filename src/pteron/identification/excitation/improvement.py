@@ -90,9 +90,9 @@ class Improvement:
                 yield Stage(self.number, stage, None, ended=True, finished=False)
                 return
             begin, sharp = time.monotonic(), len(plan.doublings) - 1
+            doublings = plan.doublings[min(stage, sharp)]
             coefficients = minimised(
-                *(setting, current.coefficients, plan.doublings[min(stage, sharp)]),
-                *(watched, instants, left),
+                setting, current.coefficients, doublings, watched, instants, left
             )
             kept, good = None, False
             current = safe
