@@ -262,8 +262,9 @@ def test_every_family_names_its_columns():
     model = identification_model(robot)
     values = np.ones(len(model.names))
     columns = FaultColumns(model, values, np.ones(4), 0.0, 1.0, families_of(robot))
-    assert len(columns.names) == len(columns.units) == len(columns.kinds)
-    assert columns.places[-1].stop == len(columns.names)
+    whole = columns.whole
+    assert len(whole.names) == len(whole.units) == len(whole.kinds)
+    assert columns.places[-1].stop == len(whole.names)
 
 
 def test_a_log_too_short_for_fault_isolation_is_not_refused():

@@ -149,18 +149,16 @@ def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurem
     chosen = np.arange(len(other))
     old = before.slopes.rows(start, other, poses, chosen)
     new = before.slopes.rows(fit.guess, other, moved, chosen)
-    errors: dict[str, dict[str, float]] = {"before": {}, "after": {}, "expected": {}}
     spread = np.einsum("nkp,pq,nkq->nk", new.slopes, fit.covariance, new.slopes, optimize=True)
-    for kind, noise in fit.noise.items():
-        here = new.measured & (other.kind_of == kind) & np.isfinite(spread)
-        if here.any():
-            for name, squares in (
-                ("before", old.residuals**2),
-                ("after", new.residuals**2),
-                ("expected", spread + noise**2),
-            ):
-                errors[name][kind] = float(np.sqrt(squares[here].mean()))
-    return HeldOut(int(new.measured.any(axis=1).sum()), **errors)
+    noise = np.array([fit.noise[kind] for kind in other.kind_of])
+    seen = new.measured & np.isfinite(spread)
+    kinds = {kind: seen & (other.kind_of == kind) for kind in fit.noise}
+
+    def rms(squares: Array) -> dict[str, float]:
+        return {k: float(np.sqrt(squares[here].mean())) for k, here in kinds.items() if here.any()}
+
+    each = map(rms, (old.residuals**2, new.residuals**2, spread + noise**2))
+    return HeldOut(int(new.measured.any(axis=1).sum()), *each)
 
 
 def _scaled_slopes(fitter: Fitter, fit: Fit) -> Array:

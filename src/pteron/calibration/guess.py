@@ -117,10 +117,10 @@ class Block:
     kind: str
     """"geometry", "zeros", "scales", "mark", "plane", "anchor" or "frame"."""
     name: str
-    where: slice
     unknowns: tuple[Unknown, ...]
     changes: tuple[Variation, ...] = ()
     legs: tuple[int, ...] = ()
+    where: slice = field(default_factory=lambda: slice(0))
 
     def move(self, guess: Guess, step: Array) -> Guess:
         """Return a guess whose unknowns of this block are moved by a step."""
@@ -153,6 +153,16 @@ class Block:
         if self.kind == "frame":
             return np.concatenate([guess.shift, np.zeros(3)])
         return np.array([change.value(guess.robot) for change in self.changes])
+
+
+def numbered(blocks: Iterable[Block], start: int = 0) -> tuple[Block, ...]:
+    """Return blocks with places one after the other, from `start` on."""
+    found = []
+    for block in blocks:
+        stop = start + len(block.unknowns)
+        found.append(replace(block, where=slice(start, stop)))
+        start = stop
+    return tuple(found)
 
 
 def tolerances_of(blocks: Sequence[Block]) -> Array:

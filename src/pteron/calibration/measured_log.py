@@ -24,17 +24,13 @@ from pteron.kinematics.unlikely_values import unlikely_length, unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings
 from pteron.tables import Dialect, Table, listed, open_table, whole_table
+from pteron.tables.units import FACTORS
 from pteron.toml import told
 
 Array = NDArray[np.float64]
 
 _POSITION = ("x", "y", "z")
 _NAMED = ("mark", "plane", "anchor")
-_UNITS = {
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "°": np.pi / 180.0},
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-}
 _WITH_UNIT = re.compile(r"(.*?)[ _]*[\[(]([^\])]*)[\])]|(.*)_(mm|cm|um|deg|mrad|ms)")
 """A column's name with its unit: "x (mm)", "x [mm]", "x_mm"."""
 
@@ -128,9 +124,9 @@ def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _O
         if name not in units:
             unread.append(column)
             continue
-        factor = _UNITS.get(units[name], {}).get(unit.strip("[]() ") or units[name])
+        factor = FACTORS.get(units[name], {}).get(unit.strip("[]() ") or units[name])
         if factor is None and units[name]:
-            valid = ", ".join(_UNITS[units[name]])
+            valid = ", ".join(FACTORS[units[name]])
             faults.append(f"column {shown(column, bare=True)}: its unit is none of {valid}")
         elif name in columns:
             faults.append(f"two columns are {name}: {listed([columns[name][0], column])}")
@@ -176,55 +172,40 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
         cells = table.frame[columns[name][0]].cast(pl.String).fill_null(TOOL)
         return tuple(cells.str.strip_chars().to_list())
 
-    readings = np.stack([column(name) for name in robot.joint_names], axis=-1)
+    def several(names: Sequence[str]) -> Array:
+        return np.stack([column(name) for name in names], axis=-1) if names else np.empty((n, 0))
+
+    def fault(row: np.integer[Any], text: str) -> None:
+        faults.append(f"{table.place(int(row))}{text}".removeprefix(f"{table.source}: "))
+
+    readings = several(robot.joint_names)
     for i, j in np.argwhere(np.isnan(readings)):
         name = columns[robot.joint_names[j]][0]
-        faults.append(f"{table.place(int(i))}, column {name}: no number; a row needs every reading")
+        fault(i, f", column {name}: no number; a row needs every reading")
     times = column("t") if "t" in columns else None
     for i in () if times is None else np.flatnonzero(np.isnan(times)):
-        faults.append(
-            f"{table.place(int(i))}, column t: no number; give each row its time, or none"
-        )
-    positions = np.stack([column(name) for name in _POSITION], axis=-1)
-    angles = [column(name) for name in robot.platform.angles]
-    heights = column("height")
+        fault(i, ", column t: no number; give each row its time, or none")
+    values = several(_POSITION), several(robot.platform.angles), column("height")
     distances, given, anchors = column("distance"), column("from"), texts("anchor")
     origins = np.full(n, -1)
     for i in np.flatnonzero(~np.isnan(given)):
         row = given[i]
         if row != int(row) or not 1 <= row <= n or row == i + 1:
-            faults.append(
-                f"{table.place(int(i))}, column from: {row:g} given, another row from 1 to {n} "
-                "expected"
-            )
+            fault(i, f", column from: {row:g} given, another row from 1 to {n} expected")
         else:
             origins[i] = int(row) - 1
     apart = ~np.isnan(distances)
     starts = (~np.isnan(given)).astype(int) + [bool(name) for name in anchors]
     for i in np.flatnonzero(apart & (starts != 1)):
         both = "both" if starts[i] else "neither"
-        faults.append(
-            f"{table.place(int(i))}: a distance with {both} from and anchor; give one, the row or "
-            "the point that it is measured from"
-        )
+        which = "give one, the row or the point that it is measured from"
+        fault(i, f": a distance with {both} from and anchor; {which}")
     for i in np.flatnonzero(~apart & (starts > 0)):
-        faults.append(f"{table.place(int(i))}: from or anchor, but no distance; give all, or none")
-    faults = list(dict.fromkeys(fault.removeprefix(f"{table.source}: ") for fault in faults))
+        fault(i, ": from or anchor, but no distance; give all, or none")
     if faults:
-        raise DataError(told(faults), subject=table.source)
-    return Measurements(
-        readings=readings,
-        positions=positions,
-        angles=np.stack(angles, axis=-1) if angles else np.empty((n, 0)),
-        heights=heights,
-        distances=distances,
-        origins=origins,
-        marks=texts("mark"),
-        planes=texts("plane"),
-        anchors=anchors,
-        places=_places(table, source),
-        times=times,
-    )
+        raise DataError(told(list(dict.fromkeys(faults))), subject=table.source)
+    names = texts("mark"), texts("plane"), anchors, _places(table, source)
+    return Measurements(readings, *values, distances, origins, *names, times)
 
 
 def _numbers(table: Table, column: str, faults: list[str]) -> Array:
@@ -233,7 +214,7 @@ def _numbers(table: Table, column: str, faults: list[str]) -> Array:
         return np.asarray(table.numbers([column], "nan")[:, 0])
     except DataError as error:
         if len(table) == 1:
-            faults.append(str(error))
+            faults.append(str(error).removeprefix(f"{table.source}: "))
             return np.zeros(1)
     half, first, line_of = len(table) // 2, table.first_row, table.line_of
     later = line_of and (lambda i: line_of(half + i))

@@ -9,9 +9,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, permutations, product
+from itertools import combinations
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess, tolerances_of
@@ -120,7 +121,8 @@ def _marks(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurement
 def _frames(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
     """Yield quarter turns of the instrument, and the measurements turned back."""
     if given.setup.frame_known and not np.isnan(given.positions).any():
-        for turn in _quarter_turns():
+        cube = scipy.spatial.transform.Rotation.create_group("O")
+        for turn in np.round(cube[cube.magnitude() > 0.1].as_matrix()):
             # Rows of `turn` say where the instrument's x, y and z point.
             told = ", ".join(
                 f"{'xyz'[k]} along {'-' if row.sum() < 0 else ''}{'xyz'[int(np.abs(row).argmax())]}"
@@ -148,12 +150,3 @@ def _legs(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements
 
 _MISTAKES = (_units, _marks, _frames, _legs)
 """Likely mistakes, those that are quick to try first."""
-
-
-def _quarter_turns() -> Iterator[Array]:
-    for order in permutations(range(3)):
-        for signs in product((1.0, -1.0), repeat=3):
-            turn = np.zeros((3, 3))
-            turn[range(3), order] = signs
-            if np.linalg.det(turn) > 0.0 and not np.array_equal(turn, np.eye(3)):
-                yield turn

@@ -14,7 +14,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
-from pteron.calibration.guess import Block, Guess, Unknown
+from pteron.calibration.guess import Block, Guess, Unknown, numbered
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.result import Finding
 
@@ -218,15 +218,11 @@ def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
         yield Finding("wrong model", text, float(squares[:, first].sum()))
 
 
-def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> list[Block]:
+def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> tuple[Block, ...]:
     """Return blocks behind others: every joint's zero, each mark, and the instrument's frame."""
-    kinds = [("zeros", "", tuple(range(joints)))]
-    kinds += [("mark", name, ()) for name in sorted(set(given.marks))]
-    kinds += [] if any(block.kind == "frame" for block in blocks) else [("frame", "", ())]
-    start, found = blocks[-1].where.stop, []
-    for kind, name, legs in kinds:
-        size = {"zeros": joints, "mark": 3, "frame": 6}[kind]
-        unknowns = (Unknown("", kind, "", np.inf),) * size
-        found.append(Block(kind, name, slice(start, start + size), unknowns, (), legs))
-        start += size
-    return found
+    one = Unknown("", "", "", np.inf)
+    more = [Block("zeros", "", (one,) * joints, legs=tuple(range(joints)))]
+    more += [Block("mark", name, (one,) * 3) for name in sorted(set(given.marks))]
+    if not any(block.kind == "frame" for block in blocks):
+        more.append(Block("frame", "", (one,) * 6))
+    return numbered(more, blocks[-1].where.stop)

@@ -288,16 +288,9 @@ class MachineSlopes:
 
 def _solved(matrix: Array, right: Array) -> Array:
     """Return matrix^-1 right of a stack; NaN where a matrix is singular."""
-    try:
-        return np.asarray(np.linalg.solve(matrix, right))
-    except np.linalg.LinAlgError:
-        found = np.full(np.broadcast_shapes(right.shape), np.nan)
-        for i in range(len(matrix)):
-            try:
-                found[i] = np.linalg.solve(matrix[i], right[i])
-            except np.linalg.LinAlgError:
-                continue
-        return found
+    with np.errstate(invalid="ignore"):  # of poses that are lost
+        singular = np.linalg.det(matrix) == 0.0
+    return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrix), right))
 
 
 def _skew(v: Array) -> Array:

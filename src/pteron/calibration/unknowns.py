@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import get_args
 
-from pteron.calibration.guess import Block, Unknown
+from pteron.calibration.guess import Block, Unknown, numbered
 from pteron.calibration.measurements import TOOL, Measurements
-from pteron.equations.variations import AXIAL, Group, Variation, axial_variations, variations
+from pteron.equations.variations import AXIAL, Group, axial_variations, variations
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator
 
@@ -71,9 +71,9 @@ def blocks_of(
 
     varying = (*variations(robot), *axial_variations(robot))
     geometry = [unknown(v.name, v.group, v.unit) for v in varying]
-    numbered = list(enumerate((leg.joint for leg in robot.legs), start=1))
-    zeros = [unknown(f"zeros[{i}]", "zeros", joint.unit) for i, joint in numbered]
-    scales = [unknown(f"scales[{i}]", "scales", "") for i, _ in numbered]
+    joints = list(enumerate((leg.joint for leg in robot.legs), start=1))
+    zeros = [unknown(f"zeros[{i}]", "zeros", joint.unit) for i, joint in joints]
+    scales = [unknown(f"scales[{i}]", "scales", "") for i, _ in joints]
     names = {u.name for u in (*geometry, *zeros, *scales)}
     known = {*GROUPS, *AXIAL, *names, "zeros, rad"}
     wrong = [name for name in (*asked, *given) if name not in known]
@@ -85,25 +85,20 @@ def blocks_of(
     for name, value in given.items():
         if not value > 0.0:
             raise DataError(f"prior: {name} = {value:g}: a standard deviation above 0 expected")
-    found: list[tuple[str, str, list[Unknown], tuple[Variation, ...], tuple[int, ...]]] = []
+    found: list[Block] = []
     if at := chosen(geometry):
-        changes = tuple(varying[i] for i in at)
-        found.append(("geometry", "", [geometry[i] for i in at], changes, ()))
+        own = tuple(geometry[i] for i in at)
+        found.append(Block("geometry", "", own, changes=tuple(varying[i] for i in at)))
     for kind, unknowns in (("zeros", zeros), ("scales", scales)):
         if at := chosen(unknowns):
-            found.append((kind, "", [unknowns[i] for i in at], (), at))
+            found.append(Block(kind, "", tuple(unknowns[i] for i in at), legs=at))
     if "tool" in asked and TOOL in measured.marks:
         tolerance = float(given.get("tool", TOLERANCES["tool"]))
-        found.append(("mark", TOOL, _three("tool", tolerance, "tool"), (), ()))
-    found += [(*part, (), ()) for part in _surroundings(measured)]
-    blocks, start = [], 0
-    for kind, name, unknowns, changes, legs in found:
-        stop = start + len(unknowns)
-        blocks.append(Block(kind, name, slice(start, stop), tuple(unknowns), changes, legs))
-        start = stop
-    if not blocks:
+        found.append(Block("mark", TOOL, _three("tool", tolerance, "tool")))
+    found += _surroundings(measured)
+    if not found:
         raise DataError("free: nothing is free; name a group")
-    return tuple(blocks)
+    return numbered(found)
 
 
 def _default(measured: Measurements) -> list[str]:
@@ -111,24 +106,25 @@ def _default(measured: Measurements) -> list[str]:
     return [group for group in GROUPS if group != "tool" or placed]
 
 
-def _three(name: str, tolerance: float = _WIDE, group: str = "setup") -> list[Unknown]:
-    return [Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz"]
+def _three(name: str, tolerance: float = _WIDE, group: str = "setup") -> tuple[Unknown, ...]:
+    return tuple(Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz")
 
 
-def _surroundings(measured: Measurements) -> Iterator[tuple[str, str, list[Unknown]]]:
+def _surroundings(measured: Measurements) -> Iterator[Block]:
     """Yield the blocks of what measurements refer to and nobody knows."""
     setup = measured.setup
     for name, mark in setup.marks.items():
         if not mark.known and name in measured.marks:
-            yield "mark", name, _three(f"marks.{name}")
+            yield Block("mark", name, _three(f"marks.{name}"))
     for name, plane in setup.planes.items():
         if not plane.known and name in measured.planes:
             told = f"planes.{name or 'plane'}"
             tilts = [Unknown(f"{told}.tilt {k}", "setup", "rad", _WIDE) for k in (1, 2)]
-            yield "plane", name, [*tilts, Unknown(f"{told}.offset", "setup", "m", _WIDE)]
+            offset = Unknown(f"{told}.offset", "setup", "m", _WIDE)
+            yield Block("plane", name, (*tilts, offset))
     for name, anchor in setup.anchors.items():
         if not anchor.known and name in measured.anchors:
-            yield "anchor", name, _three(f"anchors.{name}")
+            yield Block("anchor", name, _three(f"anchors.{name}"))
     if not setup.frame_known:
         turns = [Unknown(f"instrument about {a}", "setup", "rad", _WIDE) for a in "xyz"]
-        yield "frame", "", [*_three("instrument"), *turns]
+        yield Block("frame", "", (*_three("instrument"), *turns))

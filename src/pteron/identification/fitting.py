@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import combinations, product
 
@@ -27,7 +28,7 @@ from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cen
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model, identification_model
 from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
-from pteron.identification.plausibility import left_over
+from pteron.identification.plausibility import left_over, unseen
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.manipulator import Manipulator
@@ -38,6 +39,9 @@ METHODS = (*ESTIMATORS, "instrumental", "likelihood")
 _EXPLAINED = 0.2
 """Error of a fit, over the forces, below which joints in another order count as the right ones
 where those of the log have no pose."""
+
+NO_COLUMN = "no payload column; declare one that is 0 without payload and 1 with it"
+"""The fault of a log that does not tell when a payload is carried."""
 
 _LOOK = 12_000
 """Rows, at most, in which other orders of joints are tried."""
@@ -72,19 +76,16 @@ def check_recordings(
                 f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
                 f"description, or find them with identify_drive_gains{other}",
             )
-    for one, again in combinations(whole, 2):
+    twice = "the same samples as {}; give them once"
+    held = (
+        "is held out, but the same samples are fitted; hold out another motion, or nothing: then "
+        "the end of each log is"
+    )
+    pairs = [(*pair, twice.format(pair[0].source)) for pair in combinations(whole, 2)]
+    pairs += [(*pair, held) for pair in product(whole, others)]
+    for one, again, said in pairs:
         if same(one, again):
-            raise LogError(
-                "twice", again.source, f"the same samples as {one.source}; give them once"
-            )
-    for one, again in product(whole, others):
-        if same(one, again):
-            raise LogError(
-                "twice",
-                again.source,
-                "is held out, but the same samples are fitted; hold out another motion, or "
-                "nothing: then the end of each log is",
-            )
+            raise LogError("twice", again.source, said)
     for log in (one.log for one in whole):
         period = wanted.period
         if isinstance(log, Log) and period and log.duration < period * (1.0 - 1e-3):
@@ -100,20 +101,14 @@ def check_payload(fit: Sequence[Recording]) -> None:
     """Refuse recordings that do not tell when a payload is carried, or carry several."""
     heads = [one.head() for one in fit]
     masses = {head.payload_mass: head.source for head in heads if head.payload_mass is not None}
+    said = ""
     if len(masses) > 1:
         several = ", ".join(f"{mass:g} kg in {source}" for mass, source in masses.items())
-        raise LogError(
-            "no payload",
-            fit[0].source,
-            f"several payloads, {several}; identify one at a time, each with the log without it",
-        )
-    if all(head.payload is None for head in heads):
-        raise LogError(
-            "no payload",
-            fit[0].source,
-            "no payload column; declare one that is 0 without payload and 1 with it, or identify "
-            "without the payload",
-        )
+        said = f"several payloads, {several}; identify one at a time, each with the log without it"
+    elif all(head.payload is None for head in heads):
+        said = f"{NO_COLUMN}, or identify without the payload"
+    if said:
+        raise LogError("no payload", fit[0].source, said)
 
 
 def preprocessing_for(
@@ -208,27 +203,30 @@ def estimated(
     return total(observations, column_errors(model, logs[0], preprocessing[0]))
 
 
-def with_findings(error: PteronError, whole: Sequence[Recording]) -> PteronError:
-    """Return an error with the logs' findings behind it, which may explain it."""
-    findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
-    findings += [finding.message for one in whole for finding in one.findings]
-    if findings:
-        error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
-    return error
+@contextmanager
+def findings_told(whole: Sequence[Recording]) -> Iterator[None]:
+    """Put the findings of logs behind an error that is raised within, which they may explain."""
+    try:
+        yield
+    except PteronError as error:
+        findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
+        findings += [finding.message for one in whole for finding in one.findings]
+        if findings:
+            error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
+        raise
 
 
-def too_little_motion(
-    model: Model,
-    hidden: tuple[str, ...],
-    estimate: Estimate,
-    preprocessing: Sequence[Preprocessing],
-    first: Recording,
-) -> LogError:
-    """Return the error for a motion that leaves most base parameters unseen."""
+def check_motion(
+    model: Model, estimate: Estimate, preprocessing: Sequence[Preprocessing], first: Recording
+) -> tuple[str, ...]:
+    """Return the base parameters that a motion leaves unseen; refuse one that leaves most so."""
+    hidden, too_many = unseen(model, estimate.deviations)
+    if not too_many:
+        return hidden
     rank = model.base.rank
     names = ", ".join(hidden) if len(hidden) < rank else "all"
     cause = left_over(estimate, preprocessing)
-    return LogError(
+    raise LogError(
         "too little motion",
         first.source,
         f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "

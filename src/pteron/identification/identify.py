@@ -8,9 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from pteron.errors import DataError, ModelError
+from pteron.errors import ModelError
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
-from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
     Estimate,
@@ -22,20 +21,20 @@ from pteron.identification.fitting import (
     METHODS,
     balanced,
     check_columns,
+    check_motion,
     check_payload,
     check_recordings,
     estimated,
+    findings_told,
     fit_observations,
     in_newtons,
     preprocessing_for,
-    too_little_motion,
-    with_findings,
 )
 from pteron.identification.logs import Log, LogFile
 from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations
-from pteron.identification.plausibility import plausibility_warnings, unphysical, unseen
+from pteron.identification.plausibility import plausibility_warnings, unphysical
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification
@@ -153,24 +152,17 @@ def identify(
         found = Unknowns(searched_speeds(model, observe, usual))
         model = model.falling(np.asarray(found.speeds))
     observations = observe(model)
-    try:
+    with findings_told(whole):
         if wanted.delay == "auto" or found.speeds is not None:
-            first = weighted(observations)
-            if wanted.delay == "auto":
-                coarse = delay_of(model, first, fit, preprocessing)
-                found = replace(found, delay=coarse)
-            else:
-                found = replace(found, delay=wanted.delay)
-            late = wanted.delay == "auto"
+            first, late = weighted(observations), wanted.delay == "auto"
+            begin = delay_of(model, first, fit, preprocessing) if late else float(wanted.delay)
             model, observations, found, more = settled(
-                model, observe, found, first.values, late=late
+                model, observe, replace(found, delay=begin), first.values, late=late
             )
             wanted = replace(wanted, delay=found.delay)
             preprocessing = tuple(replace(how, delay=found.delay) for how in preprocessing)
         estimate = estimated(estimator, model, fit, preprocessing, observations)
         estimate = replace(estimate, covariance=estimate.covariance + more)
-    except DataError as error:
-        raise with_findings(error, whole) from None
 
     # Judge by what was held out, which betrays columns that are not what they are called
     modes = [None] * len(check) if others else [how.start for how in preprocessing]
@@ -178,18 +170,11 @@ def identify(
         judged(model, estimate.values, one, preprocessing_for(robot, one, wanted, start))
         for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
     ]
-    by_held_out = verdict_of(held, repeats=not others)
-    impossible = unphysical(model, observations, estimate)
-    if by_held_out.grade != "trustworthy" or impossible:
-        try:
+    trusted = verdict_of(held, repeats=not others).grade == "trustworthy"
+    with findings_told(whole):
+        if not trusted or unphysical(model, observations, estimate):
             check_columns(model, fit[0], preprocessing[0])
-        except LogError as error:
-            raise with_findings(error, whole) from None
-    hidden, too_many = unseen(model, estimate.deviations)
-    if too_many:
-        raise with_findings(
-            too_little_motion(model, hidden, estimate, preprocessing, fit[0]), whole
-        )
+        hidden = check_motion(model, estimate, preprocessing, fit[0])
     report("Looking for faults", 0, 0)
     faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
     verdict = verdict_of(held, faults, repeats=not others, limits=limits)
@@ -205,12 +190,10 @@ def identify(
     known = np.zeros(len(model.names))
     for name, mass in _reflected(rotors).items():
         known += model.share_of(name, mass)
-    try:
+    with findings_told(whole):
         consistency, share, off, missing = _real_bodies(
             model, estimate, known, observations, drawn, bounds
         )
-    except ModelError as error:
-        raise with_findings(error, whole) from None
     verdict = with_bodies(verdict, consistency, off)
     advice = plausibility_warnings(model, estimate, known, consistency, drawn)
     if hidden or essential.dropped:

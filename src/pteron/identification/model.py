@@ -5,6 +5,7 @@ Further terms are friction of actuated and passive joints, offsets, a payload an
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple, get_args
@@ -188,12 +189,19 @@ class Model:
     @property
     def expressions(self) -> tuple[str, ...]:
         """The values in words: base parameters as sums, the others by name."""
-        found = [*self.base.expressions(), *self.names[self.base.rank :]]
+        own = [*self.base.expressions(), *self.names[self.base.rank :]]
+        return self.with_joins(own, {name: name for name in self.joins})
+
+    def with_joins(
+        self, texts: Sequence[str], names: Mapping[str, str], *, minus: str = "-", gap: str = " "
+    ) -> tuple[str, ...]:
+        """Return texts of the values with the terms behind that join them, by their names."""
+        found = list(texts)
         for name, shares in self.joins.items():
             for kept, share in shares.items():
-                sign, size = ("-", -share) if share < 0.0 else ("+", share)
-                times = "" if abs(size - 1.0) < 1e-9 else f"{size:.4g} "
-                found[self.names.index(kept)] += f" {sign} {times}{name}"
+                sign, size = minus if share < 0.0 else "+", abs(share)
+                times = "" if abs(size - 1.0) < 1e-9 else f"{size:.4g}{gap}"
+                found[self.names.index(kept)] += f" {sign} {times}{names[name]}"
         return tuple(found)
 
     def share_of(self, name: str, value: float) -> Array:

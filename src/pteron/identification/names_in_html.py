@@ -10,15 +10,9 @@ from pteron.reduction.expressions import html_name
 
 def html_expressions(model: Model) -> tuple[Markup, ...]:
     """Return the values of a model in HTML: sums of parameters, or names of terms."""
-    names = [_term_html(term) for term in model.kept_terms]
-    found = [*model.base.expressions("html"), *names]
-    terms = {term.name: _term_html(term) for term in model.joining_terms}
-    for name, shares in model.joins.items():
-        for kept, share in shares.items():
-            size = "" if abs(abs(share) - 1.0) < 1e-9 else f"{abs(share):.4g}\u202f"
-            sign = "\u2212" if share < 0.0 else "+"
-            found[model.names.index(kept)] += f" {sign} {size}{terms[name]}"
-    return tuple(Markup(text) for text in found)
+    own = [*model.base.expressions("html"), *map(_term_html, model.kept_terms)]
+    joining = {term.name: _term_html(term) for term in model.joining_terms}
+    return tuple(map(Markup, model.with_joins(own, joining, minus="\u2212", gap="\u202f")))
 
 
 def html_names(model: Model) -> dict[str, Markup]:

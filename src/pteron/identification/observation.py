@@ -17,7 +17,7 @@ from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
-from pteron.identification.signals.fourier import Projection, fitted_series, most_harmonics
+from pteron.identification.signals.fourier import Projection, most_harmonics
 from pteron.identification.signals.samples import BLOCK, SampleBlock, samples
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -270,52 +270,28 @@ def _periodic(
     count = 2 * harmonics + 1
     kept = np.linspace(start, start + period, count, endpoint=False)
 
-    def regressor(time: Array, used: Array, first_row: int) -> Array:
-        phases = None if log.payload is None else np.full(len(time), log.payload[0])
-        at = replace(log, time=time, payload=phases, first_row=first_row)
-        states = States.of_log(model.robot, at, series.at(time), preprocessing.start)
-        return np.asarray(used[..., None] * model.matrix(states))
-
     places = (log.time - start) * (per_period / period)
     used = moving[np.round(places).astype(int) % per_period]
+    time, shown = log.time, used
     if log.rows == periods * per_period and np.abs(places - np.arange(log.rows)).max() <= EVEN:
         # All periods have their samples at the same instants: one stands for all.
-        matrix = _projected(regressor(fine, moving, log.first_row), count)
-        forces = fitted_series(log.time, used * log.forces, period, highest=harmonics / period)
-        rows = forces.at(kept)[0]
-        noise = _projected_noise(moving, count) * np.sqrt(per_period / log.rows)
-    else:
-        projection = Projection(log.time, period, harmonics)
-        basis = fourier_basis(kept, harmonics, period)
-        n, p = used.shape[1], len(model.names)
+        time, shown = fine, moving
 
-        def sampled(part: slice) -> Array:
-            found = regressor(log.time[part], used[part], log.first_row + part.start)
-            return found.reshape(len(found), n * p)
+    def regressor(part: slice) -> Array:
+        phases = None if log.payload is None else np.full(len(time[part]), log.payload[0])
+        first_row = log.first_row + part.start
+        at = replace(log, time=time[part], payload=phases, first_row=first_row)
+        states = States.of_log(model.robot, at, series.at(time[part]), preprocessing.start)
+        return np.asarray(shown[part][..., None] * model.matrix(states)).reshape(len(states), -1)
 
-        matrix = (basis @ projection.coefficients(sampled, n * p)).reshape(count, n, p)
-        rows = basis @ projection.coefficients(lambda part: used[part] * log.forces[part], n)
-        noise = projection.noise(used, kept)
+    n, p = used.shape[1], len(model.names)
+    basis = fourier_basis(kept, harmonics, period)
+    projection, whole = (Projection(each, period, harmonics) for each in (time, log.time))
+    matrix = (basis @ projection.coefficients(regressor, n * p)).reshape(count, n, p)
+    rows = basis @ whole.coefficients(lambda part: used[part] * log.forces[part], n)
+    noise = projection.noise(shown, kept) * np.sqrt(len(time) / log.rows)
     payload = np.full(count, 0 if log.payload is None else log.payload[0], dtype=np.int64)
     return assembled(model, matrix, rows, noise, kept, payload, np.sqrt(count / log.rows))
-
-
-def _projected_noise(moving: Array, count: int) -> Array:
-    """Return the noise of `_projected`, for unit white noise on the samples (T, n) that are 1."""
-    rows = len(moving)
-    pulse = np.zeros(rows)
-    pulse[0] = 1.0
-    response = np.fft.irfft(np.fft.rfft(pulse)[: count // 2 + 1], n=rows)
-    spread = np.fft.rfft(response**2)[:, None] * np.fft.rfft(moving, axis=0)
-    variance = np.fft.irfft(spread, n=rows, axis=0)
-    nearest = np.round(np.arange(count) * (rows / count)).astype(int)
-    return np.asarray(np.sqrt(np.maximum(variance[nearest], 0.0)))
-
-
-def _projected(signal: Array, count: int) -> Array:
-    """Return one period's samples (T, ...) as `count` samples of its lowest harmonics (odd)."""
-    spectrum = np.fft.rfft(signal, axis=0)[: count // 2 + 1]
-    return np.asarray(np.fft.irfft(spectrum, n=count, axis=0) * (count / len(signal)))
 
 
 def scaled(columns: Array) -> tuple[Array, Array]:

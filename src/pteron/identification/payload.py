@@ -12,22 +12,23 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.bodies.inertia import PlanarInertia, SpatialInertia, inertia_count
 from pteron.bodies.parameters import LENGTH_POWERS
-from pteron.errors import DataError, ModelError
+from pteron.errors import ModelError
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.faults import FaultIsolation, isolate_faults
 from pteron.identification.fitting import (
+    NO_COLUMN,
     balanced,
     check_columns,
+    check_motion,
     check_recordings,
+    findings_told,
     in_newtons,
-    too_little_motion,
-    with_findings,
 )
 from pteron.identification.logs import Finding, Log
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
-from pteron.identification.plausibility import CHANCE, left_over, unphysical, unseen
+from pteron.identification.plausibility import CHANCE, left_over, unphysical
 from pteron.identification.recordings import Recording, recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.json_values import picked
@@ -151,14 +152,11 @@ class Payload:
     @property
     def real(self) -> bool:
         """Whether a real body has these values: in a plane m > 0 and I m >= (m gamma)^2."""
-        if self.mass is None or not self.mass > 0.0:
-            return False
-        if self.first_moment is None or self.inertia is None:
-            return True
-        if not isinstance(self.inertia, tuple):
-            return self.inertia * self.mass >= sum(h * h for h in self.first_moment)
+        if self.mass is None or self.first_moment is None or self.inertia is None:
+            return self.mass is not None and self.mass > 0.0
+        kind = SpatialInertia if isinstance(self.inertia, tuple) else PlanarInertia
         try:
-            SpatialInertia.of_values([self.mass, *self.first_moment, *self.inertia])
+            kind.of_values([self.mass, *self.first_moment, *np.ravel(self.inertia).tolist()])
         except ModelError:
             return False
         return True
@@ -269,17 +267,13 @@ def identify_payload(
         with_payload = in_newtons(with_payload, robot)
     fit = _phases(without, with_payload, processing)
     check_recordings(robot, fit, (), processing or Processing())
-    parts, plans = _observed(model, fit, processing)
-    try:
+    with findings_told(fit):
+        parts, plans = _observed(model, fit, processing)
         observations = balanced(parts)
         estimate = estimator(observations)
-    except DataError as error:
-        raise with_findings(error, fit) from None
-    if unphysical(model, observations, estimate) or left_over(estimate, plans):
-        check_columns(model, fit[0], plans[0])
-    hidden, too_many = unseen(model, estimate.deviations)
-    if too_many:
-        raise with_findings(too_little_motion(model, hidden, estimate, plans, fit[0]), fit)
+        if unphysical(model, observations, estimate) or left_over(estimate, plans):
+            check_columns(model, fit[0], plans[0])
+        check_motion(model, estimate, plans, fit[0])
     return _payload(
         model, estimate, isolate_faults(model, estimate, fit, plans), [one.findings for one in fit]
     )
@@ -325,7 +319,9 @@ def observations_with_payload(
     model: Model, without: Log, with_payload: Log | None, processing: Processing | None
 ) -> Observations:
     """Return the observations of a log with both phases, or of two logs, as one."""
-    return stacked(_observed(model, _phases(without, with_payload, processing), processing)[0])
+    fit = _phases(without, with_payload, processing)
+    with findings_told(fit):
+        return stacked(_observed(model, fit, processing)[0])
 
 
 def _phases(
@@ -347,10 +343,7 @@ def _observed(
     """Return the observations of each recording, in which both phases must be, and its plan."""
     logs = [one.head() for one in fit]
     plans = [preprocessing_of(model.robot, log, processing) for log in logs]
-    try:
-        parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
-    except DataError as error:
-        raise with_findings(error, fit) from None
+    parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
     observations = stacked(parts)
     seen = (observations.gain > 0.0).any(axis=1)
     for phase, called in ((0, "without payload"), (1, "with payload")):
@@ -366,22 +359,14 @@ def _observed(
 
 def _check_phases(log: Log) -> None:
     """Refuse a single log that has not both phases."""
-    if log.payload is None:
-        raise LogError(
-            "no payload",
-            log.source,
-            "no payload column; declare one that is 0 without payload and 1 with it, or give two "
-            "logs",
-        )
-    phases = np.unique(log.payload)
-    if len(phases) < 2:
-        which = "one where a payload is carried" if not phases.any() else "one without payload"
-        raise LogError(
-            "no payload",
-            log.source,
-            f"its payload column has phase {phases[0]:g} only, 0 and 1 are expected; add {which}, "
-            "or give two logs",
-        )
+    phases = [] if log.payload is None else np.unique(log.payload).tolist()
+    if len(phases) > 1:
+        return
+    said = NO_COLUMN
+    if phases:
+        which = "one without payload" if phases[0] else "one where a payload is carried"
+        said = f"its payload column has phase {phases[0]} only, 0 and 1 are expected; add {which}"
+    raise LogError("no payload", log.source, f"{said}, or give two logs")
 
 
 def _in_phase(log: Log, phase: int) -> Log:

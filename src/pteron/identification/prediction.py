@@ -134,8 +134,7 @@ def predict(
     """Return the prediction of a recording by a model with values (p,), with its preprocessing."""
     n = len(model.robot.legs)
     plain = np.where(np.isin(model.kinds, FRICTION), 0.0, values)
-    counts, total = np.zeros(n), 0
-    sums = np.zeros((7, n))
+    sums, total = np.zeros((8, n)), 0
     shown: list[Array] = []
     step = max(recording.rows // _KEPT, 1)
     for block in samples(model.robot, recording.samples(), preprocessing):
@@ -146,37 +145,30 @@ def predict(
         error, bare = measured - predicted, measured - without
         least = _LEAST_NOISE * np.sqrt((measured**2).mean(axis=0))
         out = used * _stands_out(error, np.maximum(preprocessing.force_noise, least))
-        sums += [
-            measured.sum(axis=0),
-            (measured**2).sum(axis=0),
-            (used * error**2).sum(axis=0),
-            (used * bare**2).sum(axis=0),
-            (error**2).sum(axis=0),
-            (out * error**2).sum(axis=0),
-            out.sum(axis=0),
-        ]
-        counts += used.sum(axis=0)
+        squares = used * error**2, used * bare**2, error**2, out * error**2
+        each = used, out, measured, measured**2, *squares
+        sums += [one.sum(axis=0) for one in each]
         rows = slice(-total % step, None, step)
         columns = states.time, measured, predicted, without, states.joint_rates, used
         shown.append(np.column_stack([column[rows] for column in columns]))
         total += len(states)
     kept = np.concatenate(shown)
     parts = np.split(kept[:, 1:], 5, axis=1)
-    mean = sums[0] / total
+    counts, out_counts, force, power, moving, bare, whole, out_power = sums
     seen = np.maximum(counts, 1.0)
-    error = np.sqrt(sums[2] / seen)
-    share = sums[6] / seen
+    error = np.sqrt(moving / seen)
+    share = out_counts / seen
     outliers = np.where((share > _RARE) & (share < _FEW), share, 0.0)
-    rest = (sums[2] - sums[5]) / np.maximum(counts - sums[6], 1.0)
+    rest = (moving - out_power) / np.maximum(counts - out_counts, 1.0)
     robust = np.where(outliers > 0.0, np.sqrt(np.maximum(rest, 0.0)), error)
     return Prediction(
         source=recording.source,
         samples=total,
         left_out=1.0 - counts / total,
-        size=np.sqrt(np.maximum(sums[1] / total - mean**2, np.finfo(float).tiny)),
+        size=np.sqrt(np.maximum(power / total - (force / total) ** 2, np.finfo(float).tiny)),
         error=error,
-        error_without_friction=np.sqrt(sums[3] / seen),
-        error_of_all=np.sqrt(sums[4] / total),
+        error_without_friction=np.sqrt(bare / seen),
+        error_of_all=np.sqrt(whole / total),
         robust_error=robust,
         outliers=outliers,
         noise=preprocessing.force_noise,

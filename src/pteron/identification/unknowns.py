@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
-from pteron.identification.model import Model
+from pteron.identification.extended_model import extended
+from pteron.identification.model import Model, diagonal
 from pteron.identification.observation import LinearModel, Observations, scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
 
 _SLOWEST, _FASTEST = 3e-3, 3.0
 """Least and greatest speed of the search, over each joint's root mean square speed."""
@@ -98,27 +98,6 @@ class Unknowns:
         return found
 
 
-@dataclass(frozen=True)
-class _ExtendedModel:
-    """A model with a group of columns behind it that are each actuator's own."""
-
-    robot: Manipulator
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    kinds: tuple[str, ...]
-    matrix: Callable[[States], Array]
-
-
-def _extended(model: Model, count: int, columns: Callable[[States], Array]) -> _ExtendedModel:
-    """Return a model with so many columns (R, n, k) more."""
-    names = (*model.names, *(f"column {k}" for k in range(count)))
-    units, kinds = (*model.units, *("",) * count), (*model.kinds, *("stribeck",) * count)
-    return _ExtendedModel(
-        *(model.robot, names, units, kinds),
-        lambda states: np.concatenate([model.matrix(states), columns(states)], axis=-1),
-    )
-
-
 def settled(
     model: Model,
     observe: Callable[[LinearModel, float], Observations],
@@ -156,7 +135,7 @@ def settled(
         if speeds is not None:
             model = model.falling(speeds)
         columns = partial(_slopes, model, seen, values, late)
-        rows = observe(_extended(model, len(seen) + late, columns), found.delay)
+        rows = observe(extended(model, len(seen) + late, columns), found.delay)
         plain = rows.columns(range(p))
         whole, part = weighted(rows), weighted(plain)
         values, more = part.values, whole.covariance[:p, :p] - part.covariance
@@ -193,7 +172,7 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
         return np.asarray(np.sign(rates) * falls)
 
-    rows = observe(_extended(model, _COLUMNS, columns))
+    rows = observe(extended(model, _COLUMNS, columns))
     plain = rows.columns(range(p))
     noise = weighted(plain).noise
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
@@ -206,19 +185,15 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         weighed = plain.matrix / noise[:, None]
         basis = np.linalg.qr(scaled(weighed.reshape(-1, p))[0])[0]
         forces = (plain.forces / noise).ravel()
-        own = np.zeros((*plain.forces.shape, n, _COLUMNS))
-        for i in range(n):
-            own[:, i, i] = rows.matrix[:, i, p:] / noise[i]
-        own = own.reshape(len(forces), -1)
+        each = rows.matrix[..., p:] / noise[:, None]
+        own = np.einsum("ric,ij->rijc", each, np.eye(n)).reshape(len(forces), -1)
         inner = basis.T @ own
         gram = (own.T @ own - inner.T @ inner).reshape(n, _COLUMNS, n, _COLUMNS)
         image = (own.T @ forces - inner.T @ (basis.T @ forces)).reshape(n, _COLUMNS)
         chosen = _coordinatewise(spline, gram, image)
         speeds = np.where(chosen >= 0, usual * tried[np.maximum(chosen, 0)], np.inf)
-        seen = np.flatnonzero(chosen >= 0)
-        extra = np.zeros((*plain.forces.shape, len(seen)))
-        for k, i in enumerate(seen.tolist()):
-            extra[:, i, k] = rows.matrix[:, i, p:] @ spline[chosen[i]]
+        falls = np.einsum("ric,ic->ri", rows.matrix[..., p:], spline[chosen])
+        extra = diagonal(falls)[..., chosen >= 0]
         whole = plain.with_matrix(np.concatenate([plain.matrix, extra], axis=-1))
         noise = actuator_noise(whole, weighted(whole).values)
     return speeds

@@ -12,9 +12,9 @@ import polars as pl
 from pteron.errors import DataError, shown
 from pteron.tables.table import Table
 
-_FACTORS = {
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "rad": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0},
+FACTORS = {
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "cm": 1e-2},
+    "rad": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "mrad": 1e-3},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
 }
 """Factors from units to SI units, by SI unit."""
@@ -49,7 +49,7 @@ def in_si(table: Table, units: Mapping[str, str]) -> Table:
         factor = _factor(match["unit"], units[name])
         if factor is None:
             si, _, per = units[name].partition("/")
-            known = ", ".join(f"{unit}/{per}" if per else unit for unit in _FACTORS.get(si, (si,)))
+            known = ", ".join(f"{unit}/{per}" if per else unit for unit in FACTORS.get(si, (si,)))
             raise DataError(
                 f"{table.source}: column {shown(column, bare=True)}: the unit of {name} is one of "
                 f"{known}"
@@ -67,4 +67,4 @@ def _factor(unit: str, si: str) -> float | None:
     (own, _, per), (base, _, wanted) = unit.partition("/"), si.partition("/")
     if re.sub("[ ^]", "", per) != re.sub("[ ^]", "", wanted):
         return None
-    return _FACTORS.get(base, {base: 1.0}).get(own.strip())
+    return FACTORS.get(base, {base: 1.0}).get(own.strip())

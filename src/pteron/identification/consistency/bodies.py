@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.bodies.inertia import SpatialInertia
-from pteron.bodies.parameters import LENGTH_POWERS, PLATFORM, Parameter, body_places
+from pteron.bodies.inertia import PlanarInertia, SpatialInertia
+from pteron.bodies.parameters import PLATFORM, Parameter, body_places
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameter_data, parameter_names, parameters
 from pteron.reduction import BaseParameters
 from pteron.reduction.sharing import share
-
-_ROUNDING = 1e-12
-"""Share of an inertia that counts as rounding."""
 
 _SMALL_PLATFORM = 0.25
 """Size of a platform whose points are all at P, as a share of a link's, for its scale."""
@@ -58,26 +56,16 @@ class Bodies:
         return [place["m"] for place in self.places.values()]
 
     @cached_property
-    def cones(self) -> tuple[list[int], Array, Array, Array, Array]:
-        """The bodies that turn, and what takes their m, hx, hy and I out of the columns."""
-        turning = [b for b, place in enumerate(self.places.values()) if "I" in place]
-        rows = {kind: np.zeros((len(turning), len(self.columns))) for kind in LENGTH_POWERS}
-        for row, place in enumerate(p for p in self.places.values() if "I" in p):
-            for kind, column in place.items():
-                rows[kind][row, column] = 1.0
-        return turning, rows["m"], rows["mgx"], rows["mgy"], rows["I"]
+    def moments(self) -> tuple[Array, ...]:
+        """The matrix of each body as a function of the columns, linear: (d, d, k).
 
-    @cached_property
-    def solids(self) -> tuple[list[int], Array]:
-        """The bodies that turn about any axis, and what takes their second moments (b, 4, 4, k)."""
-        unit, found = np.eye(len(self.columns)), []
-        solid = [b for b, place in enumerate(self.places.values()) if "Izz" in place]
-        for b in solid:
-            place = list(self.places.values())[b]
-            found.append(
-                SpatialInertia.second_moments({kind: unit[k] for kind, k in place.items()})
-            )
-        return solid, np.array(found).reshape(len(solid), 4, 4, len(self.columns))
+        It is positive semidefinite where the body is real; see `_moments`.
+        """
+        unit = np.eye(len(self.columns))
+        return tuple(
+            np.array(_moments({kind: unit[column] for kind, column in place.items()}))
+            for place in self.places.values()
+        )
 
     def scale(self, masses: Array) -> Array:
         """Return the unit of each free parameter, from the bodies' masses, kg."""
@@ -93,19 +81,24 @@ class Bodies:
         return np.asarray((self.sharing / self.sharing.sum(axis=0)).T @ values)
 
     def least(self, scaled: Array) -> Array:
-        """Return the least eigenvalue of each [[m, |h|], [|h|, I]], or the mass that does not turn.
+        """Return the least eigenvalue (bodies,) of each body's matrix: above 0 for a real one."""
+        return np.array([np.linalg.eigvalsh(each @ scaled)[0] for each in self.moments])
 
-        Of a body that turns about any axis it is that of its second moments. No real body has a
-        negative one.
-        """
-        turning, *rows = self.cones
-        m, hx, hy, inertia = (row @ scaled for row in rows)
-        inside = scaled[self.masses]
-        root = np.sqrt(4 * hx * hx + 4 * hy * hy + (m - inertia) ** 2)
-        inside[turning] = 0.5 * (m + inertia - root)
-        solid, moments = self.solids
-        inside[solid] = np.linalg.eigvalsh(moments @ scaled).min(axis=-1, initial=np.inf)
-        return np.asarray(inside)
+
+def _moments(values: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the matrix of a body, linear in its values by kind.
+
+    A body that turns about any axis has its second moments (4, 4); one that turns in a plane
+    [[I, 0, hx], [0, I, hy], [hx, hy, m]], whose least eigenvalue is that of [[m, |h|], [|h|, I]];
+    one that does not turn has its mass.
+    """
+    if "Izz" in values:
+        return SpatialInertia.second_moments(values)
+    m, zero = values["m"], 0.0 * values["m"]
+    if "I" not in values:
+        return [[m]]
+    hx, hy, inertia = (values.get(kind, zero) for kind in PlanarInertia.kinds[1:])
+    return [[inertia, zero, hx], [zero, inertia, hy], [hx, hy, m]]
 
 
 def bodies_of(base: BaseParameters) -> Bodies:
@@ -173,27 +166,19 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
     >>> values = pteron.parameters(robot)
     >>> values[0] = -0.1
     >>> real_bodies(robot, values)
-    ('p1: mass -0.1 kg is not positive',)
+    ('p1: mass: -0.1 kg is not positive; give a value above 0 kg',)
     """
     vector = parameters(robot) if values is None else parameters_of(robot, values, "parameters")
-    lines = []
-    for name, place in body_places(parameter_data(robot)).items():
-        body = {kind: float(vector[column]) for kind, column in place.items()}
-        m, inertia = body["m"], body.get("I")
-        if m > 0.0 and "Izz" in body:
-            try:
-                SpatialInertia.of_values(list(body.values()))
-            except ModelError as error:
-                lines.append(f"{name}: {error}")
-        if m <= 0.0:
-            lines.append(f"{name}: mass {m:.4g} kg is not positive")
-        elif inertia is not None:
-            least = (body.get("mgx", 0.0) ** 2 + body.get("mgy", 0.0) ** 2) / m
-            if inertia <= 0.0 or inertia < least * (1.0 - _ROUNDING):
-                lines.append(
-                    f"{name}: inertia {inertia:.4g} kg m^2 is {least - inertia:.2g} below "
-                    f"{least:.4g}, the least with its mass and centre of mass"
-                )
+    data, lines = parameter_data(robot), []
+    for name, place in body_places(data).items():
+        columns = list(place.values())
+        first = data[columns[0]]
+        legs, platform = robot.legs, robot.platform
+        kind = legs[first.legs[0] - 1].bodies[first.body] if first.legs else platform.joined
+        try:
+            kind.of_values(vector[columns].tolist())
+        except ModelError as error:
+            lines.append(f"{name}: {error}")
     return tuple(lines)
 
 

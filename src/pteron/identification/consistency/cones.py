@@ -1,9 +1,7 @@
 """Cone programs over real bodies, solved by Clarabel: the parameters of real bodies are a cone.
 
-For a body that turns in a plane it is a second-order cone: I m >= hx^2 + hy^2 with m, I >= 0 is
-|(2 hx, 2 hy, m - I)| <= m + I, in parameters scaled by a mass and a length of the body, so that the
-three numbers are of one size. For a body that turns about any axis it is the cone of positive
-semidefinite matrices (4, 4), which its second moments are.
+It is that of positive semidefinite matrices: each body has one, `Bodies.moments`, in parameters
+scaled by a mass and a length of the body, so that its entries are of one size.
 """
 
 from __future__ import annotations
@@ -27,15 +25,6 @@ _UNITS = (1e-4, 1e-3, 1e-2)
 """Units of residuals, over the values' distance from zero: with the first 1e5 standard deviations
 are no problem, and where the solver gives up one of the others is in its range."""
 
-_CONE = 4
-"""Rows of a body that turns in a plane: m + I, 2 hx, 2 hy, m - I."""
-
-_TRIANGLE = tuple((i, j) for j in range(4) for i in range(j + 1))
-"""Entries of the second moments of a body that turns about any axis, in the solver's order."""
-
-_SOLID = len(_TRIANGLE)
-"""Rows of such a body."""
-
 
 @dataclass(frozen=True)
 class RealBodies:
@@ -49,36 +38,28 @@ class RealBodies:
     matrix: Array
     right: Array
 
+    @property
+    def counts(self) -> list[int]:
+        """Number of rows of each body: those of a triangle."""
+        return [len(moments) * (len(moments) + 1) // 2 for moments in self.bodies.moments]
+
     @cached_property
     def rows(self) -> tuple[Array, Array, Array]:
         """Factors of z and of the depth, and constants, of the rows that hold z in the set.
 
-        Masses and limits come first and are not negative; a cone of each turning body follows, and
-        one of each that turns about any axis.
+        Limits come first and are not negative; the matrix of each body follows as the solver has
+        it: the columns of its upper triangle, entries off the diagonal times sqrt(2).
         """
-        turning, m, hx, hy, inertia = self.bodies.cones
-        cones = np.stack([m + inertia, 2 * hx, 2 * hy, m - inertia], axis=1)
-        inside = np.zeros(cones.shape[:2])
-        inside[:, 0] = -2 * self.margins[turning]
-        masses = np.eye(cones.shape[2])[self.bodies.masses]
-        solid, moments = self.bodies.solids
-        parts = [moments[:, i, j] * (1.0 if i == j else np.sqrt(2.0)) for i, j in _TRIANGLE]
-        solids = np.stack(parts, axis=1)
-        below = -np.outer(self.margins[solid], [float(i == j) for i, j in _TRIANGLE])
-        none = np.zeros(inside.size + below.size)
-        return (
-            np.vstack(
-                [
-                    masses,
-                    -self.matrix,
-                    *(part.reshape(-1, cones.shape[2]) for part in (cones, solids)),
-                ]
-            ),
-            np.concatenate(
-                [-self.margins, np.zeros(len(self.right)), inside.ravel(), below.ravel()]
-            ),
-            np.concatenate([np.zeros(len(masses)), self.right, none]),
-        )
+        of_z, of_depth = [-self.matrix], [np.zeros(len(self.right))]
+        for moments, margin in zip(self.bodies.moments, self.margins, strict=True):
+            column, row = np.tril_indices(len(moments))
+            across = row == column
+            of_z.append(moments[row, column] * np.where(across, 1.0, np.sqrt(2.0))[:, None])
+            of_depth.append(np.where(across, -margin, 0.0))
+        whole = np.vstack(of_z)
+        constant = np.zeros(len(whole))
+        constant[: len(self.right)] = self.right
+        return whole, np.concatenate(of_depth), constant
 
 
 def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[float, Array]:
@@ -132,14 +113,11 @@ def closest(
     else:
         return None
     answer, multipliers = found
-    turning, count = real.bodies.cones[0], len(real.margins) + len(real.right)
-    forces = np.abs(multipliers[len(size) :])
-    end = count + _CONE * len(turning)
-    forces[: len(real.margins)][turning] += forces[count:end:_CONE]
-    solid = real.bodies.solids[0]
-    across = [k for k, (i, j) in enumerate(_TRIANGLE) if i == j]
-    forces[solid] += forces[end:].reshape(len(solid), _SOLID)[:, across].sum(axis=1)
-    return answer[: matrix.shape[1]], forces[:count]
+    limits, cones = np.split(np.abs(multipliers[len(size) :]), [len(real.right)])
+    # A body's multipliers are a matrix as well: its trace counts.
+    traces = np.where(of_depth[len(real.right) :] < 0.0, cones, 0.0)
+    bodies = np.add.reduceat(traces, np.cumsum([0, *real.counts[:-1]]))
+    return answer[: matrix.shape[1]], np.concatenate([bodies, limits])
 
 
 def _least_squares(
@@ -169,10 +147,8 @@ def _solved(
     except ImportError:
         told = "consistency needs Clarabel, which is not installed"
         raise MissingSolver(f"{told}; {install_command('consistency')}") from None
-    cones = [clarabel.SecondOrderConeT(_CONE)] * len(real.bodies.cones[0])
-    solids = [clarabel.PSDTriangleConeT(4)] * len(real.bodies.solids[0])
-    others = _CONE * len(cones) + _SOLID * len(solids)
-    positive = clarabel.NonnegativeConeT(len(rows) - equal - others)
+    cones = [clarabel.PSDTriangleConeT(len(moments)) for moments in real.bodies.moments]
+    positive = clarabel.NonnegativeConeT(len(rows) - equal - sum(real.counts))
     status = clarabel.SolverStatus
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -183,7 +159,7 @@ def _solved(
             linear,
             scipy.sparse.csc_matrix(-rows),
             right,
-            [clarabel.ZeroConeT(equal), positive, *cones, *solids],
+            [clarabel.ZeroConeT(equal), positive, *cones],
             settings,
         ).solve()
         if found.status not in (status.NumericalError, status.InsufficientProgress):

@@ -102,7 +102,7 @@ def consistent_model(
     -----
     Sousa, C. D., Cortesao, R.: Physical feasibility of robot base inertial parameter
     identification: a linear matrix inequality approach. Int. J. Robotics Research 33(6), 2014.
-    For a body in planar motion the linear matrix inequality is a second-order cone.
+    For a body in planar motion the matrix is [[I, 0, hx], [0, I, hy], [hx, hy, m]].
 
     Examples
     --------

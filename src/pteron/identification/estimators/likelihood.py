@@ -132,19 +132,12 @@ def maximum_likelihood(
 
 
 def _check(log: Log) -> None:
+    advice = "to maximum likelihood, or choose another estimator"
     if len(log.segments) > 1:
-        raise LogError(
-            "gap",
-            log.source,
-            "has gaps; give a part without one to maximum likelihood, or choose another estimator",
-        )
+        raise LogError("gap", log.source, f"has gaps; give a part without one {advice}")
     if log.payload is not None and np.ptp(log.payload) > 0:
-        raise LogError(
-            "no payload",
-            log.source,
-            "the payload changes; give a part with one payload to maximum likelihood, or choose "
-            "another estimator",
-        )
+        said = f"the payload changes; give a part with one payload {advice}"
+        raise LogError("no payload", log.source, said)
 
 
 def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing) -> Observations:

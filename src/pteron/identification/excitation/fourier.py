@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect_one_of
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
 from pteron.identification.signals.states import FullMotion, home_mode
@@ -72,8 +73,7 @@ class FourierMotion:
     mode: int = -1
 
     def __post_init__(self) -> None:
-        if self.space not in get_args(Space):
-            raise DataError(f'space: {self.space!r} is neither "platform" nor "joints"')
+        expect_one_of(get_args(Space), space=self.space)
         if self.space == "joints" and not closure_of(self.robot).closed_form:
             raise DataError(
                 'space: "joints" given, but direct kinematics of '
@@ -84,11 +84,10 @@ class FourierMotion:
         n = self.robot.freedom
         for name in ("center", "cosines", "sines"):
             object.__setattr__(self, name, as_array(getattr(self, name), name, (n,)).copy())
-        if self.center.shape != (n,) or self.cosines.ndim != 2:
-            raise DataError(f"center, cosines: shapes ({n},) and (H, {n}) expected")
-        if self.cosines.shape != self.sines.shape or not len(self.cosines):
+        shapes, h = (self.center.shape, self.cosines.shape, self.sines.shape), len(self.cosines)
+        if shapes != ((n,), (h, n), (h, n)) or not h:
             raise DataError(
-                f"cosines, sines: shapes {self.cosines.shape} and {self.sines.shape} given, the "
+                f"center, cosines, sines: shapes {shapes} given, ({n},) and twice (H, {n}) of the "
                 "same number of harmonics expected, at least one"
             )
         if self.mode < 0:

@@ -8,10 +8,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from queue import SimpleQueue
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,133 +55,124 @@ ROUNDS = {
 """For each criterion, the round for all starts, and that for the best of them."""
 
 
+class Stage(NamedTuple):
+    """The result of a stage of the improvement of a start."""
+
+    number: int
+    """The start."""
+    done: int
+    """Number of stages done."""
+    found: FourierMotion | None
+    """A motion that keeps all limits, if the stage found one."""
+    ended: bool
+    finished: bool
+    """Whether it was done thoroughly."""
+
+
 @dataclass(frozen=True, eq=False)
 class Improvement:
-    """The state of the improvement of one start."""
+    """The improvement of one start, a motion that keeps all limits, in so many seconds."""
 
     number: int
     setting: Setting
     plan: Round
-    safe: FourierMotion
-    """The last motion found that keeps all limits; the start at first."""
+    start: FourierMotion
     seconds: float
-    """Time left, s."""
-    stage: int = 0
-    """Number of stages done."""
-    current: FourierMotion | None = None
-    """The motion from which the next stage begins: it need not keep the limits; None for `safe`."""
-    watched: tuple[str, ...] = ()
-    """The limits that the program keeps, by name."""
-    instants: Array = field(default_factory=lambda: np.empty(0))
-    """Instants at which it keeps them beside its own samples (E,), s."""
-    improved: bool = False
-    """Whether the last stage found a motion that keeps all limits."""
-    ended: bool = False
-    finished: bool = False
-    """Whether it was done thoroughly."""
 
-    def next(self) -> Improvement:
-        """Do one stage."""
-        if self.seconds <= 0.0:
-            return replace(self, improved=False, ended=True)
-        begin = time.monotonic()
-        plan, start = self.plan, self.current or self.safe
-        watched = self.watched or _near(start, self.setting)
-        coefficients = minimised(
-            self.setting,
-            start.coefficients,
-            plan.doublings[min(self.stage, len(plan.doublings) - 1)],
-            watched,
-            self.instants,
-            self.seconds,
-        )
-        ended = self.stage == plan.stages - 1
-        finished = ended and time.monotonic() < begin + self.seconds
-        done = replace(self, stage=self.stage + 1, watched=watched, improved=False, current=None)
-        if coefficients is not None:
-            # A motion that does not keep the limits yet is still a place to go on from.
-            motion = start.with_coefficients(coefficients)
-            kept = within_limits(motion, self.setting.limits)
-            violated, instants = _violations(motion, self.setting)
-            good = not violated or (kept is not None and not plan.thorough)
-            finished = finished or (self.stage >= len(plan.doublings) - 1 and good)
-            done = replace(
-                done,
-                safe=kept or self.safe,
-                current=kept or motion,
-                improved=kept is not None,
-                watched=tuple(dict.fromkeys([*watched, *violated])),
-                instants=np.unique(np.concatenate([self.instants, instants])),
+    def stages(self) -> Iterator[Stage]:
+        """Yield the result of each stage; the last one has ended."""
+        plan, setting, left = self.plan, self.setting, self.seconds
+        safe = current = self.start
+        # The limits that the program keeps, by name, and instants (E,) beside its own samples, s
+        watched, instants = _near(current, setting), np.empty(0)
+        for stage in range(plan.stages):
+            if left <= 0.0:
+                yield Stage(self.number, stage, None, ended=True, finished=False)
+                return
+            begin, sharp = time.monotonic(), len(plan.doublings) - 1
+            doublings = plan.doublings[min(stage, sharp)]
+            coefficients = minimised(
+                setting, current.coefficients, doublings, watched, instants, left
             )
-        left = self.seconds - (time.monotonic() - begin)
-        return replace(done, seconds=left, ended=ended or finished, finished=finished)
+            kept, good = None, False
+            current = safe
+            if coefficients is not None:
+                # A motion that does not keep the limits yet is still a place to go on from.
+                motion = self.start.with_coefficients(coefficients)
+                kept = within_limits(motion, setting.limits)
+                violated, more = _violations(motion, setting)
+                good = not violated or (kept is not None and not plan.thorough)
+                safe, current = kept or safe, kept or motion
+                watched = tuple(dict.fromkeys([*watched, *violated]))
+                instants = np.unique(np.concatenate([instants, more]))
+            left -= time.monotonic() - begin
+            last = stage == plan.stages - 1
+            finished = (last and left > 0.0) or (stage >= sharp and good)
+            yield Stage(self.number, stage + 1, kept, last or finished, finished)
+            if finished:
+                return
 
 
-def improved(starts: Sequence[Improvement], workers: int) -> Generator[Improvement, None, None]:
-    """Yield every start after each of its stages, done by so many processes; by this one if one.
+def improved(starts: Sequence[Improvement], workers: int) -> Generator[Stage, None, None]:
+    """Yield every stage of all starts, done by so many processes; by this one if one.
 
     A start whose process fails is improved here; where the iteration is given up, all are ended.
     """
     if workers > 1:
-        failed: list[Improvement] = []
-        yield from _in_processes(starts, workers, failed)
-        starts = failed
+        starts = yield from _in_processes(starts, workers)
     for one in starts:
-        while not one.ended:
-            one = one.next()
-            yield one
+        yield from one.stages()
 
 
 def serve() -> None:
-    """Do the stages that come on standard input; their results go to standard output."""
+    """Improve the starts that come on standard input; their stages go to standard output."""
     # Whatever else is printed, by a solver say, must not mix with the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     with answers, suppress(EOFError):
         while True:
-            pickle.dump(pickle.load(sys.stdin.buffer).next(), answers)
-            answers.flush()
+            for stage in pickle.load(sys.stdin.buffer).stages():
+                pickle.dump(stage, answers)
+                answers.flush()
 
 
 def _in_processes(
-    starts: Sequence[Improvement], workers: int, failed: list[Improvement]
-) -> Iterator[Improvement]:
-    """Yield every start after each of its stages, and note those whose processes fail."""
-    idle: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
+    starts: Sequence[Improvement], workers: int
+) -> Generator[Stage, None, list[Improvement]]:
+    """Yield every stage of all starts, and return those starts whose processes fail."""
+    left, failed = list(reversed(starts)), []
+    told: SimpleQueue[Stage | None] = SimpleQueue()
 
-    def next_stage(one: Improvement) -> Improvement:
-        process = idle.get()
+    def work(process: subprocess.Popen[bytes]) -> None:
+        assert process.stdin is not None
+        assert process.stdout is not None
         try:
-            assert process.stdin is not None
-            assert process.stdout is not None
-            pickle.dump(one, process.stdin)
-            process.stdin.flush()
-            answer: Improvement = pickle.load(process.stdout)
-            return answer
+            while left:
+                failed.append(one := left.pop())
+                pickle.dump(one, process.stdin)
+                process.stdin.flush()
+                while not (stage := pickle.load(process.stdout)).ended:
+                    told.put(stage)
+                told.put(stage)
+                failed.remove(one)
+        except (OSError, EOFError, IndexError, pickle.UnpicklingError):
+            pass  # what it was to do has failed, or nothing is left
         finally:
-            idle.put(process)
+            told.put(None)
 
-    pool = ThreadPoolExecutor(workers)
     with ExitStack() as ends:
-        # Last in, first out: no new work, no processes, then no threads that wait for them.
-        ends.enter_context(pool)
+        # Last in, first out: no processes, then no threads that wait for them.
+        pool = ends.enter_context(ThreadPoolExecutor(workers))
+        works = []
         for _ in range(workers):
             process = _started()
             ends.callback(_end, process)
-            idle.put(process)
-        ends.callback(pool.shutdown, wait=False, cancel_futures=True)
-        running = {pool.submit(next_stage, one): one for one in starts}
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                before = running.pop(future)
-                try:
-                    one = future.result()
-                except (OSError, EOFError, pickle.UnpicklingError):
-                    failed.append(before)
-                    continue
-                yield one
-                if not one.ended:
-                    running[pool.submit(next_stage, one)] = one
+            works.append(pool.submit(work, process))
+        for _ in works:
+            yield from iter(told.get, None)
+        for each in works:
+            each.result()
+    return failed + left
 
 
 def _started() -> subprocess.Popen[bytes]:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import ModelError
 from pteron.identification.excitation.fourier import FourierMotion
-from pteron.identification.excitation.limits import Limits
+from pteron.identification.excitation.limits import PER_JOINT, Limits
 from pteron.identification.excitation.margins import Margins, margins, relative_margins
 from pteron.identification.excitation.random_motions import is_clear
 from pteron.identification.signals.states import FullMotion
@@ -171,9 +171,7 @@ def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
 def _room(led: LedMotion, limits: Limits, samples: int) -> float:
     """Return the least relative margin of a movement to what depends on how fast it goes."""
     found = relative_margins(led, limits, np.linspace(0.0, led.duration, samples))
-    return min(
-        float(found[name].min()) for name in ("speed", "acceleration", "force") if name in found
-    )
+    return min(float(found[name].min()) for name in PER_JOINT if name in found)
 
 
 def _set_off(times: Array, span: float) -> tuple[Array, Array, Array]:

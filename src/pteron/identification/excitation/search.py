@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
+from pteron.arguments import expect_one_of
 from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import (
     Conditioning,
@@ -251,18 +252,16 @@ class _Search:
         weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
         with closing(improved(tasks, workers)) as stages:
             for one in stages:
-                share[one.number] = 1.0 if one.ended else one.stage / (plan.stages + 1)
-                self.take(one, starts[one.number])
+                share[one.number] = 1.0 if one.ended else one.done / (plan.stages + 1)
+                start = starts[one.number]
+                start.finished = start.finished or (one.finished and plan.thorough)
+                if one.found is not None:
+                    start.best = min(start.best, self.judged(one.found), key=self.cost)
                 self.report(seen + weight * sum(share) / len(share))
 
     def report(self, share: float) -> None:
         self.seen = share
         self.progress(share)
-
-    def take(self, one: Improvement, start: _Started) -> None:
-        start.finished = start.finished or (one.finished and one.plan.thorough)
-        if one.improved:
-            start.best = min(start.best, self.judged(one.safe), key=self.cost)
 
     def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:
         random = min(self.drawn, key=self.cost)
@@ -278,8 +277,7 @@ class _Search:
 
 
 def _check(criterion: str, starts: int, draws: int, seconds: float) -> None:
-    if criterion not in get_args(Criterion):
-        raise DataError(f'criterion: {criterion!r} is neither "condition" nor "logdet"')
+    expect_one_of(get_args(Criterion), criterion=criterion)
     for name, value in (("starts", starts), ("draws", draws)):
         if value < 1:
             raise DataError(f"{name}: {value} given, 1 or more expected")

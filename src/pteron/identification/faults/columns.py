@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import chain, pairwise
+from itertools import pairwise
 
 import numpy as np
 
 from pteron.equations.friction import passive_joints
+from pteron.identification.extended_model import ExtendedModel
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
 from pteron.identification.model import Model, diagonal
@@ -176,7 +177,7 @@ def _scale(i: int) -> Family:
 
 @dataclass(frozen=True)
 class FaultColumns:
-    """A model with the columns of faults behind its own; `observations_of` takes it as a model.
+    """A model with the columns of faults behind its own.
 
     `values` (p,) are those of the fit, `begin` and `end` the times of the log, s; `usual` (n,),
     `stride` and `cutoff` are those of `FittedMotion`.
@@ -191,40 +192,18 @@ class FaultColumns:
     stride: int = 1
     cutoff: float | None = None
 
-    @property
-    def robot(self) -> Manipulator:
-        """The machine."""
-        return self.model.robot
-
-    @cached_property
-    def sizes(self) -> tuple[Sequence[str], ...]:
-        """Labels of the sizes of each family."""
-        return tuple(family.sizes(self.model) for family in self.families)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all columns."""
-        return (*self.model.names, *chain.from_iterable(self.sizes))
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Units of the sizes of all columns."""
-        return (*self.model.units, *self._repeated([family.unit for family in self.families]))
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """The model's kinds, and the fault of each other column."""
-        return (*self.model.kinds, *self._repeated([family.name for family in self.families]))
-
-    def _repeated(self, told: Sequence[str]) -> list[str]:
-        found = zip(told, self.sizes, strict=True)
-        return [text for text, sizes in found for _ in sizes]
-
     @cached_property
     def places(self) -> tuple[slice, ...]:
         """Columns of each family among all."""
-        ends = np.cumsum([len(self.model.names), *map(len, self.sizes)]).tolist()
+        counts = (len(family.sizes(self.model)) for family in self.families)
+        ends = np.cumsum([len(self.model.names), *counts]).tolist()
         return tuple(slice(a, b) for a, b in pairwise(ends))
+
+    @property
+    def whole(self) -> ExtendedModel:
+        """The model with all columns behind its own."""
+        count = self.places[-1].stop - len(self.model.names)
+        return ExtendedModel(self.model, count, self.matrix)
 
     def motion(self, states: States, along: Array, stride: int = 1) -> FittedMotion:
         """Return the motion that columns are made of, at times `along` (R,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -59,25 +60,16 @@ class ReferenceCycle:
         `size` is over the largest size that fits; None where none does.
         """
         for around in (extent.pose, np.array(home(robot))):
+            within = partial(pick_and_place, robot, around, samples=_SAMPLES)
             try:
-                slow = pick_and_place(robot, around, duration=1.0, samples=_SAMPLES)
+                slow = within(duration=1.0)
             except PteronError:
                 continue
             gone = _whole(robot, slow)
-            duration = max(
-                float((np.abs(gone.rates).max(axis=0) / extent.rates).max()),
-                float(
-                    np.sqrt((np.abs(gone.accelerations).max(axis=0) / extent.accelerations).max())
-                ),
-            )
-            motion = pick_and_place(
-                robot,
-                around,
-                scale=size * slow.scale,
-                direction=slow.across,
-                duration=duration,
-                samples=_SAMPLES,
-            )
+            rate = np.abs(gone.rates).max(axis=0) / extent.rates
+            acceleration = np.abs(gone.accelerations).max(axis=0) / extent.accelerations
+            duration = float(np.maximum(rate, np.sqrt(acceleration)).max())
+            motion = within(scale=size * slow.scale, direction=slow.across, duration=duration)
             gone = _whole(robot, motion)
             rates = np.abs(gone.rates)
             return cls(States.of(motion.time, gone), rates > _MOVES * rates.max(axis=0))

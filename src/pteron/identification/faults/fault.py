@@ -42,15 +42,26 @@ the next belongs to the instant between them."""
 _CYCLE_OF_SAMPLING = 3.0
 """Percent of a reference cycle's forces above which a delay of sampling matters all the same."""
 
-_CLEAREST = {
-    "geometry": "Lengths or points of the geometry are off, most clearly in",
-    "stribeck": "Friction falls with speed, most clearly at",
-    "elasticity": "The drives give, most clearly under",
-    "drift": "Friction or offset changes during the log, most clearly at",
-    "load": "Friction grows with the load, most clearly at",
-    "passive": "Passive joints have friction, most clearly in",
+_SENTENCES = {
+    "delay": "The {late} are {size_ms:.3g} ms (+- {error_ms:.1g}) late for the {early}",
+    "sampling": "The {late} are half a sample ({size_ms:.3g} ms) late for the {early}, as where "
+    "forces are held from sample to sample",
+    "scale": "{label} is {percent:.2g} % (+- {error:.1g}) too {more} beside the others",
+    "gravity": "Gravity is {tilt:.2g} degrees (+- {tilt_error:.1g}) off the direction in the model",
+    "gain": "All forces are {percent:.3g} % (+- {error:.1g}) too {more} for what is known",
+    "clock": "The weight is {percent:.2g} % (+- {error:.1g}) too {more} for the inertia, as where "
+    "the log's clock runs {clock:.2g} % {pace}",
+    "sign": "The weight acts the other way: gravity has the wrong sign",
+    "geometry": "Lengths or points of the geometry are off, most clearly in {clearest}",
+    "stribeck": "Friction falls with speed, most clearly at {clearest}",
+    "elasticity": "The drives give, most clearly under {clearest}",
+    "drift": "Friction or offset changes during the log, most clearly at {clearest}",
+    "load": "Friction grows with the load, most clearly at {clearest}",
+    "passive": "Passive joints have friction, most clearly in {clearest}",
+    "play": "Residuals of {labels} are {times:.2g} times as large where the load changes "
+    "direction, as where a drive has play",
 }
-"""Sentences that end in the label of the size that is clearest."""
+"""Sentences on the faults, on a delay of sampling, and on gravity that acts the other way."""
 
 _REMEDY: dict[FaultName, str] = {
     "delay": "--delay auto takes it out",
@@ -135,41 +146,27 @@ class IsolatedFault:
         }
 
     def _sentence(self) -> str:
-        first, size, error = self.sizes[0], abs(self.sizes[0]), self.deviations[0]
-        percent = f"{100.0 * size:.2g} % (+- {100.0 * error:.1g})"
-        more = "large" if first > 0.0 else "small"
-        match self.fault:
-            case "delay":
-                late, early = ("forces", "positions")[:: 1 if first > 0.0 else -1]
-                if self.of_sampling:
-                    return (
-                        f"The {late} are half a sample ({1e3 * size:.3g} ms) late for the {early}, "
-                        "as where forces are held from sample to sample"
-                    )
-                error = f"+- {1e3 * error:.1g}"
-                return f"The {late} are {1e3 * size:.3g} ms ({error}) late for the {early}"
-            case "scale":
-                return f"{self.labels[0]} is {percent} too {more} beside the others"
-            case "gravity":
-                tilt, error = np.degrees([np.linalg.norm(self.sizes), self.deviations.max()])
-                return (
-                    f"Gravity is {tilt:.2g} degrees (+- {error:.1g}) off the direction in the model"
-                )
-            case "play":
-                return (
-                    f"Residuals of {', '.join(self.labels)} are {self.sizes.max():.2g} times as "
-                    "large where the load changes direction, as where a drive has play"
-                )
-            case "gain":
-                size, error = 100.0 * size, 100.0 * error
-                return f"All forces are {size:.3g} % (+- {error:.1g}) too {more} for what is known"
-            case "clock":
-                if first <= -1.0:
-                    return "The weight acts the other way: gravity has the wrong sign"
-                rate = (1.0 + first) ** -0.5 - 1.0
-                return (
-                    f"The weight is {percent} too {more} for the inertia, as where the log's clock "
-                    f"runs {100.0 * abs(rate):.2g} % {'slow' if rate < 0.0 else 'fast'}"
-                )
+        first, told = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
+        if told == "clock" and first <= -1.0:
+            told = "sign"
+        size, error = abs(first), float(self.deviations[0])
+        late, early = ("forces", "positions")[:: 1 if first > 0.0 else -1]
+        clock = max(1.0 + first, 1e-300) ** -0.5 - 1.0
         clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
-        return f"{_CLEAREST[self.fault]} {self.labels[clearest]}"
+        return _SENTENCES[told].format(
+            label=self.labels[0],
+            labels=", ".join(self.labels),
+            times=float(self.sizes.max()),
+            clearest=self.labels[clearest],
+            late=late,
+            early=early,
+            size_ms=1e3 * size,
+            error_ms=1e3 * error,
+            percent=100.0 * size,
+            error=100.0 * error,
+            more="large" if first > 0.0 else "small",
+            tilt=np.degrees(np.linalg.norm(self.sizes)),
+            tilt_error=np.degrees(self.deviations.max()),
+            clock=100.0 * abs(clock),
+            pace="slow" if clock < 0.0 else "fast",
+        )

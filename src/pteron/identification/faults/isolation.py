@@ -18,7 +18,7 @@ from pteron.identification.faults.play import Record, knocks
 from pteron.identification.faults.search import FoundFault, cannot_be_told, searched
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import in_motion, observations_of, stacked
+from pteron.identification.observation import Observations, in_motion, observations_of, stacked
 from pteron.identification.plausibility import factor_of_forces, known_values
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import (
@@ -162,7 +162,7 @@ def _isolated(
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
 
     # Which faults the residuals show
-    observations = stacked([observations_of(part.model, part.log, part.how) for part in parts])
+    observations = _observed(parts)
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
     left_open = cannot_be_told(columns, observations, noise)
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
@@ -171,7 +171,7 @@ def _isolated(
         # A long delay is no small one: the rest is told once forces are where they belong.
         late, shifted = _delay(parts)
         rest = tuple(one for one in columns.families if one is not DELAY)
-        fit, found = _searched_for(shifted, rest)
+        fit, found = _searched_for(rest, shifted)
         if late is not None:
             found.insert(0, replace(late, fit=fit))
 
@@ -335,32 +335,29 @@ def _unaveraged(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
     return replace(again, slow=how.slow, delay=how.delay)
 
 
+def _observed(parts: Sequence[_Part]) -> Observations:
+    return stacked([observations_of(part.model.whole, part.log, part.how) for part in parts])
+
+
 def _searched_for(
-    parts: Sequence[_Part], families: tuple[Family, ...]
+    families: tuple[Family, ...], parts: Sequence[_Part]
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and which of some faults they show."""
-    models = [replace(part.model, families=families) for part in parts]
-    each = zip(models, parts, strict=True)
-    observations = stacked([observations_of(model, part.log, part.how) for model, part in each])
-    return searched(models[0], observations)
+    some = [replace(part, model=replace(part.model, families=families)) for part in parts]
+    return searched(some[0].model, _observed(some))
 
 
 def _delay(parts: Sequence[_Part]) -> tuple[FoundFault | None, list[_Part]]:
     """Return the whole delay of logs' forces, and the parts with it taken out."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
-        _, found = _searched_for(shifted, (DELAY,))
+        _, found = _searched_for((DELAY,), shifted)
         if not found:
             break
         first, late = late or found[0], found[0]
-        more = float(late.sizes[0])
-        shifted = [
-            replace(
-                part,
-                how=replace(part.how, delay=float(np.clip(part.how.delay + more, -LATEST, LATEST))),
-            )
-            for part in shifted
-        ]
+        delay = shifted[0].how.delay + float(late.sizes[0])
+        delay = min(max(delay, -LATEST), LATEST)
+        shifted = [replace(part, how=replace(part.how, delay=delay)) for part in shifted]
     if late is not None:
         whole = np.array([shifted[0].how.delay - parts[0].how.delay])
         late = replace(late, sizes=whole, chance=first.chance)

@@ -209,7 +209,7 @@ def _taken_in(
 
 def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
     """Return what share of Wald's statistic lengths explain that are off by usual errors alone."""
-    spread = _LENGTH * float(np.mean([leg.size for leg in model.robot.legs]))
+    spread = _LENGTH * float(np.mean([leg.size for leg in model.model.robot.legs]))
     back = spread * np.linalg.pinv(mix)
     both = back @ back.T + covariance
     # The most likely sizes leave C (C0 + C)^-1 of what was found.

@@ -66,10 +66,8 @@ def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.
     drives = [leg.drive or Drive() for leg in robot.legs]
     if not needed:
         return np.ones(len(drives))
-    each = [(drive.counts_per_turn or 1.0) * drive.gear for drive in drives]
-    if joints.units[0] == "turns":
-        each = [drive.gear for drive in drives]
-    return 2.0 * np.pi / np.array(each)
+    counts = [(d.counts_per_turn if len(needed) > 1 else None) or 1.0 for d in drives]
+    return 2.0 * np.pi / (np.array(counts) * [d.gear for d in drives])
 
 
 def by_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
@@ -105,12 +103,7 @@ def per_cent_advice(robot: Manipulator) -> str:
 
 def _lacking(robot: Manipulator, names: tuple[str, ...]) -> str:
     """Return which of a drive's values some leg has not, with the legs; empty if none."""
-    legs = [
-        i
-        for i, leg in enumerate(robot.legs, start=1)
-        if any(getattr(leg.drive, name, None) is None for name in names)
-    ]
-    absent = [
-        name for name in names if any(getattr(leg.drive, name, None) is None for leg in robot.legs)
-    ]
-    return f"{' and '.join(absent)} (legs {', '.join(map(str, legs))})" if absent else ""
+    given = [[getattr(leg.drive, name, None) is not None for name in names] for leg in robot.legs]
+    legs = [str(i) for i, one in enumerate(given, start=1) if not all(one)]
+    absent = [name for k, name in enumerate(names) if not all(one[k] for one in given)]
+    return f"{' and '.join(absent)} (legs {', '.join(legs)})" if absent else ""

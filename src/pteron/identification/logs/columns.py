@@ -63,16 +63,11 @@ def find_columns(
         Wanted("joints", one.coordinate, f"{one.noun}s", one.unit, unit)
         for one, unit in zip(joints, d.joint_units(robot), strict=True)
     ]
-    si = d.column_force_unit in ("N", "N m")
+    raw = d.column_force_unit
+    units_of_forces = [one.force_unit if raw in ("N", "N m") else raw for one in joints]
     actuators = [
-        Wanted(
-            "forces",
-            one.force,
-            f"{one.force}s",
-            one.force_unit,
-            one.force_unit if si else d.column_force_unit,
-        )
-        for one in joints
+        Wanted("forces", one.force, f"{one.force}s", one.force_unit, unit)
+        for one, unit in zip(joints, units_of_forces, strict=True)
     ]
     numbers = range(1, len(joints) + 1)
     time = search.time(Wanted("time", "t", "time", "s", d.time_unit), d.time_column)

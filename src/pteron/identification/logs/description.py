@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic.dataclasses import dataclass
 
-from pteron.bodies.inertia import SpatialInertia
+from pteron.bodies.inertia import PlanarInertia, SpatialInertia
 from pteron.errors import DataError, shown
 from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
@@ -52,9 +52,6 @@ MotorUnit = Literal["turns", "counts"]
 
 JointUnit = Literal["m", "mm", "um", "rad", "deg", "turns", "counts"]
 """All units that joint positions may have."""
-
-_ROUNDING = 1e-12
-"""Share of an inertia that counts as rounding."""
 
 _OF_DRIVES = ("A", "V", "%")
 """Units of forces that need gains to become newtons."""
@@ -162,14 +159,9 @@ class KnownPayload:
                 "about P with three"
             )
         if isinstance(self.inertia, tuple):
-            SpatialInertia.of_values([self.mass, *self.first_moment, *self.inertia])
-            return self
-        least = sum(h * h for h in self.first_moment) / self.mass
-        if not self.inertia >= least * (1.0 - _ROUNDING):
-            raise ValueError(
-                f"inertia: {self.inertia:g} kg m^2 belongs to no real body; with this mass and "
-                f"centre of mass, and about P, it must be at least {least:g} kg m^2"
-            )
+            SpatialInertia.of_values(self.values)
+        elif any(self.values[1:]):  # more than the mass is known
+            PlanarInertia.of_values(self.values)
         return self
 
     @property

@@ -29,7 +29,7 @@ _AROUND = 16
 _LATER = 0.5
 """Usual steps, at least, by which all rows after a missing sample come later."""
 
-_ARRAYS = ("time", "joints", "forces", "pose", "payload")
+_ARRAYS = ("time", "joints", "forces", "pose", "payload", "rows_in_file")
 """Fields of a log with a row for each sample."""
 
 _Phases = Int[np.ndarray, "*batch"]
@@ -200,14 +200,10 @@ class Log:
         The findings stay those of the whole file; their rows are rows of the file.
         """
         start, stop, _ = slice(start, stop).indices(self.rows)
-        parts = {name: getattr(self, name) for name in (*_ARRAYS, "rows_in_file")}
-        changed: dict[str, Any] = {
-            name: None if values is None else values[start:stop] for name, values in parts.items()
-        }
         first = self.first_row + start
         if self.rows_in_file is not None and start < self.rows:
             first = int(self.rows_in_file[start])
-        return replace(self, **changed, first_row=first)
+        return replace(self._taken(slice(start, stop)), first_row=first)
 
     def with_gains(self, description: Description, finding: Finding) -> Log:
         """Return the log with the gains of a description, which a finding tells."""
@@ -217,16 +213,20 @@ class Log:
 
     def without(self, rows: NDArray[np.bool_]) -> Log:
         """Return the samples without some, (T,): where they were is a gap."""
-        kept = np.flatnonzero(~rows)
-        parts = {name: getattr(self, name) for name in _ARRAYS}
+        return replace(self, rows_in_file=_rows_of(self))._taken(np.flatnonzero(~rows))
+
+    def _taken(self, rows: slice | NDArray[np.int64]) -> Log:
+        held = {name: getattr(self, name) for name in _ARRAYS}
         changed: dict[str, Any] = {
-            name: None if values is None else values[kept] for name, values in parts.items()
+            name: values[rows] for name, values in held.items() if values is not None
         }
-        return replace(self, **changed, rows_in_file=_rows_of(self)[kept])
+        return replace(self, **changed)
 
 
 def joined(pieces: Sequence[Log]) -> Log:
     """Return pieces that follow each other as one log, with what is said of the first."""
+    if len(pieces) > 1 and any(piece.rows_in_file is not None for piece in pieces):
+        pieces = [replace(piece, rows_in_file=_rows_of(piece)) for piece in pieces]
     first = pieces[0]
     if len(pieces) == 1:
         return first
@@ -235,8 +235,6 @@ def joined(pieces: Sequence[Log]) -> Log:
         for name in _ARRAYS
         if getattr(first, name) is not None
     }
-    if any(piece.rows_in_file is not None for piece in pieces):
-        changed["rows_in_file"] = np.concatenate([_rows_of(piece) for piece in pieces])
     return replace(first, **changed)
 
 

@@ -65,12 +65,8 @@ class ColumnSearch(ColumnNames):
             raise self.ambiguous(kind, [one[:1] for one in stamps])
         else:
             columns = tuple(self.family(kind, [0])[0])
-        named = self.unit_of(columns[0], kind) if len(columns) == 1 else None
-        unit = self.unit(kind, named)
-        self.taken.update(columns)
         guessed = declared is None and columns != ("t",)
-        said = (kind.declared or named) is not None
-        return Group(columns, (unit,) * len(columns), said, guessed or named is not None, guessed)
+        return self._in_units([kind] * len(columns), columns, guessed=guessed)
 
     def group(
         self,
@@ -79,24 +75,33 @@ class ColumnSearch(ColumnNames):
         numbers: Sequence[int],
     ) -> Group:
         """Return the columns wanted, one for each number, that are declared or called alike."""
-        columns, units, said = [""] * len(wanted), [""] * len(wanted), True
-        told = guessed = False
+        if declared is not None:
+            columns = self.declared(wanted[0].table, declared)
+            return self._in_units(wanted, columns, guessed=False)
+        found, guessed = dict[int, str](), False
         for kind in dict.fromkeys(wanted):
-            at = [j for j, one in enumerate(wanted) if one == kind]
-            if declared is not None:
-                found = [self.declared(kind.table, declared)[j] for j in at]
-                named = self.common_unit(found, kind)
-                told = told or (named is not None and not kind.declared)
-            else:
-                found, by_name = self.family(kind, [numbers[j] for j in at])
-                named = self.common_unit(found, kind)
-                guessed = guessed or by_name
-            unit = self.unit(kind, named)
+            own = [i for i, one in zip(numbers, wanted, strict=True) if one == kind]
+            names, by_name = self.family(kind, own)
+            found |= zip(own, names, strict=True)
+            guessed = guessed or by_name
+        columns = [found[i] for i in numbers]
+        # Names that are documented say their units as documented.
+        return self._in_units(wanted, columns, guessed=guessed)._replace(told=guessed)
+
+    def _in_units(
+        self, wanted: Sequence[Wanted], columns: Sequence[str], *, guessed: bool
+    ) -> Group:
+        """Return columns of what is wanted with their units; lengths have one, and angles."""
+        units, said, told = dict[str, str](), True, guessed
+        for kind in {one.unit: one for one in wanted}.values():
+            alike = zip(columns, wanted, strict=True)
+            named = self.common_unit([c for c, one in alike if one.unit == kind.unit], kind)
+            units[kind.unit] = self.unit(kind, named)
             said = said and (kind.declared or named) is not None
-            for j, name in zip(at, found, strict=True):
-                columns[j], units[j] = name, unit
+            told = told or (named is not None and not kind.declared)
         self.taken.update(columns)
-        return Group(tuple(columns), tuple(units), said, told or guessed, guessed)
+        each = tuple(units[one.unit] for one in wanted)
+        return Group(tuple(columns), each, said, told, guessed)
 
     def matches(self, kind: Wanted) -> Iterator[tuple[str, Called]]:
         """Yield the columns that are called by a word for it, in a unit of it if in any."""
@@ -154,17 +159,8 @@ class ColumnSearch(ColumnNames):
                 first = shown(columns[0], bare=True)
                 self.findings.append(Finding("guessed", message, column=first, count=len(columns)))
             return Group()
-        named = [self.unit_of(name, one) for name, one in zip(columns, wanted, strict=True)]
-        kinds = {one.unit: one for one in wanted}
-        told = {one.unit: unit for one, unit in reversed([*zip(wanted, named, strict=True)])}
         guessed = declared is None and columns != stems
-        if any(unit != told[one.unit] for one, unit in zip(wanted, named, strict=True)):
-            raise self.ambiguous(wanted[0], [columns])
-        units = {si: self.unit(one, told[si]) for si, one in kinds.items()}
-        heard = guessed or any(told[si] and not one.declared for si, one in kinds.items())
-        return Group(
-            tuple(columns), tuple(units[one.unit] for one in wanted), told=heard, guessed=guessed
-        )
+        return self._in_units(wanted, columns, guessed=guessed)
 
     def lone(self, kind: Wanted) -> list[str]:
         """Return the column without a number that may be meant, if any."""
@@ -217,8 +213,9 @@ class ColumnSearch(ColumnNames):
         if len(units) > 1 and kind.declared is None:
             said = ", ".join(unit or "no unit" for unit in units)
             raise DataError(
-                f"{self.source}: {listed(columns)} are in {said}; {kind.noun} have one unit: say "
-                "which in a TOML file beside it:" + declaration(kind.table, unit=kind.unit)
+                f"{self.source}: {listed(columns)} are in {said}; the {kind.noun} columns have one "
+                "unit: say which in a TOML file beside it:"
+                + declaration(kind.table, **{self.unit_key(kind): kind.unit})
             )
         words = {parts.word for parts in map(called, columns) if parts}
         if kind.declared is None and words & set(RATED) and None in units:

@@ -92,9 +92,8 @@ class FittedSeries(FourierSeries):
         if not delay:
             return self
         turn = delay * 2.0 * np.pi / self.period * np.arange(1, self.harmonics + 1)[:, None]
-        cos, sin = np.cos(turn), np.sin(turn)
-        a, b = np.array(self.cosines), np.array(self.sines)
-        return replace(self, cosines=cos * a - sin * b, sines=cos * b + sin * a)
+        turned = (np.array(self.cosines) + 1j * np.array(self.sines)) * np.exp(1j * turn)
+        return replace(self, cosines=turned.real, sines=turned.imag)
 
 
 def fitted_series(
