@@ -232,6 +232,17 @@ def test_margins_are_those_between_the_directions_of_a_cycle_too(chosen):
     assert one.figures["peak_margin"] <= 1.003 * (most / np.abs(forces)).min()
 
 
+def test_rounded_corners_of_a_cycle_are_seen_in_time():
+    up, across = 0.01, 0.08
+    points = [[-across, 0, -up], [-across, 0, up], [across, 0, up], [across, 0, -up]]
+    cycle = {"points": points, "corner": 0.015, "duration": 0.4}
+    (case,) = cases_of(of(cycles=[cycle])).values()
+    (places,) = case.every_cycle
+    fine = replace(places.at(np.array([0])), samples=5001).states[2]
+    seen = places.both_ways().states[2]
+    assert np.linalg.norm(seen, axis=-1).max() > 0.98 * np.linalg.norm(fine, axis=-1).max()
+
+
 def test_guides_tools_and_thin_posts_count_as_room():
     tool = {"mass": 0.3, "tool": [0.0, 0.0, -0.2]}
     case = cases_of(of(payload=tool, cell={"margin": 0.0}))["linear-delta"]

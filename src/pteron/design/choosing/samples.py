@@ -38,8 +38,8 @@ _DIRECTIONS = 4
 _PLACES = 64
 """Most places of a cycle that a search looks at."""
 
-_IN_CYCLE = 49
-"""Samples of a cycle."""
+_IN_CYCLE, _IN_CYCLE_LAST = 49, 129
+"""Samples of a cycle, in a search and at last: peaks at a rounded corner are short."""
 
 _SHARES = np.linspace(1.0, 0.0, 21)
 """Shares of the way to a corner at which a cycle is tried."""
@@ -73,6 +73,8 @@ class Places:
         How often it is done in a duty cycle of all; 0 where each counts by itself.
     anywhere : bool
         Whether it may be at other places and in other directions.
+    samples : int
+        In time.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Places:
     dwell: float
     share: float
     anywhere: bool = True
+    samples: int = _IN_CYCLE
 
     def words(self, k: int) -> str:
         """Return place k in words."""
@@ -103,20 +106,19 @@ class Places:
         return replace(self, shifts=self.shifts[chosen], turns=self.turns[chosen])
 
     def both_ways(self) -> Places:
-        """Return it at its places and, turned round, at those opposite."""
-        count = min(2, len(self.robot.platform.lengths))
+        """Return it, finer in time, at its places and, turned round, at those opposite."""
+        fine = replace(self, samples=_IN_CYCLE_LAST)
+        if not self.anywhere:
+            return fine
         opposite = self.shifts.copy()
-        opposite[:, :count] *= -1.0
-        shifts, turns = (
-            np.vstack([self.shifts, opposite]),
-            np.append(self.turns, self.turns + np.pi),
-        )
-        return replace(self, shifts=shifts, turns=turns) if self.anywhere else self
+        opposite[:, : min(2, len(self.robot.platform.lengths))] *= -1.0
+        turns = np.append(self.turns, self.turns + np.pi)
+        return replace(fine, shifts=np.vstack([self.shifts, opposite]), turns=turns)
 
     @cached_property
     def states(self) -> Curve:
         """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s."""
-        curve = _timed(self.path, np.linspace(0.0, 1.0, _IN_CYCLE))
+        curve = _timed(self.path, np.linspace(0.0, 1.0, self.samples))
         return self.moved(*curve)
 
     def moved(self, *curve: Array) -> Curve:
