@@ -6,26 +6,36 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 import tomlkit
 from mechanisms import CLIENTS
+from scipy.spatial.transform import Rotation
 from test_cli import done, refused, run
 
 import pteron
 from pteron.design import Job, choose_machine
 from pteron.design.choosing.choose import cases_of
-from pteron.design.choosing.proofs import regions
+from pteron.design.choosing.margins import margins_of
+from pteron.design.choosing.proofs import regions, told
 from pteron.design.choosing.rating import Rating
 from pteron.design.choosing.room import tool_places
-from pteron.design.choosing.samples import about_the_worst, sample_poses
+from pteron.design.choosing.samples import (
+    about_the_worst,
+    sample_poses,
+    with_tool_in_the_middle,
+)
 from pteron.design.choosing.search import search_kind
 from pteron.design.worst_cases import worst_forces
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError
-from pteron.kinematics import inverse_kinematics
+from pteron.kernels import numeric
+from pteron.kinematics import inverse_kinematics, pose_of
 from pteron.motion import along, line_path, with_payload
+from pteron.report.choice.write import write_choice
 from pteron.workspace import Box, clearance, pose_margins, prove
 
 JOB = {
@@ -49,13 +59,19 @@ def chosen(tmp_path_factory):
     return choose_machine(of(), folder=folder), folder
 
 
-def test_a_chosen_machine_keeps_what_was_asked(chosen, tmp_path):
+def loaded(one):
+    """Return the machine of a candidate, from its file."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "machine.toml"
+        file.write_text(one.robot)
+        return pteron.load(file)
+
+
+def test_a_chosen_machine_keeps_what_was_asked(chosen):
     one = chosen[0].best
     assert one.serves
     assert "proved" in one.proved
-    file = tmp_path / "machine.toml"
-    file.write_text(one.robot)
-    robot = pteron.load(file)
+    robot = loaded(one)
     rng = np.random.default_rng(0)
     middle, half = np.array(one.middle), np.array([0.1, 0.1, 0.025])
     poses = middle + rng.uniform(-1.0, 1.0, (2000, 3)) * half
@@ -184,6 +200,77 @@ def test_worse_places_stay_in_the_workspace(space):
     assert len(where) == 3
 
 
+def test_a_cycle_between_the_poses_of_a_list_keeps_the_limits():
+    space = {"poses": [[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]]}
+    ends = np.array([[-0.15, 0.1, -0.05], [0.15, -0.1, 0.05]])
+    cycle = {"points": ends.tolist(), "duration": 0.5, "anywhere": False}
+    (case,) = cases_of(of(workspace=space, cycles=[cycle], accuracy=None)).values()
+    kept = next(one for one in search_kind(case, 20, 0) if not one.misses)
+    low, high = np.array([leg.limits for leg in kept.robot.legs]).T
+    line = ends[0] + np.linspace(0.0, 1.0, 41)[:, None] * (ends[1] - ends[0])
+    joints = inverse_kinematics(kept.robot, kept.middle + line)
+    assert (joints >= low).all()
+    assert (joints <= high).all()
+    assert "so do the cycles between them" in told(case, [])
+
+
+def test_margins_are_those_between_the_directions_of_a_cycle_too(chosen):
+    # In a cylinder a line is farthest out beside its middle, where no corner of a box is.
+    one = chosen[0].best
+    (case,) = cases_of(of(workspace={"radius": 0.1, "height": 0.05})).values()
+    carrying = with_payload(loaded(one), 0.3)
+    most = np.array([leg.drive.max_force for leg in carrying.legs])
+    found = margins_of(case, carrying, np.array(one.middle), None)
+    turns, tau = np.radians(np.arange(0.0, 360.0, 3.0)), np.linspace(0.0, 1.0, 61)
+    ways = np.c_[np.cos(turns), np.sin(turns), 0.0 * turns]
+    across = np.c_[-np.sin(turns), np.cos(turns), 0.0 * turns]
+    places = [0.06 * across + [0.0, 0.0, z] for z in (-0.025, 0.025)]
+    places = np.array(places).reshape(-1, 1, 3)
+    line = 0.16 * np.tile(ways, (2, 1))[:, None]
+    # A quintic from rest to rest in 0.3 s.
+    share = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2) - 0.5
+    rate = 30.0 * tau**2 * (1.0 - tau) ** 2 / 0.3
+    gain = 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau) / 0.3**2
+    at = np.array(one.middle) + places + line * share[:, None]
+    forces = drive_forces(carrying, at, line * rate[:, None], line * gain[:, None])
+    assert found.figures["peak_margin"] <= 1.003 * (most / np.abs(forces)).min()
+
+
+def test_rounded_corners_of_a_cycle_are_seen_in_time():
+    up, across = 0.01, 0.08
+    points = [[-across, 0, -up], [-across, 0, up], [across, 0, up], [across, 0, -up]]
+    cycle = {"points": points, "corner": 0.015, "duration": 0.4}
+    (case,) = cases_of(of(cycles=[cycle])).values()
+    (places,) = case.every_cycle
+    fine = replace(places.at(np.array([0])), samples=5001).states[2]
+    seen = places.both_ways().states[2]
+    assert np.linalg.norm(seen, axis=-1).max() > 0.98 * np.linalg.norm(fine, axis=-1).max()
+
+
+def test_guides_tools_and_thin_posts_count_as_room():
+    tool = {"mass": 0.3, "tool": [0.0, 0.0, -0.2]}
+    case = cases_of(of(payload=tool, cell={"margin": 0.0}))["linear-delta"]
+    robot, middle = case.kind.machine(case.kind.ranges.mean(axis=0))
+    legs = tuple(replace(leg, limits=(-3.0, 3.0)) for leg in robot.legs)
+    robot = replace(robot, legs=legs)
+    sizes, _ = case.room.within(case.room.taken(robot, middle[None], middle)[0])
+    assert sizes["height"] == pytest.approx(6.0), "guides reach from end to end"
+
+    def lacks(low, high):
+        box = {"low": list(low), "high": list(high)}
+        room = cases_of(of(payload=tool, keep_out=[box], cell={"margin": 0.0}))["linear-delta"].room
+        return "keep-out" in room.within(room.taken(robot, middle[None], middle)[0])[1]
+
+    # A box of 2 mm about a point of a rod, of a guide, and of what leads to the tool.
+    center = tool_places(robot, middle[None])[0]
+    chain = np.asarray(numeric(robot, "joint_points")(middle[None])[0])[0, 0]
+    ends = chain[[2, 3]]
+    guide = np.array(robot.legs[1].guide_point) - 2.5 * np.array(robot.legs[1].joint_axis)
+    for point in (ends.T @ [0.63, 0.37], guide, center + np.array([0.0, 0.0, 0.11])):
+        assert lacks(point - center - 1e-3, point - center + 1e-3)
+        assert not lacks(point - center + 0.03, point - center + 0.032)
+
+
 def test_tilts_fill_a_cone():
     job = of(workspace={**JOB["workspace"], "tilt": 0.2}, kinds=["stewart"])
     case = cases_of(job)["stewart"]
@@ -193,6 +280,38 @@ def test_tilts_fill_a_cone():
     assert len(np.unique(np.round(axes, 9), axis=0)) == 7
 
 
+def tilted(case, count):
+    """Return random poses of a machine that leans to every side, from the middle."""
+    job, rng = case.job, np.random.default_rng(0)
+    lean = job.workspace.tilt * np.sqrt(rng.random(count)).clip(0.5)
+    way = rng.uniform(0.0, 2.0 * np.pi, count)
+    vectors = lean[:, None] * np.c_[-np.sin(way), np.cos(way), 0.0 * way]
+    matrices = Rotation.from_rotvec(vectors).as_matrix()
+    poses = np.asarray(pose_of(case.kind.robot, np.zeros(3), matrices))
+    half = 0.5 * np.array(job.workspace.size)
+    at = with_tool_in_the_middle(case.kind.robot, poses[:, 3:])
+    at[:, :3] += rng.uniform(-1.0, 1.0, (count, 3)).round(1) * half
+    return at
+
+
+def test_worse_tilts_are_looked_for_in_the_whole_cone():
+    tool = {"payload": {"mass": 1.0, "tool": [0.0, 0.0, 0.1]}}
+    job = of(workspace={"size": [0.2, 0.2, 0.1], "tilt": 0.3}, kinds=["stewart"], **tool)
+    case = cases_of(job)["stewart"]
+    robot, middle = case.kind.machine(case.kind.ranges.mean(axis=0))
+
+    def lengths(poses):
+        rams = inverse_kinematics(robot, middle + poses)
+        return np.hstack([rams, -rams])
+
+    drawn = lengths(tilted(case, 5000)).min(axis=0)
+    assert (drawn < lengths(case.poses).min(axis=0) - 6e-4).any(), "samples miss the worst tilts"
+    least, where = case.worst(robot, lengths)
+    assert (least <= drawn + 3e-4).all()
+    leans = np.arccos(pteron.rotation_of("stewart", where)[:, 2, 2])
+    assert leans.max() <= 0.3 + 1e-9
+
+
 def test_rams_go_as_far_as_the_job_asks():
     space = {"size": [0.2, 0.2, 0.1], "tilt": 0.2}
     (case,) = cases_of(of(workspace=space, kinds=["stewart"])).values()
@@ -200,7 +319,7 @@ def test_rams_go_as_far_as_the_job_asks():
     assert kept
     robot, middle = kept[-1].robot, kept[-1].middle
     low, high = np.array([leg.limits for leg in robot.legs]).T
-    joints = inverse_kinematics(robot, middle + case.poses)
+    joints = inverse_kinematics(robot, middle + np.vstack([case.poses, tilted(case, 2000)]))
     assert (joints > low).all()
     assert (joints < high).all()
     assert (high <= 1.7 * low).all()
@@ -243,7 +362,7 @@ def test_kinds_are_those_that_can_do_the_motion():
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"),
+    ("keys", "line"),
     [
         ({"workspace": {"size": [300.0, 300.0, 150.0]}}, "are these mm"),
         ({"workspace": {"size": [0.1, 0.1, 0.1], "radius": 0.2}}, "a box has size"),
@@ -256,6 +375,24 @@ def test_kinds_are_those_that_can_do_the_motion():
         ({"links": {"upper": ["wood"]}}, "is no stock"),
         ({"cell": {"low": [0, 0, 0], "high": [1, 1, 1]}}, "need [workspace] center"),
         ({"motors": "motors.csv"}, "a table expected: [motors] with list"),
+        ({"cell": {"footprint": [0.1, 1]}}, "a footprint of 100 x 1000 mm has no room"),
+        ({"cell": {"height": 0.04}}, "a height of 40 mm has no room for the workspace, 50 mm"),
+        (
+            {
+                "workspace": {"size": [0.2, 0.2, 0.05], "center": [0, 0, 0.5]},
+                "cell": {"low": [-1, -1, 0], "high": [0.05, 1, 1]},
+            },
+            "along x it goes from -1 to 0.05 m, and the workspace from -0.1 to 0.1 m",
+        ),
+        ({"keep_out": [{"low": [0.09, -1, -1], "high": [1, 1, 1]}]}, "it is in the workspace"),
+        ({"keep_out": [{"low": [90, -1, -1], "high": [100, 1, 1]}]}, "are these mm?"),
+        ({"accuracy": {"most": 0.1}}, "is this mm?"),
+        ({"cycles": [{"points": [[-80, 0, 0], [80, 0, 0]]}]}, "are these mm?"),
+        ({"workspace": {"size": [0.2, 0.2], "tilt": 20.0}}, "is this in degrees?"),
+        (
+            {"cycles": [{"points": [[0, 0, 0], [0.15, 0, 0]], "duration": 1.0, "anywhere": False}]},
+            "where it is (anywhere = false)",
+        ),
         ({"workspace": {"size": [0.2, -0.1, 0.1]}}, "workspace.size, item 2: -0.1 given"),
         ({"workspace": {"size": [0.2]}}, "at least 2 of them"),
         ({"workspace": {"size": [0.2, 0.2], "turn": [-90, 90]}}, "are these degrees?"),
@@ -266,10 +403,10 @@ def test_kinds_are_those_that_can_do_the_motion():
         ({"cycles": [*TURNING["cycles"], JOB["cycles"][0] | {"share": 2}]}, "share given of some"),
     ],
 )
-def test_a_bad_job_is_refused_in_a_line(keys, told, tmp_path):
+def test_a_bad_job_is_refused_in_a_line(keys, line, tmp_path):
     file = tmp_path / "job.toml"
     file.write_text(tomlkit.dumps(JOB | keys))
-    assert told in refused(f"choose {file}")
+    assert line in refused(f"choose {file}")
 
 
 def test_a_cycle_that_does_not_fit_and_motors_without_inertia_are_refused(tmp_path):
@@ -282,6 +419,37 @@ def test_a_cycle_that_does_not_fit_and_motors_without_inertia_are_refused(tmp_pa
     motors.write_text("name,rotor_inertia,rated_torque,peak_torque,max_speed\na,1e-4,1,3,300\n")
     with pytest.raises(DataError, match="price: asked for"):
         choose_machine(of(motors={"list": str(motors)}))
+
+
+def test_a_keep_out_box_beside_a_cylinders_corner_is_not_in_it():
+    space, box = {"radius": 0.1, "height": 0.1}, {"high": [1.0, 1.0, 1.0]}
+    of(workspace=space, keep_out=[box | {"low": [0.08, 0.08, -1.0]}])
+    with pytest.raises(ValueError, match="it is in the workspace"):
+        of(workspace=space, keep_out=[box | {"low": [0.07, 0.07, -1.0]}])
+
+
+def test_motors_in_a_toml_file_have_prices(tmp_path):
+    file = tmp_path / "motors.toml"
+    text = 'name = "a"\nrotor_inertia = 1e-5\nrated_torque = 1\npeak_torque = 3\nmax_speed = 300\n'
+    file.write_text(f"[[motors]]\n{text}price = 70\n")
+    options = cases_of(of(motors={"list": str(file)}))["linear-delta"].options["m"]
+    assert {one.price - one.gearbox.price for one in options.all} == {70.0}
+    file.write_text(f"[[motors]]\n{text}price = -1\n")
+    with pytest.raises(DataError, match="motor a: price: -1 given"):
+        cases_of(of(motors={"list": str(file)}))
+
+
+def test_a_machine_that_no_longer_serves_leaves_the_folder(chosen, tmp_path):
+    choice, _ = chosen
+    write_choice(choice, tmp_path)
+    (fallen,) = (replace(one, serves=False, why=("it is too dear",)) for one in choice.candidates)
+    other = replace(choice, candidates=(fallen,))
+    write_choice(other, tmp_path)
+    assert not (tmp_path / "linear-delta.toml").exists()
+    write_choice(choice, tmp_path)
+    (tmp_path / "linear-delta.toml").write_text("# mine now\n")
+    write_choice(other, tmp_path)
+    assert (tmp_path / "linear-delta.toml").exists(), "a file that was changed stays"
 
 
 def test_gearboxes_and_prices_that_cannot_be(tmp_path):

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pteron.design.choosing.margins import DENSE, margins_of
 from pteron.design.choosing.proofs import is_clear, proofs_of, told
 from pteron.design.choosing.rating import Case, Rating
-from pteron.design.choosing.samples import Places, about_the_worst, sample_poses
+from pteron.design.choosing.samples import Places, sample_poses
 from pteron.design.choosing.search import front
 from pteron.design.choosing.tool import elasticity, greatest_errors, joint_errors, tolerances
 from pteron.errors import PteronError
@@ -26,6 +26,9 @@ from pteron.workspace import Proof, clearance
 
 _WORST = 8
 """Worst sample poses about which worse ones are sought."""
+
+MARGINS = {"rated": "rated torque", "peak": "peak torque", "speed": "speed"}
+"""The margins of drives, in words."""
 
 _TRIED = 9
 """Designs of which a proof is tried: the best, and then ever further behind, as neighbours fail
@@ -81,6 +84,11 @@ class Candidate:
     robot: str = ""
     middle: tuple[float, ...] = ()
 
+    @property
+    def least_margin(self) -> float:
+        """The least of the drives' margins."""
+        return min(self.figures.get(f"{name}_margin", np.inf) for name in MARGINS)
+
     def data(self) -> dict[str, Any]:
         """Return it as plain data."""
         return asdict(self)
@@ -97,17 +105,32 @@ def judged(case: Case, found: list[Rating]) -> Candidate:
     if not good:
         nearest = min(found, key=lambda one: one.cost(objectives[0]))
         return Candidate(case.kind.name, False, tuple(nearest.told.values()), *counts)
-    why = ""
+    why, tight = "", None
     for one in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
         proofs, one.robot = proofs_of(case, one)
         bad = next((p for p in proofs if p.counterexample is not None), None)
-        why = str(bad)
-        if bad is None:
+        why = str(bad) if bad is not None else _beyond(case, one)
+        if not why:
             made = _candidate(case, one, proofs, counts, front(good, shown_objectives(objectives)))
             why = _exceeded(case, made)
-            if not why:
+            if not why and made.least_margin >= case.job.motors.margin:
                 return made
-    return Candidate(case.kind.name, False, (f"no proof ({why})",), *counts)
+            # Where no design keeps the whole margin between the search's places, the best serves.
+            tight = tight or (None if why else made)
+    return tight or Candidate(case.kind.name, False, (f"no proof ({why})",), *counts)
+
+
+def _beyond(case: Case, one: Rating) -> str:
+    """Return in words where a design leaves its room between the poses of its search; note it."""
+    robot = one.robot
+    assert robot is not None  # it keeps all that is asked
+
+    def taken(poses: Array) -> Array:
+        return case.room.taken(robot, one.middle + poses, one.middle)
+
+    sizes, misses = case.room.within(case.worst(robot, taken, DENSE)[0])
+    one.figures |= sizes
+    return "".join(f"not so: {told}" for _, told in list(misses.values())[:1])
 
 
 def _exceeded(case: Case, found: Candidate) -> str:
@@ -119,8 +142,7 @@ def _exceeded(case: Case, found: Candidate) -> str:
             return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * asked.most:g} mm asked"
     if figures["clearance"] < job.floors.clearance:
         return f"not so: a clearance of {1e3 * figures['clearance']:.3g} mm"
-    names = ("rated_margin", "peak_margin", "speed_margin")
-    least = min(figures.get(name, np.inf) for name in names)
+    least = found.least_margin
     return f"not so: the drives' margin is {least:.3g} at {found.worst}" if least < 1.0 else ""
 
 
@@ -145,7 +167,7 @@ def _candidate(
         def column(poses: Array) -> Array:
             return np.reshape(values_of(one.middle + poses), (-1, 1))
 
-        return float(about_the_worst(case.job, robot, column, DENSE, _WORST)[0][0])
+        return float(case.worst(robot, column, DENSE, _WORST)[0][0])
 
     figures["clearance"] = least(lambda poses: clearance(robot, poses).least)
     if (asked := case.job.accuracy) is not None:
@@ -175,9 +197,10 @@ def _candidate(
 
 
 def _clear_words(case: Case, robot: Manipulator, middle: Array) -> str:
-    least, count = case.job.floors.clearance, len(sample_poses(case.job, robot, DENSE))
+    least, samples = case.job.floors.clearance, sample_poses(case.job, robot, DENSE)
+    count = len(samples) + len(case.between)
     kept = f"come nearer than {1e3 * least:g} mm" if least else "touch"
-    if is_clear(case, robot, middle):
+    if not len(case.between) and is_clear(case, robot, middle):
         return f"proved: no two links, guides or the platform {kept}"
     return (
         f"no two links, guides or the platform {kept} at {count} sample poses and about the worst "

@@ -36,6 +36,10 @@ from pteron.manipulator.saving import text_of
 _SEARCH = 0.9
 """Share of a kind's work that is its search."""
 
+_SMALL = 0.05
+"""Metres that a workspace counts as where it is smaller, a single pose for one: its machine is of
+the size of its parts."""
+
 _SOURCES = (*EQUATIONS, "design", "dynamics", "indices", "kinematics", "motion", "workspace")
 """The packages that a kept kind depends on: of other code it is searched again."""
 
@@ -159,7 +163,7 @@ def cases_of(job: Job) -> dict[str, Case]:
     names = [name for name in names if _driven(name, options, job)]
     needed = 2.0 * float(half_sides(job).max())
     tool = job.payload.tool
-    kinds = (Kind(name, max(needed, 1e-3), job.links, tool, job.free) for name in names)
+    kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
     found = {kind.name: Case(job, kind, options) for kind in kinds}
     for case in found.values():
         try:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.motion import Motor, read_motors
 from pteron.tables import read_table
+from pteron.toml import read_toml
 
 MOTORS = Path(__file__).parent / "motors.csv"
 GEARBOXES = Path(__file__).parent / "gearboxes.csv"
@@ -94,7 +96,8 @@ def read_gearboxes(path: str | Path) -> tuple[Gearbox, ...]:
 def prices(path: str | Path, count: int) -> list[float]:
     """Return the prices that a list has, NaN where it has none."""
     if Path(path).suffix.lower() == ".toml":
-        return [float("nan")] * count
+        listed = read_toml(path, DataError, "no such file")["motors"]
+        return [_price(path, motor) for motor in listed]
     table = read_table(path)
     if "price" not in table.columns:
         return [np.nan] * count
@@ -103,6 +106,15 @@ def prices(path: str | Path, count: int) -> list[float]:
         k = int(found.argmin())
         raise DataError(f"{table.place(k)}: price: {found[k]:g} given, 0 or more expected")
     return list(map(float, found))
+
+
+def _price(path: str | Path, motor: Mapping[str, Any]) -> float:
+    price = float(motor.get("price", np.nan))
+    if price < 0.0:
+        raise DataError(
+            f"{path}: motor {motor['name']}: price: {price:g} given, 0 or more expected"
+        )
+    return price
 
 
 @dataclass(frozen=True)

@@ -118,6 +118,34 @@ class Job(Table):
                 "cell: low and high need [workspace] center; of a workspace that floats give "
                 "footprint and height"
             )
+        else:
+            yield from self._room_faults()
+
+    def _room_faults(self) -> Iterator[str]:
+        """Yield where the cell leaves the workspace itself no room."""
+        cell, space, sides = self.cell, self.workspace, 2.0 * self.workspace.half
+        at = np.array(space.center or (0.0, 0.0, 0.0))
+        if cell.footprint is not None and (sides[:2] > cell.footprint).any():
+            given = " x ".join(f"{1e3 * x:g}" for x in cell.footprint)
+            yield (
+                f"cell: a footprint of {given} mm has no room for the workspace, "
+                f"{' x '.join(f'{1e3 * x:g}' for x in sides[:2])} mm"
+            )
+        if cell.height is not None and sides[2] > cell.height:
+            yield (
+                f"cell: a height of {1e3 * cell.height:g} mm has no room for the workspace, "
+                f"{1e3 * sides[2]:g} mm"
+            )
+        if cell.low is not None and cell.high is not None:
+            low, high = at - space.half, at + space.half
+            for i in np.flatnonzero((low < cell.low) | (high > cell.high)):
+                yield (
+                    f"cell: along {'xyz'[i]} it goes from {cell.low[i]:g} to {cell.high[i]:g} m, "
+                    f"and the workspace from {low[i]:g} to {high[i]:g} m"
+                )
+        for k, box in enumerate(self.keep_out, start=1):
+            if space.meets(np.array(box.low) - at, np.array(box.high) - at):
+                yield f"keep_out[{k}]: it is in the workspace, where the tool must be"
 
     def _cycle_faults(self, cycle: CycleTable) -> Iterator[str]:
         space, k = self.workspace, self.lengths

@@ -11,10 +11,17 @@ from pteron.bodies.tables import Count, Number, Table, Three, Two
 from pteron.design.loads import PayloadTable, Positive
 from pteron.design.spec import Floor
 from pteron.errors import ModelError
+from pteron.kernels import Array
 from pteron.manipulator.dimensions import Stock
 
 _FAR = 20.0
 """Metres from which on a workspace or a cell was probably given in millimetres."""
+
+_COARSE = 0.02
+"""Metres from which on an error was probably given in millimetres."""
+
+_LEANS = 1.5
+"""Radians that a tilt is below."""
 
 _TURNS = 7.0
 """Radians from which on a turn was probably given in degrees."""
@@ -32,11 +39,33 @@ def _near(given: Any) -> Any:
     return given
 
 
+def _fine(given: float) -> float:
+    """Refuse errors, m, that are those of no machine."""
+    if given > _COARSE:
+        raise ValueError(f"{given:g} m given: is this mm?")
+    return given
+
+
+def _leaning(given: float) -> float:
+    if given >= _LEANS:
+        raise ValueError(f"{given:g} rad given, below {_LEANS:g} expected: is this in degrees?")
+    return given
+
+
+def _near_points(given: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Refuse points, of which two lengths or more come first, that are those of no cell."""
+    _near([point[:2] for point in given])
+    return given
+
+
 Names = Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)]
 """One name, or some."""
 
 Near = Annotated[Positive, AfterValidator(_near)]
 """A length above 0 and of a cell's size, m."""
+
+Fine = Annotated[Positive, AfterValidator(_fine)]
+"""A greatest error above 0, m."""
 
 Place = Annotated[Three, AfterValidator(_near)]
 """A place in a cell, m."""
@@ -57,7 +86,7 @@ class WorkspaceTable(Table):
         None, description="its middle in the cell, m; left out, it may be anywhere in the cell"
     )
     turn: Two | None = Field(None, description="least and greatest turn about the upright, rad")
-    tilt: Annotated[Number, Field(gt=0.0, lt=1.5)] | None = Field(
+    tilt: Annotated[Positive, AfterValidator(_leaning)] | None = Field(
         None, description="of the platform to every side, rad: it fills a cone"
     )
     directions: Annotated[list[Three], Field(min_length=1)] | None = Field(
@@ -85,6 +114,29 @@ class WorkspaceTable(Table):
         return self
 
     @property
+    def half(self) -> Array:
+        """Half the sides (3,) of the box about it, m."""
+        if self.poses is not None:
+            sides = np.ptp(np.array(self.poses), axis=0)
+        elif self.radius is not None and self.height is not None:
+            sides = np.array([2.0 * self.radius, 2.0 * self.radius, self.height])
+        else:
+            sides = np.array(self.size)
+        return np.pad(0.5 * sides, (0, 3 - len(sides)))
+
+    def meets(self, low: Array, high: Array) -> bool:
+        """Say whether its tool enters a box (3,) from its middle, m."""
+        if self.poses is not None:
+            poses = np.pad(self.poses, ((0, 0), (0, 3 - len(self.poses[0]))))
+            poses = poses - 0.5 * (poses.min(axis=0) + poses.max(axis=0))
+            return bool(((poses > low) & (poses < high)).all(axis=1).any())
+        half = self.half
+        if not ((low < half) & (high > -half) | (half == 0.0) & (low < 0.0) & (high > 0.0)).all():
+            return False
+        nearest = np.hypot(*np.clip(0.0, low, high)[:2])
+        return self.radius is None or bool(nearest < self.radius)
+
+    @property
     def tilts(self) -> bool:
         """Whether it asks for tilts."""
         return self.tilt is not None or self.directions is not None
@@ -95,7 +147,7 @@ class WorkspaceTable(Table):
         if self.size is not None:
             return f"workspace {' x '.join(f'{1e3 * x:g}' for x in self.size)} mm"
         if self.poses is not None:
-            return f"workspace of {len(self.poses)} poses"
+            return f"workspace of {len(self.poses)} pose{'s' if len(self.poses) > 1 else ''}"
         return f"workspace: cylinder of radius {self.radius:g} m, height {self.height:g} m"
 
 
@@ -112,7 +164,9 @@ class CycleTable(Table):
     """`[[cycles]]`: a path of the tool through points, again and again."""
 
     name: str | None = None
-    points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] = Field(
+    points: Annotated[
+        list[tuple[Number, ...]], Field(min_length=2), AfterValidator(_near_points)
+    ] = Field(
         description="from the middle of the workspace, m; a turn about the upright may follow, or "
         "roll, pitch and yaw, rad"
     )
@@ -143,7 +197,7 @@ class MotionTable(Table):
 class AccuracyTable(Table):
     """`[accuracy]`: how far the tool may be from where it should be."""
 
-    most: Positive = Field(description="m")
+    most: Fine = Field(description="m")
     counted: Literal["deviation", "worst"] = Field(
         "deviation", description="root of the sum of squares of all errors, or their sum"
     )
@@ -163,14 +217,14 @@ class StiffnessTable(Table):
     """`[stiffness]`: how far the tool may give way."""
 
     force: Positive = Field(description="in any direction, N")
-    most: Positive = Field(description="m")
+    most: Fine = Field(description="m")
 
 
 class KeepOutTable(Table):
     """`[[keep_out]]`: a box in which no part of the machine may be."""
 
-    low: Three = Field(description="m; from the middle of a workspace that floats")
-    high: Three = Field(description="m")
+    low: Place = Field(description="m; from the middle of a workspace that floats")
+    high: Place = Field(description="m")
 
     @model_validator(mode="after")
     def _rises(self) -> Self:
@@ -184,8 +238,8 @@ class CellTable(Table):
 
     footprint: tuple[Near, Near] | None = Field(None, description="along x and y, m")
     height: Near | None = Field(None, description="m")
-    low: Three | None = Field(None, description="of a cell with a place of its own, m")
-    high: Three | None = Field(None, description="m")
+    low: Place | None = Field(None, description="of a cell with a place of its own, m")
+    high: Place | None = Field(None, description="m")
     margin: Annotated[Number, Field(ge=0.0)] = Field(
         0.03, description="half the width of bodies about their middle lines, m"
     )

@@ -8,7 +8,8 @@ import numpy as np
 
 from pteron.design.choosing.drives import in_duty
 from pteron.design.choosing.rating import Case
-from pteron.design.choosing.samples import Places, about_the_worst
+from pteron.design.choosing.room import tool_places
+from pteron.design.choosing.samples import Places, about_the_worst, near_places
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
 from pteron.kernels import Array
@@ -17,6 +18,9 @@ from pteron.manipulator import Manipulator
 
 DENSE = 7
 """Poses along each side of a box at which a design is looked at last, before ever nearer places."""
+
+_ROUNDS, _KEPT = 4, 3
+"""Times that worse places of a cycle are looked for, ever nearer, about so many of the worst."""
 
 _NOTHING = 1e-9
 """Least force, speed or torque by which a limit is divided."""
@@ -67,21 +71,27 @@ def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None
     found, squares, shares = Margins(), [], case.shares(time)
     for cycle in case.every_cycle:
         duration = cycle.duration or time or 1.0
-        states = case.states(cycle, middle, duration)
-        forces = drive_forces(robot, *states)
-        rates = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
-        means = np.trapezoid(forces**2, axis=1) / (forces.shape[1] - 1) * duration
-        means = (means + cycle.dwell * forces[:, -1] ** 2) / (duration + cycle.dwell)
-        squares.append(means.max(axis=0))
-        every = np.minimum(
-            found.take("peak_margin", most, np.abs(forces).max(axis=1)),
-            found.take("speed_margin", fastest, np.abs(rates).max(axis=1)),
-        )
-        if not len(shares):
-            every = np.minimum(every, found.take("rated_margin", rated, np.sqrt(means)))
-        if every.min() < found.least:
-            k = int(every.argmin())
-            found.least, found.worst, found.place = float(every[k]), cycle.words(k), (cycle, k)
+        places, greatest = cycle.both_ways(), np.zeros(robot.joint_count)
+        for step in range(_ROUNDS + 1):
+            states = case.states(places, middle, duration)
+            forces = drive_forces(robot, *states)
+            rates = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
+            means = np.trapezoid(forces**2, axis=1) / (forces.shape[1] - 1) * duration
+            means = (means + cycle.dwell * forces[:, -1] ** 2) / (duration + cycle.dwell)
+            greatest = np.maximum(greatest, means.max(axis=0))
+            every = [
+                found.take("peak_margin", most, np.abs(forces).max(axis=1)),
+                found.take("speed_margin", fastest, np.abs(rates).max(axis=1)),
+            ]
+            if not len(shares):
+                every.append(found.take("rated_margin", rated, np.sqrt(means)))
+            if np.min(every) < found.least:
+                k = int(np.min(every, axis=0).argmin())
+                found.least, found.place = float(np.min(every)), (places, k)
+                found.worst = places.words(k)
+            worst = np.unique(np.argsort([*every, *-means.T], axis=1)[:, :_KEPT])
+            places = near_places(case.job, places, worst, 0.5 ** (step + 1))
+        squares.append(greatest)
     if len(shares):
         load = np.sqrt(in_duty(np.array(squares), shares))
         least = float(found.take("rated_margin", rated, load[None])[0])
@@ -101,8 +111,9 @@ def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None
         found.note("peak_margin", float(margins[: len(most)].min()))
         found.note("speed_margin", float(margins[len(most) :].min()))
         if margins.min() < found.least:
-            corner = where[int(margins.argmin())][: len(robot.platform.lengths)]
-            at = ", ".join(f"{1e3 * x:+.0f}" for x in corner)
+            worst_pose = middle + where[int(margins.argmin())]
+            place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
+            at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
             found.least = float(margins.min())
             found.worst = f"the motion in any direction, at ({at}) mm"
     return found

@@ -137,7 +137,9 @@ def told(case: Case, proofs: Sequence[Proof]) -> str:
             "of all"
         )
     if space.poses is not None:
-        return f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+        kept = f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+        between = f"; so do the cycles between them at {len(case.between)} samples"
+        return kept + (between if len(case.between) else "")
     one = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
     found = f"proved: every {one} keeps reach, limits and floors, by intervals over {boxes} boxes"
     return f"{found}; not proved between the sampled tilts" if space.tilt else found

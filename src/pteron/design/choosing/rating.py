@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -120,6 +120,10 @@ class Case:
         self.outline = sample_poses(job, kind.robot, 3)
         self.every_cycle = cycles_of(job, kind.robot)
         self.cycles = [cycle.some() for cycle in self.every_cycle]
+        # A box holds its cycles; between the poses of a list they go where no pose is.
+        states = (c.states[0].reshape(-1, kind.robot.freedom) for c in self.every_cycle)
+        self.between = np.vstack([self.poses[:0], *(states if job.workspace.poses else ())])
+        self.visited = np.vstack([self.poses, self.between])
         self.half = half_sides(job)
         self.room = Room(job, kind.robot)
 
@@ -149,7 +153,7 @@ class Case:
 
     def _reach(self, found: Rating) -> None:
         """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
-        robot, poses, floors = _of(found), found.middle + self.poses, self.job.floors
+        robot, poses, floors = _of(found), found.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
         if least >= 0.0:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
@@ -164,7 +168,7 @@ class Case:
                 every = np.column_stack([squares, signed, room])
                 return np.asarray(np.nan_to_num(every, nan=1.0))
 
-            lowest, found.worst = about_the_worst(self.job, robot, measures)
+            lowest, found.worst = self.worst(robot, measures)
             legs_least, type_ii, room = np.split(lowest, [robot.joint_count, robot.joint_count + 1])
             least = float(legs_least.min())
         found.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
@@ -179,8 +183,17 @@ class Case:
         if not np.isfinite(joints).all():
             _miss(found, "reach", 1.0, "a leg that does not reach the whole workspace")
             return
+        shortest, longest = joints.min(axis=0), joints.max(axis=0)
+        if self.job.workspace.tilt is not None:
+            # Between the tilts of the samples rams are longer and shorter.
+            def ends(places: Array) -> Array:
+                at = inverse_kinematics(robot, found.middle + places, on_failure="nan")
+                return np.asarray(np.nan_to_num(np.hstack([at, -at]), nan=np.inf))
+
+            shortest, longest = np.split(self.worst(robot, ends)[0], 2)
+            longest = -longest
         legs = []
-        for leg, low, high in zip(robot.legs, joints.min(axis=0), joints.max(axis=0), strict=True):
+        for leg, low, high in zip(robot.legs, shortest, longest, strict=True):
             spare = _STROKE * (high - low) + 1e-6
             if leg.joint.unit == "m":
                 travel = float(low - spare), float(high + spare)
@@ -198,7 +211,7 @@ class Case:
 
     def _room(self, found: Rating) -> None:
         """Judge the footprint, the height, what is to be kept out of, and whether links touch."""
-        figures, misses = self.room.judged(_of(found), found.middle + self.poses, found.middle)
+        figures, misses = self.room.judged(_of(found), found.middle + self.visited, found.middle)
         found.figures |= figures
         for name, (share, told) in misses.items():
             _miss(found, name, share, told)
@@ -268,6 +281,16 @@ class Case:
             "energy": self._energy([float((w + way @ friction).max()) for w, way in work]),
             "cycle_time": given.get("time", 0.0),
         }
+
+    def worst(
+        self,
+        robot: Manipulator,
+        values_of: Callable[[Array], Array],
+        along: int | None = None,
+        keep: int = 1,
+    ) -> tuple[Array, Array]:
+        """Return least values over the workspace and its cycles, as `about_the_worst` has them."""
+        return about_the_worst(self.job, robot, values_of, along, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
         """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""

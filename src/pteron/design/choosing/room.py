@@ -15,11 +15,14 @@ from pteron.equations.clearance import meetings, squared_distance
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 
-_STEPS = 6
-"""Points along a link at which it is outside of keep-out boxes."""
+_HALVINGS = 24
+"""Steps towards the point of a line that is deepest in a box, each of which leaves 2/3."""
 
 _SPARE = 1e-3
 """Metres by which links are farther apart in a search than is asked at last."""
+
+_TIGHT = 2e-3
+"""Metres by which a cell is smaller, and what is kept out larger, in a search than at last."""
 
 _CLOSE = 0.01
 """Metres of clearance whose lack counts as much as another bound missed by the whole."""
@@ -41,53 +44,67 @@ class Room:
 
         `middle` is the pose with the tool in the middle of the workspace.
         """
-        cell, floor = self._job.cell, self._job.floors.clearance
+        floor = self._job.floors.clearance
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        center = tool_places(robot, middle[None])[0]
-        tools = tool_places(robot, poses)
-        flat = np.vstack([points.reshape(-1, 3), tools]) - center
-        flat = flat[np.isfinite(flat).all(axis=1)]
-        low, high = flat.min(axis=0) - cell.margin, flat.max(axis=0) + cell.margin
-        width, depth, height = map(float, high - low)
-        figures = {"footprint": width * depth, "width": width, "depth": depth, "height": height}
-        most = dict(zip(("width", "depth"), cell.footprint or (np.inf, np.inf), strict=True))
-        most["height"] = cell.height or np.inf
-        found: Misses = {
-            name: (figures[name] / m - 1.0, f"{name} {figures[name]:.4g} m, at most {m:g} m asked")
-            for name, m in most.items()
-            if figures[name] > m
-        }
+        figures, found = self.within(self._taken(robot, poses, points, middle).min(axis=0), _TIGHT)
         clear = self._clearance(robot, poses, points)
         if clear < floor + _SPARE:
             asked = f"at least {1e3 * floor:g} mm asked, and {1e3 * _SPARE:g} mm to spare"
             told = f"clearance {1e3 * clear:.3g} mm, {asked}"
             found["clearance"] = (floor + _SPARE - clear) / _CLOSE, told
-        found |= self._outside(low, high)
-        found |= self._inside(points - center)
         return figures, found
 
-    def _outside(self, low: Array, high: Array) -> Misses:
-        cell, center = self._job.cell, np.array(self._job.workspace.center or (0.0, 0.0, 0.0))
-        if cell.low is None or cell.high is None:
-            return {}
-        beyond = float(np.maximum(cell.low - (center + low), center + high - cell.high).max())
-        return {"cell": (beyond, f"parts {beyond:.3g} m outside the cell")} if beyond > 0.0 else {}
+    def taken(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
+        """Return the room that a machine takes at poses (N, 6 + boxes), from the tool's middle, m.
 
-    def _inside(self, points: Array) -> Misses:
-        center = np.array(self._job.workspace.center or (0.0, 0.0, 0.0))
-        ends = np.linspace(0.0, 1.0, _STEPS)[:, None, None]
-        lines = points[..., :-1, :][..., None, :, :] + center
-        lines = lines + ends * np.diff(points, axis=-2)[..., None, :, :]
+        The least coordinates, minus the greatest, and how far it stays outside each keep-out box.
+        """
+        points = np.asarray(numeric(robot, "joint_points")(poses)[0])
+        return self._taken(robot, poses, points, middle)
+
+    def _taken(self, robot: Manipulator, poses: Array, points: Array, middle: Array) -> Array:
+        margin, center = self._job.cell.margin, tool_places(robot, middle[None])[0]
+        starts, ends = (part - center for part in _lines(robot, poses, points))
+        both = np.stack([starts, ends])
+        low, high = np.nanmin(both, axis=(0, 2)) - margin, np.nanmax(both, axis=(0, 2)) + margin
+        at = np.array(self._job.workspace.center or (0.0, 0.0, 0.0))
         depths = [
-            float(np.nanmax(np.minimum(lines - box.low, box.high - lines).min(axis=-1)))
+            np.nanmax(
+                _depths(starts + at, ends + at, np.array(box.low), np.array(box.high)), axis=1
+            )
             for box in self._job.keep_out
         ]
-        depth = max(depths, default=-np.inf) + self._job.cell.margin
-        return (
-            {"keep-out": (depth, f"parts {depth:.3g} m inside a keep-out box")}
-            if depth > 0.0
-            else {}
-        )
+        return np.column_stack([low, -high, *(-depth - margin for depth in depths)])
+
+    def within(self, taken: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
+        """Return the sizes of a machine that takes so much room (6 + boxes,), and what it misses.
+
+        Bounds are tighter by a length, m.
+        """
+        cell, (low, high, outside) = self._job.cell, np.split(taken, [3, 6])
+        high = -high
+        width, depth, height = map(float, high - low)
+        figures = {"footprint": width * depth, "width": width, "depth": depth, "height": height}
+        most = dict(zip(("width", "depth"), cell.footprint or (np.inf, np.inf), strict=True))
+        most["height"] = cell.height or np.inf
+        spare = f", and {1e3 * tight:g} mm to spare" if tight else ""
+        found: Misses = {
+            name: (
+                (figures[name] + tight) / m - 1.0,
+                f"{name} {figures[name]:.4g} m, at most {m:g} m asked{spare}",
+            )
+            for name, m in most.items()
+            if figures[name] + tight > m
+        }
+        if cell.low is not None and cell.high is not None:
+            at = np.array(self._job.workspace.center)
+            beyond = float(np.maximum(cell.low - (at + low), at + high - cell.high).max())
+            if beyond + tight > 0.0:
+                found["cell"] = beyond + tight, f"{_parts(beyond)} outside the cell{spare}"
+        inside = -float(outside.min(initial=np.inf))
+        if inside + tight > 0.0:
+            found["keep-out"] = inside + tight, f"{_parts(inside)} inside a keep-out box{spare}"
+        return figures, found
 
     def _clearance(self, robot: Manipulator, poses: Array, points: Array) -> float:
         """Return the least distance of bodies, m; `points` are those of the joints at the poses.
@@ -115,10 +132,46 @@ class Room:
         return meetings(self._robot)
 
 
+def _parts(beyond: float) -> str:
+    return f"parts {beyond:.3g} m" if beyond > 0.0 else "parts nearly"
+
+
 def tool_places(robot: Manipulator, poses: Array) -> Array:
     """Return the places (N, 3) of the tool's centre point at poses (N, m)."""
     places, axes = robot.platform.at(poses)
     return np.asarray(places + np.array(robot.platform.tool) @ axes)
+
+
+def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Array]:
+    """Return starts and ends (N, L, 3) of links, guides, and what leads from P to legs and tool."""
+    count, place = len(poses), robot.platform.at(poses)[0]
+    legs = points.reshape(count, -1, *points.shape[-2:])
+    tips = np.concatenate([legs[:, :, -1], tool_places(robot, poses)[:, None]], axis=1)
+    guides = [(np.tile(a, (count, 1, 1)), np.tile(b, (count, 1, 1))) for _, a, b in _guides(robot)]
+    starts = [legs[:, :, :-1].reshape(count, -1, 3), np.repeat(place[:, None], tips.shape[1], 1)]
+    ends = [legs[:, :, 1:].reshape(count, -1, 3), tips]
+    return (
+        np.concatenate([*starts, *(a for a, _ in guides)], axis=1),
+        np.concatenate([*ends, *(b for _, b in guides)], axis=1),
+    )
+
+
+def _depths(starts: Array, ends: Array, low: Array, high: Array) -> Array:
+    """Return how deep lines (..., 3) go into a box: the least distance to a face, at its most.
+
+    Along a line it is concave, so that thirds find its most.
+    """
+
+    def depth(share: Array) -> Array:
+        at = starts + share[..., None] * (ends - starts)
+        return np.asarray(np.minimum(at - low, high - at).min(axis=-1))
+
+    first, last = np.zeros(starts.shape[:-1]), np.ones(starts.shape[:-1])
+    for _ in range(_HALVINGS if np.isfinite(starts).any() else 0):
+        third = (last - first) / 3.0
+        falls = depth(first + third) > depth(last - third)
+        first, last = np.where(falls, first, first + third), np.where(falls, last - third, last)
+    return depth(0.5 * (first + last))
 
 
 def _guides(robot: Manipulator) -> Iterator[tuple[int, Array, Array]]:

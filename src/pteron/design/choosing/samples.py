@@ -5,14 +5,13 @@ Places are those of the tool's centre point: where the platform turns, P moves a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 
 from pteron.design.choosing.job import Job
 from pteron.design.choosing.job_tables import CycleTable
@@ -39,8 +38,8 @@ _DIRECTIONS = 4
 _PLACES = 64
 """Most places of a cycle that a search looks at."""
 
-_IN_CYCLE = 49
-"""Samples of a cycle."""
+_IN_CYCLE, _IN_CYCLE_LAST = 49, 129
+"""Samples of a cycle, in a search and at last: peaks at a rounded corner are short."""
 
 _SHARES = np.linspace(1.0, 0.0, 21)
 """Shares of the way to a corner at which a cycle is tried."""
@@ -72,6 +71,10 @@ class Places:
         s.
     share : float
         How often it is done in a duty cycle of all; 0 where each counts by itself.
+    anywhere : bool
+        Whether it may be at other places and in other directions.
+    samples : int
+        In time.
     """
 
     name: str
@@ -82,6 +85,8 @@ class Places:
     duration: float | None
     dwell: float
     share: float
+    anywhere: bool = True
+    samples: int = _IN_CYCLE
 
     def words(self, k: int) -> str:
         """Return place k in words."""
@@ -100,10 +105,20 @@ class Places:
         """Return it at some of its places."""
         return replace(self, shifts=self.shifts[chosen], turns=self.turns[chosen])
 
+    def both_ways(self) -> Places:
+        """Return it, finer in time, at its places and, turned round, at those opposite."""
+        fine = replace(self, samples=_IN_CYCLE_LAST)
+        if not self.anywhere:
+            return fine
+        opposite = self.shifts.copy()
+        opposite[:, : min(2, len(self.robot.platform.lengths))] *= -1.0
+        turns = np.append(self.turns, self.turns + np.pi)
+        return replace(fine, shifts=np.vstack([self.shifts, opposite]), turns=turns)
+
     @cached_property
     def states(self) -> Curve:
         """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s."""
-        curve = _timed(self.path, np.linspace(0.0, 1.0, _IN_CYCLE))
+        curve = _timed(self.path, np.linspace(0.0, 1.0, self.samples))
         return self.moved(*curve)
 
     def moved(self, *curve: Array) -> Curve:
@@ -133,7 +148,7 @@ def with_tool_in_the_middle(robot: Manipulator, angles: Array) -> Array:
 
 def sample_poses(job: Job, robot: Manipulator, along: int | None = None) -> Array:
     """Return poses (N, m) over the workspace and its orientations, from its middle."""
-    return _poses_at(robot, _places(job, robot, along or _along(job)))
+    return _poses_at(job, robot, _places(job, robot, along or _along(job)))
 
 
 def about_the_worst(
@@ -142,42 +157,67 @@ def about_the_worst(
     values_of: Callable[[Array], Array],
     along: int | None = None,
     keep: int = 1,
+    besides: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return the least of each column of values (C,), and the poses where they are (C, m).
 
     `values_of` gives the values (B, C) at poses (B, m), which are from the middle. They are taken
     at `sample_poses`, and then ever nearer about those that are worst in a column, `keep` of each:
-    what is worst near a singularity is worst in a valley that samples miss.
+    what is worst near a singularity is worst in a valley that samples miss. Poses `besides` those
+    of the workspace count as they are.
     """
     along, count, space = along or _along(job), len(robot.platform.lengths), job.workspace
     places = _places(job, robot, along)
-    values = values_of(_poses_at(robot, places))
+    values = values_of(_poses_at(job, robot, places))
     steps = np.zeros(robot.freedom)
     steps[:count] = half_sides(job)[:count] / (along - 1)
-    if space.turn is not None and not space.tilts:
+    if space.tilt is not None:
+        steps[count : count + 2] = 0.5 * space.tilt
+    if space.turn is not None and space.directions is None:
         steps[-1] = 0.25 * (space.turn[1] - space.turn[0])
+    if space.poses is not None:
+        steps[:count] = 0.0
+    ways = _ways(steps, count)
+    for _ in range(_ROUNDS if steps.any() else 0):
+        worst = np.unique(np.argsort(values, axis=0)[:keep])
+        near = (places[worst][:, None] + steps * ways).reshape(-1, robot.freedom)
+        places = _into(job, near, count)
+        values = values_of(_poses_at(job, robot, places))
+        steps /= 2.0
+    poses = _poses_at(job, robot, places)
+    if besides is not None and len(besides):
+        poses, values = np.vstack([poses, besides]), np.vstack([values, values_of(besides)])
+    return values.min(axis=0), poses[values.argmin(axis=0)]
+
+
+def _ways(steps: Array, count: int) -> Array:
+    """Return the neighbours of a place (W, m), in steps: any, but if it tilts in part of it."""
+    several = [(-1.0, 0.0, 1.0) if step else (0.0,) for step in steps]
+    if not steps[count:-1].any():
+        return np.array(list(product(*several)))
+    still = [(0.0,)] * len(steps)
+    parts = (several[:count] + still[count:], still[:count] + several[count:])
+    return np.unique(np.vstack([list(product(*part)) for part in parts]), axis=0)
+
+
+def _into(job: Job, places: Array, count: int) -> Array:
+    """Return places (N, m) brought into the workspace where they are outside."""
+    space, half, found = job.workspace, half_sides(job)[:count], places.copy()
     if space.poses is None:
-        ways = np.array(list(product(*((-1.0, 0.0, 1.0) if step else (0.0,) for step in steps))))
-        for _ in range(_ROUNDS):
-            worst = np.unique(np.argsort(values, axis=0)[:keep])
-            near = (places[worst][:, None] + steps * ways).reshape(-1, robot.freedom)
-            places = near[_inside(job, near, count)]
-            values = values_of(_poses_at(robot, places))
-            steps /= 2.0
-    least = values.argmin(axis=0)
-    return values.min(axis=0), _poses_at(robot, places[least])
-
-
-def _inside(job: Job, places: Array, count: int) -> NDArray[np.bool_]:
-    """Return which places (N, m) are in the workspace."""
-    space, away = job.workspace, np.abs(places)
-    found = np.asarray((away[:, :count] <= half_sides(job)[:count] + _INSIDE).all(axis=1))
+        found[:, :count] = np.clip(found[:, :count], -half, half)
     if space.radius is not None:
-        found &= np.hypot(away[:, 0], away[:, 1]) <= space.radius + _INSIDE
-    if space.turn is not None and not space.tilts:
-        low, high = space.turn
-        found &= (low - _INSIDE <= places[:, -1]) & (places[:, -1] <= high + _INSIDE)
-    return found
+        found[:, :2] = _within(found[:, :2], space.radius)
+    if space.tilt is not None:
+        found[:, count : count + 2] = _within(found[:, count : count + 2], space.tilt)
+    if space.turn is not None and space.directions is None:
+        found[:, -1] = np.clip(found[:, -1], *space.turn)
+    return np.unique(found, axis=0)
+
+
+def _within(points: Array, radius: float) -> Array:
+    """Return points (N, 2) drawn into a circle."""
+    shares = np.minimum(1.0, radius / np.maximum(np.hypot(*points.T), 1e-12))
+    return np.asarray(points * shares[:, None])
 
 
 def _along(job: Job) -> int:
@@ -185,28 +225,32 @@ def _along(job: Job) -> int:
 
 
 def _places(job: Job, robot: Manipulator, along: int) -> Array:
-    """Return places (N, m): of the tool from the middle, and angles of the platform."""
+    """Return places (N, m): of the tool from the middle, and angles of the platform.
+
+    Of a cone of tilts the angles are how far the platform leans to x and to y, and its turn.
+    """
     points = _positions(job, along)[:, : len(robot.platform.lengths)]
     angles = orientations(job, robot)
+    if job.workspace.tilt is not None:
+        leans = [(*lean, turn) for turn in _turns(job) for lean in _leans(job.workspace.tilt)]
+        angles = np.array(leans)
     return np.hstack([np.tile(points, (len(angles), 1)), np.repeat(angles, len(points), axis=0)])
 
 
-def _poses_at(robot: Manipulator, places: Array) -> Array:
+def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     count = len(robot.platform.lengths)
-    found = with_tool_in_the_middle(robot, places[:, count:])
+    angles = places[:, count:]
+    if job.workspace.tilt is not None:
+        angles = _leaning(robot, angles[:, :2])
+        angles[:, -1] += places[:, -1]
+    found = with_tool_in_the_middle(robot, angles)
     found[:, :count] += places[:, :count]
     return found
 
 
 def half_sides(job: Job) -> Array:
     """Return half the sides (3,) of the box about the workspace, m."""
-    space = job.workspace
-    if space.poses is not None:
-        return np.asarray(0.5 * np.ptp(_wide(space.poses), axis=0))
-    if space.radius is not None and space.height is not None:
-        return np.array([space.radius, space.radius, space.height / 2.0])
-    assert space.size is not None  # one of three shapes
-    return np.asarray(0.5 * _wide([space.size])[0])
+    return job.workspace.half
 
 
 def _wide(rows: object) -> Array:
@@ -232,29 +276,39 @@ def _positions(job: Job, along: int) -> Array:
 
 def orientations(job: Job, robot: Manipulator) -> Array:
     """Return angles (A, a) of the platform that the workspace asks for; tilts at each turn."""
+    return np.concatenate([_turned(tilts(job, robot), angle) for angle in _turns(job)])
+
+
+def _turns(job: Job) -> list[float]:
     turn = job.workspace.turn
-    turns = [0.0] if turn is None else [*([0.0] if turn[0] < 0.0 < turn[1] else []), *turn]
-    return np.concatenate([_turned(tilts(job, robot), angle) for angle in turns])
+    return [0.0] if turn is None else [*([0.0] if turn[0] < 0.0 < turn[1] else []), *turn]
 
 
 def tilts(job: Job, robot: Manipulator) -> Array:
     """Return angles (A, a) of the tilts: of a cone those of its middle and round its rim."""
     space, count = job.workspace, len(robot.platform.angles)
-    if not space.tilts:
-        return np.zeros((1, count))
-    given = np.array(space.directions or [(0.0, 0.0, 1.0)])
     if space.tilt is not None:
-        rim = 2.0 * np.pi * np.arange(_RIM) / _RIM
-        side, up = np.sin(space.tilt), np.full(_RIM, np.cos(space.tilt))
-        given = np.vstack([given, np.c_[side * np.cos(rim), side * np.sin(rim), up]])
-    # The shortest turn from upright.
-    across = np.cross([0.0, 0.0, 1.0], given)
-    size = np.linalg.norm(across, axis=1, keepdims=True)
-    angle = np.arctan2(size, given[:, 2:])
-    matrices = scipy.spatial.transform.Rotation.from_rotvec(
-        across / np.where(size > 0.0, size, 1.0) * angle
-    ).as_matrix()
-    return np.asarray(pose_of(robot, np.zeros(3), matrices)[:, -count:])
+        return _leaning(robot, _leans(space.tilt))
+    if space.directions is None:
+        return np.zeros((1, count))
+    given = np.array(space.directions)
+    given /= np.linalg.norm(given, axis=1, keepdims=True)
+    away = np.linalg.norm(given[:, :2], axis=1, keepdims=True)
+    angle = np.arctan2(away, given[:, 2:])
+    return _leaning(robot, given[:, :2] / np.where(away > 0.0, away, 1.0) * angle)
+
+
+def _leans(tilt: float) -> Array:
+    """Return leans (L, 2) to x and y, rad: none, and round the rim of a cone."""
+    rim = 2.0 * np.pi * np.arange(_RIM) / _RIM
+    return np.vstack([np.zeros((1, 2)), tilt * np.c_[np.cos(rim), np.sin(rim)]])
+
+
+def _leaning(robot: Manipulator, leans: Array) -> Array:
+    """Return the angles (L, a) of a platform that leans to x and y (L, 2): the shortest turn."""
+    vectors = np.c_[-leans[:, 1], leans[:, 0], np.zeros(len(leans))]
+    matrices = scipy.spatial.transform.Rotation.from_rotvec(vectors).as_matrix()
+    return np.array(pose_of(robot, np.zeros(3), matrices)[:, -len(robot.platform.angles) :])
 
 
 def _turned(angles: Array, turn: float) -> Array:
@@ -291,10 +345,50 @@ def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
     if not kept:
         size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(_wide(given[:, : job.lengths]), axis=0))
         room = " x ".join(f"{2e3 * x:.0f}" for x in half_sides(job))
-        raise DataError(f"cycles[{k}]: {size} mm does not fit into the workspace of {room} mm")
+        where = "" if cycle.anywhere else " where it is (anywhere = false)"
+        raise DataError(
+            f"cycles[{k}]: {size} mm does not fit into the workspace of {room} mm{where}"
+        )
     shifts, turns = np.array([s for s, _ in kept]), np.array([t for _, t in kept])
     times = cycle.duration, cycle.dwell, cycle.share or 0.0
-    return Places(name, robot, path, shifts, turns, *times)
+    return Places(name, robot, path, shifts, turns, *times, cycle.anywhere)
+
+
+def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> Places:
+    """Return a cycle at neighbours of some of its places, which they may be themselves.
+
+    A neighbour is turned by a part of the angle between directions, or shifted by that part of
+    half the workspace or of the range of turns.
+    """
+    half, count = half_sides(job), len(cycle.robot.platform.lengths)
+    poses = cycle.path.at(np.linspace(0.0, cycle.path.length, _IN_CYCLE))[0]
+    path, last, found = _wide(poses[:, :count]), poses[:, -1], []
+    limits = np.full((2, cycle.robot.freedom), np.nan)
+    steps = np.zeros(cycle.robot.freedom)
+    steps[:count] = part * half[:count]
+    if job.workspace.turn is not None:
+        low, high = job.workspace.turn
+        steps[-1] = part * (high - low)
+        limits[:, -1] = low - last.min(), high - last.max()
+    ways = np.vstack([np.zeros_like(steps), np.diag(steps), -np.diag(steps)])
+    for k, way in product(chosen, (-1.0, 0.0, 1.0) if cycle.anywhere else (0.0,)):
+        turn = float(cycle.turns[k] + way * part * np.pi / _DIRECTIONS)
+        turned = path.copy()
+        turned[:, :2] = path[:, :2] @ _plane(np.array([turn]))[0].T
+        limits[:, :count] = (
+            (-half - turned.min(axis=0))[:count],
+            (half - turned.max(axis=0))[:count],
+        )
+        if (limits[0] > limits[1] + _INSIDE).any():
+            continue
+        shifts = cycle.shifts[k] + (ways if cycle.anywhere else 0.0 * ways[:1])
+        for shift in np.unique(np.fmax(np.fmin(shifts, limits[1]), limits[0]), axis=0):
+            shares = (s for s in _SHARES if _holds(job, half, turned + s * _wide([shift[:count]])))
+            if (share := next(shares, None)) is not None:
+                found.append((np.append(share * shift[:count], shift[count:]), turn))
+    return replace(
+        cycle, shifts=np.array([s for s, _ in found]), turns=np.array([t for _, t in found])
+    )
 
 
 def _plane(turns: Array) -> Array:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
-from pteron.design.choosing.candidate import Candidate
+from pteron.design.choosing.candidate import MARGINS, Candidate
 from pteron.design.choosing.choose import Choice
 from pteron.design.choosing.job import Job
 
 _FIGURES = {
     "price": ("price", 1.0),
-    "shortest_time": ("time (s)", 1.0),
+    "cycle_time": ("cycle (s)", 1.0),
+    "shortest_time": ("shortest (s)", 1.0),
     "error": ("error (mm)", 1e3),
     "deflection": ("gives way (mm)", 1e3),
     "clearance": ("clear (mm)", 1e3),
@@ -19,15 +21,12 @@ _FIGURES = {
 }
 """Figures of a candidate that are shown: their headings and factors."""
 
-_MARGINS = {"rated_margin": "rated torque", "peak_margin": "peak torque", "speed_margin": "speed"}
-
 
 def cells(one: Candidate) -> dict[str, str]:
     """Return a row's numbers by their headings, rounded; of a machine that serves."""
-    least = min(one.figures[name] for name in _MARGINS if name in one.figures)
-    found = {"margin": _ratio(least)}
+    found = {"margin": _ratio(one.least_margin)}
     for name, (heading, factor) in _FIGURES.items():
-        if (value := one.figures.get(name)) is not None:
+        if (value := one.figures.get(name)) is not None and (name != "cycle_time" or value):
             found[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
     return found
 
@@ -46,7 +45,8 @@ def dimensions(one: Candidate) -> str:
 
 def margins(one: Candidate) -> str:
     """Return the drives' margins and the place of the least, in a line."""
-    known = {word: one.figures[name] for name, word in _MARGINS.items() if name in one.figures}
+    names = {f"{name}_margin": word for name, word in MARGINS.items()}
+    known = {word: one.figures[name] for name, word in names.items() if name in one.figures}
     told = ", ".join(f"{word} {_ratio(value)}" for word, value in known.items())
     return f"{told}; least at {one.worst}" if one.worst else told
 
@@ -87,9 +87,23 @@ def asked(job: Job) -> list[str]:
     if job.cell.footprint is not None:
         found.append(f"footprint {' x '.join(f'{x:g}' for x in job.cell.footprint)} m")
     found += [f"height {job.cell.height:g} m"] if job.cell.height is not None else []
+    if job.cell.low is not None and job.cell.high is not None:
+        found.append(f"cell {_box(job.cell.low, job.cell.high)} m")
+    found += [f"kept out of {_box(box.low, box.high)} m" for box in job.keep_out]
+    floors = {
+        "type_i": "type-I measure",
+        "type_ii": "type-II measure",
+        "clearance": "clearance (m)",
+    }
+    for name in sorted(job.floors.model_fields_set):
+        found.append(f"{floors[name]} at least {getattr(job.floors, name):g}")
     bounds = job.most.model_dump(exclude_none=True)
     found += [f"{name.replace('_', ' ')} at most {value:g}" for name, value in bounds.items()]
     return [*found, f"least {' and '.join(name.replace('_', ' ') for name in job.objectives)}"]
+
+
+def _box(low: Sequence[float], high: Sequence[float]) -> str:
+    return " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True))
 
 
 def assumed(choice: Choice) -> list[str]:
@@ -102,13 +116,15 @@ def assumed(choice: Choice) -> list[str]:
     exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
     return [
         *examples,
-        f"Drives have {motors.margin:g} times what is asked, and dry friction of "
-        f"{motors.friction:.0%} of their rated torque.",
+        f"Drives are chosen for {motors.margin:g} times what is asked, with dry friction of "
+        f"{motors.friction:.0%} of their rated torque; the least margins are told as they are "
+        "between the places of the search, too.",
         f"Links are cut from {stocks}; the platform is half of an aluminium disc "
         f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
         f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as cranks; a ram is "
         "at most 1.7 times its least length; where links may meet, a pair of rods counts as one; "
         "ball joints have no cones.",
-        "The shortest time is that of the cycle at its worst place with this margin.",
+        "The shortest time is that of the cycle at its worst place with this margin of peak torque "
+        "and speed; again and again the rated torque may not allow it.",
         *(exact if left_out else []),
     ]

@@ -18,7 +18,7 @@ from pteron.tables import read_table
 from pteron.toml import read_toml, told, validated
 
 _FASTEST = 3000.0
-"""Speed, rad/s, above which `Motor.warnings` asks whether it is in revolutions per minute: 29 000
+"""Speed, rad/s, from which on `Motor.warnings` asks whether it is in revolutions per minute: 29 000
 of them."""
 
 _SLUGGISH = 30.0
@@ -80,7 +80,7 @@ class Motor:
     def warnings(self) -> tuple[str, ...]:
         """Warnings of unlikely numbers, most often in a wrong unit, one line each."""
         found = []
-        if self.max_speed > _FASTEST:
+        if self.max_speed >= _FASTEST:
             found.append(
                 f"motor {self.name}: max_speed of {self.max_speed:g} rad/s: is it in revolutions "
                 "per minute?"
@@ -101,7 +101,8 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     path : str or path
         A CSV or Parquet file with the columns name, rotor_inertia, rated_torque, peak_torque and
         max_speed, a row a motor, which without a name is called by its number; or a TOML file with
-        a table `[[motors]]` of these keys, name too, for each. kg m^2, N m and rad/s.
+        a table `[[motors]]` of these keys, name too, for each. kg m^2, N m and rad/s; a price, in
+        whatever currency, may stand beside them.
 
     Returns
     -------
@@ -137,6 +138,7 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
 
 
 _NAMED: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
+_NAMED["price"] = Number | None, None  # for who chooses among them
 _MotorTable: Any = create_model("_MotorTable", __base__=Table, **_NAMED)
 
 
@@ -150,7 +152,7 @@ _Rows = list[tuple[str, dict[str, Any]]]
 def _from_toml(path: str | Path) -> _Rows:
     document = read_toml(path, DataError, "no such file")
     listed = validated(_MotorsFile, document, str(path), DataError)
-    return [(str(path), motor.model_dump()) for motor in listed.motors]
+    return [(str(path), motor.model_dump(exclude={"price"})) for motor in listed.motors]
 
 
 def _from_table(path: str | Path) -> _Rows:

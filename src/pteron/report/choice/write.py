@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +20,31 @@ from pteron.report.typeset import template
 def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
     """Write choose.html, choose.json and KIND.toml for each kind that serves.
 
+    Machines of an earlier choice that no longer serve are removed, if they are as they were
+    written.
+
     Raises
     ------
     OutputError
         If the folder cannot be written.
     """
     texts = {"choose.html": page(choice), "choose.json": json_text(choice.data())}
-    return write_texts(folder, texts | choice.robots())
+    earlier = _machines(Path(folder) / "choose.json")
+    written = write_texts(folder, texts | choice.robots())
+    for name, robot in earlier.items():
+        file = Path(folder) / name
+        if file not in written and file.is_file() and file.read_text(encoding="utf-8") == robot:
+            file.unlink()
+    return written
+
+
+def _machines(file: Path) -> dict[str, str]:
+    """Return the machines' files of an earlier choice by their names; none if it is not one."""
+    try:
+        kinds = json.loads(file.read_text(encoding="utf-8"))["kinds"]
+        return {f"{one['kind']}.toml": one["robot"] for one in kinds if one["serves"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
 
 
 def reasons(choice: Choice, serving: list[Candidate]) -> list[str]:
