@@ -6,11 +6,12 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rich.table import Table
 
 from pteron.cli.terminal import table
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     import polars as pl
 
     from pteron.manipulator import Manipulator

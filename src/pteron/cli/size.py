@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import rich.table
 
 from pteron.cli.arguments import STANDARD, Machine
 from pteron.cli.destination import Destination
@@ -22,6 +21,8 @@ from pteron.errors import UnlikelyValue
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
+    import rich.table
+
     import polars as pl
 
     from pteron.manipulator import Manipulator
