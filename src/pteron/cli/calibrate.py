@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-
 from pteron.cli.arguments import Machine
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result

@@ -6,7 +6,6 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-
 from pteron.cli.arguments import Machine, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table

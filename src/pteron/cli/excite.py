@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Literal
 
-
 from pteron.cli.arguments import Machine
 from pteron.cli.progress import progress_bar
 from pteron.cli.result import Result

@@ -7,7 +7,6 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
-
 from pteron.cli.arguments import Machine, load_robot
 from pteron.cli.progress import Times, spinner, stages
 from pteron.cli.result import Result

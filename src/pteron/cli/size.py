@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-
 from pteron.cli.arguments import STANDARD, Machine
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
@@ -21,9 +20,8 @@ from pteron.errors import UnlikelyValue
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
-    import rich.table
-
     import polars as pl
+    import rich.table
 
     from pteron.manipulator import Manipulator
     from pteron.motion import Fit, Motion, Sizing
