@@ -40,6 +40,8 @@ def main() -> None:
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+        # What is left is freed with the process: Python need not look for cycles in it as it ends.
+        gc.freeze()
 
 
 def _leave(number: int = signal.SIGINT, frame: FrameType | None = None) -> NoReturn:

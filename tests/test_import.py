@@ -88,6 +88,36 @@ def test_kinematics_and_dynamics_do_without_them_too():
     assert [name for name in HEAVY if name in modules] == []
 
 
+def loaded_by(words):
+    """Return the modules that a command line has loaded when it ends."""
+    return in_a_fresh_python(
+        "import sys, json\n"
+        "from contextlib import redirect_stdout, suppress\n"
+        "from io import StringIO\n"
+        "from pteron_command import main\n"
+        f"sys.argv[1:] = {words.split()}\n"
+        "with redirect_stdout(StringIO()), suppress(SystemExit):\n"
+        "    main()\n"
+        "print(json.dumps(list(sys.modules)))"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "unused"),
+    [
+        ("--version", ("numpy", "rich.console", "urllib.request")),
+        ("catalog", ("scipy", "sympy", "polars", "urllib.request")),
+        ("inverse quadrupteron 0.01 0.02 -0.03 0.1", ("scipy", "sympy", "rich.console")),
+        ("base quadrupteron", ("sympy", "polars")),
+        ("cycle quadrupteron", ("scipy.optimize", "sympy", "polars")),
+    ],
+)
+def test_a_command_loads_what_it_uses(words, unused):
+    loaded_by(words)  # what it keeps on disk is there the second time
+    modules = loaded_by(words)
+    assert [name for name in unused if name in modules] == []
+
+
 def test_every_public_name_resolves():
     assert len(set(pteron.__all__)) == len(pteron.__all__)
     assert list(pteron.__all__) == sorted(pteron.__all__)

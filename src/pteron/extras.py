@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
-from urllib.request import url2pathname
 
 if TYPE_CHECKING:
     from pteron.errors import PteronError
@@ -59,6 +55,12 @@ def install_command(extra: str) -> str:
 
 
 def _wanted(extra: str) -> str:
+    # Only where something is missing: these are slow to import.
+    import json
+    from importlib.metadata import PackageNotFoundError, distribution
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname
+
     name = f"pteron[{extra}]"
     try:
         record = distribution("pteron").read_text("direct_url.json")

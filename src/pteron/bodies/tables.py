@@ -38,7 +38,7 @@ def key(about: str, default: Any = ..., *example: Any) -> Any:
 class Table(BaseModel):
     """A TOML table in which an unknown key is an error."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class Slider(Table):

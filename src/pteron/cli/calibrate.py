@@ -6,8 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from rich.table import Table
-
 from pteron.cli.arguments import Machine
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
@@ -15,6 +13,8 @@ from pteron.cli.terminal import GRADE_COLORS, ascii_number, plain, show, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from pteron.calibration import Calibration
     from pteron.manipulator import Manipulator
 

@@ -6,8 +6,6 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from rich.table import Table
-
 from pteron.cli.arguments import Machine, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table
@@ -19,6 +17,8 @@ from pteron.errors import DataError
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, MotionLimits
 

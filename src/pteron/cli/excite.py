@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Literal
 
-from rich.table import Table
-
 from pteron.cli.arguments import Machine
 from pteron.cli.progress import progress_bar
 from pteron.cli.result import Result
@@ -14,6 +12,8 @@ from pteron.cli.terminal import note, table
 from pteron.errors import ModelError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from pteron.identification.excitation import Excitation, Margins, RepeatedCycle
 
 _MEASURES = {

@@ -7,8 +7,6 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
-from rich.table import Table
-
 from pteron.cli.arguments import Machine, load_robot
 from pteron.cli.progress import Times, spinner, stages
 from pteron.cli.result import Result
@@ -24,6 +22,8 @@ from pteron.cli.terminal import (
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from pteron.identification import Bounds, Identification, Terms
     from pteron.identification.consistency.bounds import Box
     from pteron.manipulator import Manipulator

@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
 from typer import Exit
 
 from pteron.cli.arguments import load_robot, signs
@@ -19,6 +18,8 @@ from pteron.errors import DataError, ModelError, OutputError, PteronError
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from pteron.legs import LegKind
     from pteron.manipulator import Manipulator
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from io import StringIO
 from typing import Any
 
 from typer import Abort, Context, Exit, Typer, echo
 from typer.core import TyperGroup
+from typer.main import get_command
 
 from pteron.cli.arguments import Command, NumbersCommand, without_types
 from pteron.cli.base_parameters import base, table1
@@ -51,6 +52,9 @@ _PIPE_CLOSED = 1
 
 class CommandGroup(TyperGroup):
     """All subcommands; errors become lines on standard error and exit codes."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given | {"commands": Commands()})
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, flags without a type in the help."""
@@ -124,9 +128,9 @@ def _close_standard_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-app = Typer(
-    name="pteron", cls=CommandGroup, rich_markup_mode="rich", pretty_exceptions_enable=False
-)
+_LOOKS: dict[str, Any] = {"rich_markup_mode": "rich", "pretty_exceptions_enable": False}
+
+app = Typer(name="pteron", cls=CommandGroup, **_LOOKS)
 
 
 _COMMANDS: dict[str, tuple[Callable[..., Result | None], ...]] = {
@@ -141,6 +145,29 @@ _COMMANDS: dict[str, tuple[Callable[..., Result | None], ...]] = {
 
 _NUMERIC = (inverse, direct, forces, cycle)
 """Subcommands whose arguments may be negative numbers."""
+
+
+class Commands(Mapping[str, Any]):
+    """The subcommands by their names, each made when it is asked for: most often one is."""
+
+    def __init__(self) -> None:
+        self._panels = {f.__name__: (panel, f) for panel, fs in _COMMANDS.items() for f in fs}
+        self._made: dict[str, Any] = {}
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._panels)
+
+    def __len__(self) -> int:
+        return len(self._panels)
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._made:
+            panel, function = self._panels[name]
+            cls, whole = NumbersCommand if function in _NUMERIC else Command, typed(function)
+            alone = Typer(add_completion=False, **_LOOKS)
+            alone.command(cls=cls, rich_help_panel=panel, **help_of(whole))(whole)
+            self._made[name] = get_command(alone)
+        return self._made[name]
 
 
 def pteron(context: Context, *, version: bool = False) -> None:
@@ -170,10 +197,6 @@ def pteron(context: Context, *, version: bool = False) -> None:
 
 
 app.callback(invoke_without_command=True, **help_of(pteron))(pteron)
-for _panel, _functions in _COMMANDS.items():
-    for _function in _functions:
-        _cls, _typed = NumbersCommand if _function in _NUMERIC else Command, typed(_function)
-        app.command(cls=_cls, rich_help_panel=_panel, **help_of(_typed))(_typed)
 
 
 def main() -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-import rich.table
-
 from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
+    import rich.table
+
     from pteron.maps import Map
     from pteron.workspace import ReachVolume
 

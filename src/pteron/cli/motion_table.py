@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
 from pteron.cli.terminal import table
 
 if TYPE_CHECKING:
     import polars as pl
+    from rich.table import Table
 
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, Peak

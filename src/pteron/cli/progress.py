@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from pteron.cli.terminal import plain
 
 if TYPE_CHECKING:
@@ -34,6 +32,8 @@ def spinner(task: str) -> Iterator[None]:
     if not is_watched():
         yield
         return
+    from rich.console import Console
+
     with Console(stderr=True).status(plain(task)):
         yield
 
@@ -74,6 +74,7 @@ def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
 
 def _bar() -> Progress:
     from rich import progress
+    from rich.console import Console
 
     return progress.Progress(
         progress.TextColumn("{task.description}"),

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
-
-from rich.table import Table
+from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import Machine
 from pteron.cli.motion_argument import played
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import plain, table, warn
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 """Keys of report.json with a value for each sample of the motion, too long to print."""

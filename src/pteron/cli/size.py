@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import rich.table
-
 from pteron.cli.arguments import STANDARD, Machine
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
@@ -23,6 +21,7 @@ from pteron.json_values import picked
 
 if TYPE_CHECKING:
     import polars as pl
+    import rich.table
 
     from pteron.manipulator import Manipulator
     from pteron.motion import Fit, Motion, Sizing

@@ -11,16 +11,15 @@ import json
 import sys
 from collections.abc import Iterable
 from io import TextIOWrapper
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.markup import escape
-from rich.measure import Measurement
-from rich.table import Table
 from typer import echo
 
 from pteron.json_values import json_ready
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
 _PIECE = 1 << 16
 """Characters written at a time: a reader of a pipe that leaves is noticed at the next piece."""
@@ -48,6 +47,8 @@ def plain(text: str) -> str:
     >>> print(plain("[red]odd\x1b[2J"))
     \[red]odd\x1b[2J
     """
+    from rich.markup import escape
+
     return escape(_visible(text))
 
 
@@ -59,6 +60,9 @@ def _visible(text: str) -> str:
 
 def show(*things: str | Table) -> None:
     """Print texts, with Rich's markup, and tables on standard output."""
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console(highlight=False, emoji=False)
     for thing in things:
         if isinstance(thing, Table):
@@ -69,6 +73,8 @@ def show(*things: str | Table) -> None:
 
 def _fit(made: Table, console: Console) -> None:
     """Break the headings of a table at their blanks if it is wider than the screen."""
+    from rich.measure import Measurement
+
     wide = console.options.update(max_width=_ANY_WIDTH)
     if Measurement.get(console, wide, made).maximum <= console.width:
         return
@@ -100,6 +106,9 @@ def table(
 
     Rows may hold Rich's markup; the headings are plain text.
     """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
     made = Table(box=SIMPLE_HEAD, caption=caption, pad_edge=False, collapse_padding=True)
     for name in columns:
         number = name in numbers
@@ -139,6 +148,8 @@ def warn(messages: Iterable[str], source: str = "") -> None:
 
 def complain(message: str) -> None:
     """Print an error as one line on standard error; lines to paste into a file stay lines."""
+    from rich.console import Console
+
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
     told, start, lines = message.partition("\n[")
     console.print(f"[bold red]Error:[/bold red] {plain(told)}")

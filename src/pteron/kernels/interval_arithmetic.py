@@ -117,8 +117,11 @@ def multiply(a: Interval, b: Interval) -> Interval:
         ends = (a.low, a.high) if b.low >= 0.0 else (a.high, a.low)
         least, most = (_finite_product(end, b.low) for end in ends)
     else:
-        products = [_finite_product(x, y) for x in a[:2] for y in b[:2]]
+        products = [x * y for x in a[:2] for y in b[:2]]
         least, most = _least(products), _most(products)
+        if np.isnan(np.sum(least)):  # as each is where one of the products is
+            products = [_finite_product(x, y) for x in a[:2] for y in b[:2]]
+            least, most = _least(products), _most(products)
     return Interval(_well_below(least), _well_above(most), *_marks(a, b))
 
 

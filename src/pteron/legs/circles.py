@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from random import Random
 
 import casadi as ca
 import numpy as np
 
 from pteron.bodies.motion import Expression
-from pteron.bodies.vectors import cross
+from pteron.bodies.vectors import Vector, cross
 
 _ROUNDING = 1e-15
 """Difference of an axis' component from 0, 1 or -1 that counts as rounding."""
@@ -92,9 +93,10 @@ def plane_of(d: Expression, a: Expression) -> Expression:
     return ca.SX(ca.DM(np.where(np.abs(values - whole) < _ROUNDING, whole, values)))
 
 
-def perpendicular_to(d: Sequence[float]) -> list[float]:
+@lru_cache(maxsize=256)
+def perpendicular_to(d: Vector) -> tuple[float, ...]:
     """Return a unit vector of numbers perpendicular to another."""
-    return [float(x) for x in ca.vertsplit(plane_axis(ca.DM(list(d)), *pole(d)))]
+    return tuple(float(x) for x in ca.vertsplit(plane_axis(ca.DM(list(d)), *pole(d))))
 
 
 def random_vector(length: Fraction, dimension: int, rng: Random) -> list[Fraction]:

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache
 from random import Random
 from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
 
@@ -152,6 +153,7 @@ class LegKind(ABC):
         return sound_fields(given, cls.every_key(), cls.conditions, cls.branches)
 
     @classmethod
+    @cache
     def every_key(cls) -> dict[str, Key]:
         """Return all its keys, in the order in which files and pages give them."""
         roles, found = get_args(KeyRole), {**COMMON, **cls.keys}

@@ -1,4 +1,7 @@
-"""Base parameters as text, SymPy, LaTeX and HTML."""
+"""Base parameters as text, SymPy, LaTeX and HTML.
+
+SymPy is imported only for shares in symbols, since it is slow to import.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
-
-from sympy import Add, Mul, Symbol, factor, latex, sympify
-from sympy.printing.str import StrPrinter
 
 from pteron.bodies.parameters import Parameter
 from pteron.reduction.grouping import Share, Shares
@@ -22,6 +22,7 @@ _MINUS = "\u2212"
 _NARROW = "\u202f"
 """The narrow space that stands for a product's sign in HTML."""
 
+_WORD = re.compile(r"[A-Za-z]\w*")
 
 _FACTORED = 60
 """Operations up to which a share is factored, to be read; longer ones only cost minutes."""
@@ -61,6 +62,8 @@ def as_latex(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
 
     def product(column: int, share: Share) -> tuple[bool, str]:
         if _is_symbolic(share):
+            from sympy import latex
+
             minus, value = _signed(share)
             size = latex(value, symbol_names=_geometry_names(share))
             size = rf"\left({size}\right)" if value.is_Add or size.startswith("-") else size
@@ -103,6 +106,8 @@ def _is_symbolic(share: Share) -> bool:
 
 def _signed(share: Any) -> tuple[bool, Any]:
     """Return whether a share is written with a minus sign, and what is then written after it."""
+    from sympy import factor
+
     size = factor(share) if share.count_ops() <= _FACTORED else share
     minus = size.could_extract_minus_sign()
     return minus, -size if minus else size
@@ -110,6 +115,8 @@ def _signed(share: Any) -> tuple[bool, Any]:
 
 def as_sympy(names: Sequence[str], terms: Terms) -> Any:
     """Return a base parameter as a SymPy sum; fractions stay exact."""
+    from sympy import Add, Mul, Symbol, sympify
+
     return Add(*(Mul(sympify(share), Symbol(names[j])) for j, share in terms.items()))
 
 
@@ -138,15 +145,11 @@ def html_symbol(name: str) -> str:
     return f"<i>{name[0]}</i><sub>{name[1:]}</sub>"
 
 
-class _HtmlPrinter(StrPrinter):  # type: ignore[misc]
-    def _print_Symbol(self, symbol: Any) -> str:  # noqa: N802
-        return html_symbol(symbol.name)
-
-
 def _html_share(share: Any) -> str:
     """Return an expression of geometric symbols in HTML."""
-    text = _HtmlPrinter().doprint(share)
-    return re.sub(r"\*\*(\d+)", r"<sup>\1</sup>", text).replace("*", _NARROW)
+    names = {symbol.name for symbol in share.free_symbols}
+    text = re.sub(r"\*\*(\d+)", r"<sup>\1</sup>", str(share)).replace("*", _NARROW)
+    return _WORD.sub(lambda w: html_symbol(w[0]) if w[0] in names else w[0], text)
 
 
 def _geometry_names(share: Any) -> dict[Any, str]:

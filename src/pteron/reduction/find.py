@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from importlib.metadata import version
 from typing import Literal, get_args
-
-import sympy
 
 from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
@@ -19,12 +18,10 @@ from pteron.kernels import OTHER_LAYOUT, bare, same_layout
 from pteron.kernels.kept import kept_result
 from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.reduction.exact import exact_grouping
 from pteron.reduction.grouping import Grouping
 from pteron.reduction.numerical import qr_grouping, svd_grouping
 from pteron.reduction.result import BaseParameters
 from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
-from pteron.reduction.transfers import transfers
 from pteron.shapes import OnFailure, PoseLike, Regressors, Seed
 
 Method = Literal["exact", "svd", "qr"]
@@ -96,7 +93,6 @@ def base_parameters(
     groups = tuple(leg_groups(robot, shared))
     columns, sharing = share(robot, groups)
     order = _order(columns, keep)
-    by_mass = transfers(robot, columns)
     # Neither bodies nor drives matter; a refusal tells the name.
     layout = replace(bare(robot), name=robot.name)
     grouping = _grouping(layout, method, tuple(order), groups, seed)
@@ -107,7 +103,7 @@ def base_parameters(
             f"keep: {', '.join(lost)} cannot be kept: zero, or dependent on the columns named "
             "before; leave it out"
         )
-    return BaseParameters.of(robot, columns, sharing, tuple(by_mass), grouping)
+    return BaseParameters.of(robot, columns, sharing, grouping)
 
 
 @lru_cache(maxsize=256)
@@ -119,11 +115,15 @@ def _grouping(
     def found() -> Grouping:
         columns, sharing = share(layout, groups)
         if method == "exact":
+            # Only where nothing is kept: SymPy is slow to import.
+            from pteron.reduction.exact import exact_grouping
+            from pteron.reduction.transfers import transfers
+
             by_mass = transfers(layout, columns)
             return exact_grouping(layout, columns, order, sharing, by_mass, seed)
         return _NUMERICAL[method](layout, order, sharing, seed)
 
-    key = "grouping", layout, method, order, groups, seed, sympy.__version__
+    key = "grouping", layout, method, order, groups, seed, version("sympy")
     return kept_result(key, ("kinematics", "reduction"), found)
 
 

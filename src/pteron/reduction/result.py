@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from markupsafe import Markup
@@ -23,8 +23,9 @@ from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.expressions import as_html, as_latex, as_sympy, as_text, terms_of
 from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.latex_table import latex_table
-from pteron.reduction.symbols import named_values, symbolic_shares, values_by_leg
-from pteron.reduction.transfers import Transfer
+
+if TYPE_CHECKING:
+    from pteron.reduction.transfers import Transfer
 
 Form = Literal["text", "sympy", "latex", "html"]
 """Forms in which expressions are written."""
@@ -50,8 +51,6 @@ class BaseParameters:
         base = grouping @ parameters. Where legs share parameters it takes their mean.
     selection : array, shape (N, rank)
         base regressor = regressor @ selection.
-    transfers : tuple of Transfer
-        The mass transfers, which give the groupings in symbols.
     certificate : Certificate
         What proves, or supports, the rank.
     """
@@ -61,7 +60,6 @@ class BaseParameters:
     kept: tuple[int, ...]
     grouping: Array = field(compare=False)
     selection: Array = field(compare=False)
-    transfers: tuple[Transfer, ...] = field(compare=False)
     certificate: Certificate
     shares: Shares = field(compare=False)
 
@@ -71,7 +69,6 @@ class BaseParameters:
         robot: Manipulator,
         columns: tuple[Parameter, ...],
         sharing: Array,
-        transfers: tuple[Transfer, ...],
         grouping: Grouping,
     ) -> BaseParameters:
         """Assemble the result from what a method found; `sharing` is (N, columns)."""
@@ -82,7 +79,6 @@ class BaseParameters:
             kept=grouping.kept,
             grouping=_matrix(grouping, len(columns)) @ mean,
             selection=sharing[:, list(grouping.kept)],
-            transfers=transfers,
             certificate=grouping.certificate,
             shares={column: dict(terms) for column, terms in grouping.given.items()},
         )
@@ -126,15 +122,31 @@ class BaseParameters:
         return np.asarray(self.grouping @ values_of(robot or self.robot))
 
     @cached_property
+    def transfers(self) -> tuple[Transfer, ...]:
+        """The mass transfers, which give the groupings in symbols."""
+        from pteron.reduction.transfers import transfers  # SymPy
+
+        return tuple(transfers(self.robot, self.parameters))
+
+    @cached_property
+    def _named(self) -> dict[str, Any]:
+        """The value of each geometric symbol, in symbols of which equal values share one."""
+        from pteron.reduction.symbols import named_values  # SymPy
+
+        return named_values(exact_geometry(self.robot))
+
+    @cached_property
     def _symbolic(self) -> Shares:
         """The shares in symbols of the geometry, those that are equal in one."""
-        return self._in_symbols(named_values(exact_geometry(self.robot)))
+        return self._in_symbols(self._named)
 
     @cached_property
     def _by_leg(self) -> Shares:
         """The shares in symbols of the geometry, each leg with its own."""
         if not self.shared_symbols:
             return self._symbolic
+        from pteron.reduction.symbols import values_by_leg  # SymPy
+
         return self._in_symbols(values_by_leg(exact_geometry(self.robot)))
 
     def _in_symbols(self, named: dict[str, Any]) -> Shares:
@@ -153,13 +165,15 @@ class BaseParameters:
             {column: Fraction(1), **{k: -share for k, share in self.shares[column].items()}}
             for column in unexplained
         ]
+        from pteron.reduction.symbols import symbolic_shares  # SymPy
+
         return symbolic_shares(self.parameters, self.kept, self.transfers, extra, named)
 
     @property
     def geometry_values(self) -> dict[str, float]:
         """The geometric symbols of the expressions, and their values in metres."""
-        named = named_values(exact_geometry(self.robot))
-        return {k: v for k, v in self.leg_geometry_values.items() if str(named[k]) == k}
+        values = self.leg_geometry_values.items()
+        return {name: value for name, value in values if str(self._named[name]) == name}
 
     @property
     def leg_geometry_values(self) -> dict[str, float]:
@@ -171,7 +185,7 @@ class BaseParameters:
     def shared_symbols(self) -> dict[str, tuple[str, ...]]:
         """The geometric symbols that stand for several values, equal but for their sign."""
         found: dict[str, tuple[str, ...]] = {}
-        for name, value in named_values(exact_geometry(self.robot)).items():
+        for name, value in self._named.items():
             bearer = str(value).lstrip("-")
             if bearer not in (name, "0"):
                 found[bearer] = (*found.get(bearer, ()), name)

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TypeVar
 
-from sympy import factorint
-
 from pteron.kernels import Field
 
 Element = TypeVar("Element")
@@ -28,6 +26,8 @@ class Surd:
     @classmethod
     def root(cls, square: Fraction, sign: float) -> Surd:
         """Return the square root of a rational number, with the sign of `sign`."""
+        from sympy import factorint  # slow to import
+
         outside, inside = 1, 1
         for prime, power in factorint(square.numerator * square.denominator).items():
             outside *= prime ** (power // 2)
@@ -55,6 +55,8 @@ class Surd:
         The root of s is the product of the roots of its primes, so that sqrt(2) sqrt(3) = sqrt(6)
         holds in every field.
         """
+        from sympy import factorint  # slow to import
+
         value = field.number(self.q)
         for prime in factorint(self.s):
             value = field.multiply(value, field.square_root(field.number(prime)))

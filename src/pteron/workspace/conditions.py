@@ -20,7 +20,7 @@ from pteron.arguments import expect
 from pteron.equations.edges import Edge, edges
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
-from pteron.kernels import Array, bounded, numeric
+from pteron.kernels import Array, bounded, layout_of, numeric
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 
@@ -110,11 +110,7 @@ def conditions(
     robot = as_manipulator(robot)
     for name, floor in (("type_i", type_i), ("type_ii", type_ii)):
         expect(0.0 <= floor < math.inf, name, repr(floor), "a floor of 0 or more")
-    pose = ca.SX.sym("pose", robot.freedom)
-    found = [
-        Condition(edge.leg, _clause(edge), "room", "room", k)
-        for k, edge in enumerate(edges(Machine.of(robot), pose))
-    ]
+    found = [*_edges(layout_of(robot))]
     if type_i > 0.0:
         found += [
             Condition(i + 1, "near type I", "squared_type_i", "squares", i, type_i**2)
@@ -123,6 +119,16 @@ def conditions(
     if type_ii > 0.0:
         found.append(Condition(0, "near type II", "type_ii", "type_ii", 0, type_ii, sized=True))
     return tuple(found)
+
+
+@lru_cache(maxsize=64)
+def _edges(layout: Manipulator) -> tuple[Condition, ...]:
+    """Return the conditions of reach and limits: a search asks for those of many machines."""
+    pose = ca.SX.sym("pose", layout.freedom)
+    return tuple(
+        Condition(edge.leg, _clause(edge), "room", "room", k)
+        for k, edge in enumerate(edges(Machine.of(layout), pose))
+    )
 
 
 def condition_margins(robot: Manipulator, given: Sequence[Condition], poses: Array) -> Array:

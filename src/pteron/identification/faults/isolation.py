@@ -254,7 +254,7 @@ def _play(parts: Sequence[_Part], values: Array, step: float) -> IsolatedFault |
     if found is None:
         return None
     named = np.flatnonzero(~np.isnan(found.times)).tolist()
-    labels = tuple(parts[0].model.robot.force_names[joint] for joint in named)
+    labels = tuple(parts[0].model.model.robot.force_names[joint] for joint in named)
     # Knocks come on a cycle as they do in the logs, as far as can be said.
     forces = np.concatenate([part.log.forces for part in parts])
     cycle = 100.0 * np.sqrt(found.power) / forces.std(axis=0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
 from pteron.arguments import expect, expect_to_fit
@@ -23,6 +22,9 @@ from pteron.workspace import home_pose
 
 PEAK_ACCELERATION = 10.0
 """Largest acceleration of the tool's centre point where no duration is given, m/s^2."""
+
+_ZOOMS = 4
+"""Grids in which the greatest acceleration is sought, each a 500th as wide as the one before."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -176,16 +178,10 @@ def farthest_point(robot: Manipulator) -> float:
 
 def _peak_acceleration(cycle: Cycle, radius: float) -> float:
     """Return the largest acceleration over a cycle that takes one second, m/s^2."""
-
-    def size(tau: Array) -> Array:
-        return np.asarray(np.linalg.norm(cycle.acceleration(tau, radius), axis=-1))
-
-    tau = np.linspace(0.0, 0.5, 1001)
-    highest = int(size(tau).argmax())
-    found = scipy.optimize.minimize_scalar(
-        lambda t: -float(size(np.array([t]))[0]),
-        bounds=(tau[max(highest - 1, 0)], tau[min(highest + 1, 1000)]),
-        method="bounded",
-        options={"xatol": 1e-12},
-    )
-    return max(-float(found.fun), float(size(tau)[highest]))
+    low, high = 0.0, 0.5
+    for _ in range(_ZOOMS):
+        tau = np.linspace(low, high, 1001)
+        sizes = np.linalg.norm(cycle.acceleration(tau, radius), axis=-1)
+        highest = int(sizes.argmax())
+        low, high = tau[max(highest - 1, 0)], tau[min(highest + 1, 1000)]
+    return float(sizes[highest])
