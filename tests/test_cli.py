@@ -446,10 +446,10 @@ def test_joints_beyond_their_limits_are_told_beside_the_numbers():
         "Note: beyond the joints' limits: theta1 (1.2 for -1.5 to 0.9 rad), "
         "theta3 (1.3 for -1.5 to 0.9 rad)\n"
     )
-    poses = "x,y,z\n0,0,-0.9\n0,0,-1.4\n0,0,-1.42\n"
+    poses = "x,y,z\n0,0,-0.9\n0.7,0,-0.7\n0.6,0,-0.6\n"
     told = run("inverse delta --table -", poses).stderr
     assert told.startswith("Note: beyond the joints' limits: theta1 (in 2 of 3 rows, ")
-    told = run("forces delta --pose 0 0 -1.4").stderr
+    told = run("forces delta --pose 0.7 0 -0.7").stderr
     assert told.startswith("Note: beyond the joints' limits: theta1 (")
 
 

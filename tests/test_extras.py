@@ -78,6 +78,6 @@ def test_the_set_up_of_readme_has_what_its_commands_need():
     text = "".join((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/start/tour.md"))
     shown = set(re.findall(r"(?m)^ {4}\.venv/bin/pteron (\w+)", text))
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    (set_up,) = re.findall(r"(?s)/\.runtime: .*?install --editable '\.\[([\w,]+)\]'", makefile)
+    (set_up,) = re.findall(r"(?m)/\.runtime: EXTRAS := ([\w,]+)$", makefile)
     assert shown >= NEEDED.keys()
     assert {NEEDED[name] for name in shown & NEEDED.keys()} <= set(set_up.split(","))
