@@ -290,13 +290,12 @@ def test_a_fault_hides_none_that_does_not_hang_on_it(tmp_path):
     second = second.replace("zero_direction = [1.0, 0.0", "zero_direction = [0.0, 1.0")
     head = text.split("[[legs]]")[0].replace('name = "par4"', "nam = 1").replace("0.32", "-0.32", 1)
     found = faults_in("[[legs]]".join([head, first, second, *others]), tmp_path)
-    assert [fault.split(": ")[0:2] for fault in found[:4]] == [
-        ["name", "missing; the file must give a text"],
-        ["nam", f"unknown key; the valid ones there are {KEYS}"],
+    assert [fault.split(": ")[0:2] for fault in found[:3]] == [
+        ["nam", f"unknown key; did you mean name? The valid ones there are {KEYS}"],
         ["platform.bars, item 1", "mass"],
         ["platform.limits", "a 3T platform has no angle to limit"],
     ]
-    assert [fault.split(": ")[0:2] for fault in found[5:-1]] == [
+    assert [fault.split(": ")[0:2] for fault in found[4:-1]] == [
         ["leg 1", "upper.mass"],
         ["leg 1", "upper_length"],
         ["leg 1", "limits"],
@@ -305,6 +304,18 @@ def test_a_fault_hides_none_that_does_not_hang_on_it(tmp_path):
         ["leg 2", "zero_direction"],
     ]
     assert found[-1] == four
+
+
+def test_a_misspelt_key_is_one_fault_a_leg_with_the_valid_keys_told_once(tmp_path):
+    found = faults_in(text_of("delta").replace("upper_length", "upper_lenght"), tmp_path)
+    meant = "upper_lenght: unknown key; did you mean upper_length?"
+    keys = " The valid ones there are type, guide_point, "
+    assert len(found) == 3
+    assert found[0].startswith(f"leg 1: {meant}{keys}")
+    assert found[1:] == tuple(f"leg {i}: {meant}" for i in (2, 3))
+    found = faults_in(text_of("delta").replace("rods =", "zzz ="), tmp_path)
+    listed = "zzz: unknown key; the valid ones there are listed above"
+    assert found[1:] == tuple(f"leg {i}: {listed}" for i in (2, 3))
 
 
 def test_a_leg_with_faults_is_held_against_the_platform_too(tmp_path):

@@ -399,7 +399,7 @@ def test_a_description_is_given_by_value_or_path(tmp_path):
     [
         (
             "[force]\n",
-            "force: unknown key; the valid ones there are csv, time, joints, forces, ",
+            "force: unknown key; did you mean forces[?] The valid ones there are csv, time, ",
         ),
         ("forces = 3\n", "forces: 3 given, a table expected"),
         ("[forces]\nunits = 'N'\n", "forces.units: unknown key; .* columns, unit, gains, limits"),

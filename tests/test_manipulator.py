@@ -387,7 +387,7 @@ BAD_FILES = {
     "unknown key": (
         "mass = 0.8\n",
         "mass = 0.8\nmas = 1\n",
-        "platform.mas: unknown key; the valid ones there are motion, ",
+        "platform.mas: unknown key; did you mean mass? The valid ones there are motion, ",
     ),
     "unknown key of a link": (
         "mass = 0.36,",
@@ -529,8 +529,8 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path):
     with pytest.raises(ModelError) as caught:
         pteron.load(file)
     head, *lines = str(caught.value).split("\n")
-    assert head == f"{file}: 6 faults"
-    keys = ["platform.mass", "platform.mas", "gravitation", "leg 1", "leg 1", "leg 3"]
+    assert head == f"{file}: 5 faults"
+    keys = ["platform.mas", "gravitation", "leg 1", "leg 1", "leg 3"]
     assert [line.strip().split(": ")[0] for line in lines] == keys
     assert lines[-1] == "  leg 3: slider.mass: -0.65 kg is not positive; give a value above 0 kg"
 
@@ -587,6 +587,17 @@ def test_a_byte_order_mark_is_passed_over(tmp_path):
 
 
 HEXAPODS = ("rubin-camera-hexapod", "rubin-m2-hexapod", "stewart")
+
+
+def test_a_missing_file_is_told_by_the_file_beside_it_that_may_be_meant(tmp_path):
+    (tmp_path / "robot.toml").write_text(CATALOG_TEXT, encoding="utf-8")
+    near, missing = tmp_path / "robot.toml", tmp_path / "robto.toml"
+    catalog = "neither a file nor a machine of the catalog"
+    refused(lambda: pteron.load(missing), f'{missing}: {catalog}; did you mean "{near}"?')
+    (tmp_path / "delat.toml").write_text(CATALOG_TEXT, encoding="utf-8")
+    both = f'did you mean "{tmp_path / "delat.toml"}" or "delta"?'
+    refused(lambda: pteron.load(tmp_path / "delta.toml"), both)
+    refused(lambda: pteron.load(tmp_path / "nowhere.toml"), f"{catalog} (3-prr, ")
 
 
 def test_files_that_cannot_be_read_are_refused(tmp_path):

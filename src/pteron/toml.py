@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -37,6 +38,9 @@ _BOUNDS = {
     "less_than_equal": "of at most",
 }
 """Words of messages for pydantic's kinds of fault."""
+
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""Pydantic's kinds of fault for a key that a table has not."""
 
 _WORDS = {
     "number": "a number",
@@ -151,11 +155,15 @@ def told(lines: Sequence[str]) -> str:
     return "\n  ".join([f"{len(lines)} faults", *lines[:_MANY], *more])
 
 
-def fault_lines(error: ValidationError, model: Any) -> list[str]:
+def fault_lines(
+    error: ValidationError, model: Any, listed: set[tuple[str, ...]] | None = None
+) -> list[str]:
     r"""Return a line for every fault that pydantic found: the key, what was given and expected.
 
     `model` is the pydantic model or dataclass that refused a file's content. Aliases with a dot,
-    such as ``"time.unit"``, are understood as keys of tables.
+    such as ``"time.unit"``, are understood as keys of tables. A key that is missing is not told
+    where an unknown one is nearest to it. `listed` takes the lists of valid keys that are told, so
+    that a file of several tables tells each list once.
 
     Examples
     --------
@@ -172,8 +180,13 @@ def fault_lines(error: ValidationError, model: Any) -> list[str]:
     nam: unknown key; the valid ones there are gravity, legs
     """
     schema = _schema(model)
+    listed = set() if listed is None else listed
+    faults = error.errors(include_url=False)
+    meant = {_meant(f["loc"], schema) for f in faults if f["type"] in _UNKNOWN}
     lines = []
-    for fault in error.errors(include_url=False):
+    for fault in faults:
+        if fault["type"] == "missing" and fault["loc"] in meant:
+            continue  # it is there, misspelt
         if fault["type"] == "too_short" and len(fault["input"]) >= fault["ctx"]["min_length"]:
             continue  # some of its items are faults
         location = fault["loc"]
@@ -181,7 +194,7 @@ def fault_lines(error: ValidationError, model: Any) -> list[str]:
         if fault["type"] == "missing" and location and isinstance(location[-1], int):
             location = location[:-1]
         key = _key(location)
-        lines.append(f"{key}: " * bool(key) + _fault(fault, schema, location))
+        lines.append(f"{key}: " * bool(key) + _fault(fault, schema, location, listed))
     return list(dict.fromkeys(lines))
 
 
@@ -202,16 +215,36 @@ def _key(location: tuple[int | str, ...]) -> str:
     return key
 
 
-def _fault(fault: Any, schema: _Node, location: tuple[int | str, ...]) -> str:
+def _valid(location: tuple[int | str, ...], schema: _Node) -> tuple[str, tuple[str, ...]]:
+    """Return what aliases of an unknown key's table begin with, and the keys that it may have."""
+    table, dot, _ = str(location[-1]).rpartition(".")
+    return table + dot, _keys(_at(schema, location[:-1]), table + dot)
+
+
+def _meant(location: tuple[int | str, ...], schema: _Node) -> tuple[int | str, ...]:
+    """Return the location of the valid key that is nearest to an unknown one; empty if none is."""
+    table, valid = _valid(location, schema)
+    close = get_close_matches(str(location[-1]).removeprefix(table), valid, n=1)
+    return (*location[:-1], table + close[0]) if close else ()
+
+
+def _fault(
+    fault: Any, schema: _Node, location: tuple[int | str, ...], listed: set[tuple[str, ...]]
+) -> str:
     kind, given, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
-    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        table, dot, _ = str(location[-1]).rpartition(".")
-        valid = _keys(_at(schema, location[:-1]), table + dot)
+    if kind in _UNKNOWN:
+        table, valid = _valid(location, schema)
         if location[-1] in valid:
             return f"{given} given, a table expected"
-        return f"unknown key; the valid ones there are {', '.join(valid)}"
+        meant = _meant(location, schema)
+        guess = f" did you mean {str(meant[-1]).removeprefix(table)}?" if meant else ""
+        if valid in listed:
+            return f"unknown key;{guess or ' the valid ones there are listed above'}"
+        listed.add(valid)
+        the = " The" if guess else " the"
+        return f"unknown key;{guess}{the} valid ones there are {', '.join(valid)}"
     node = _at(schema, location)
     if kind == "list_type" and isinstance(fault["input"], dict):
         key = ".".join(str(part) for part in location)

@@ -109,14 +109,28 @@ def _contents(name_or_path: str | Path) -> tuple[bytes, str]:
     if name in catalog():
         resource = files("pteron.manipulator") / "catalog" / f"{name}.toml"
         return resource.read_bytes(), name
+    names = " or ".join(f'"{near}"' for near in [*_near_files(Path(name)), *_near_machines(name)])
+    guess = f"; did you mean {names}?" if names else f" ({', '.join(catalog())})"
+    absent = f"neither a file nor a machine of the catalog{guess}"
+    return toml_bytes(name_or_path, ModelError, absent)
+
+
+def _near_files(path: Path) -> list[str]:
+    """Return the file in a missing file's folder whose name is nearest, if one is near."""
+    with suppress(OSError, ValueError):  # no such folder, one that may not be read, or no path
+        if not path.exists():
+            beside = [file.name for file in path.parent.iterdir() if file.suffix == ".toml"]
+            near = get_close_matches(path.name, beside, n=1, cutoff=0.75)
+            return [shown(str(path.parent / name), bare=True, longest=1000) for name in near]
+    return []
+
+
+def _near_machines(name: str) -> list[str]:
+    """Return the machines of the catalog that a name may mean, by their names or what they are."""
     word = Path(name).stem.lower()
     said = [own for own, text in descriptions().items() if word in text.lower().split()]
     close = get_close_matches(word, catalog(), n=1, cutoff=0.85) or said
-    close = close or get_close_matches(word, catalog(), n=1)
-    names = " or ".join(f'"{own}"' for own in close)
-    guess = f"; did you mean {names}?" if close else f" ({', '.join(catalog())})"
-    absent = f"neither a file nor a machine of the catalog{guess}"
-    return toml_bytes(name_or_path, ModelError, absent)
+    return close or get_close_matches(word, catalog(), n=1)
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
@@ -152,6 +166,8 @@ class _Reading:
     faults: list[str] = field(default_factory=list)
     tilts: bool = False
     """Whether the machine's platform does."""
+    listed: set[tuple[str, ...]] = field(default_factory=set)
+    """The lists of valid keys that were told."""
 
     def table(self, model: Any, given: object, prefix: str) -> Any:
         """Return a table as its model holds it; with its faults noted, what of it `rest` gives."""
@@ -160,7 +176,7 @@ class _Reading:
         try:
             return model.model_validate(given)
         except ValidationError as error:
-            self.faults += [prefix + line for line in fault_lines(error, model)]
+            self.faults += [prefix + line for line in fault_lines(error, model, self.listed)]
             return self.rest(model, given)
 
     def rest(self, model: Any, given: object) -> Any:
