@@ -24,6 +24,8 @@ from pteron.cli.arguments import regrouped
 from pteron.cli.main import app
 from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.variants import with_elbows
+from pteron.playback import playback
+from pteron.report.given_forces import force_doubts
 
 PROGRAM = [sys.executable, "-c", "from pteron_command import main; main()"]
 PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
@@ -892,6 +894,29 @@ def test_a_motion_is_a_page_or_in_a_report(monkeypatch: pytest.MonkeyPatch):
     refused("report tripteron --out one --motion way.csv", "noted")
     assert len(seen[0].motion.time) == samples
     assert seen[0].source == "way.csv"
+
+
+def test_a_report_has_the_payload_and_doubts_the_forces_of_another(monkeypatch):
+    run("cycle tripteron --payload 1.5 --rate 50 --out loaded.csv")
+    seen = []
+
+    def noted(machine, folder, motion):
+        seen.append((machine, force_doubts(machine, motion)))
+        raise pteron.OutputError("noted")
+
+    monkeypatch.setattr("pteron.report.write_report", noted)
+    refused("report tripteron --out one --motion loaded.csv --payload 1.5", "noted")
+    refused("report tripteron --out one --motion loaded.csv", "noted")
+    (loaded, none), (bare, (doubt,)) = seen
+    assert loaded.name == "tripteron with 1.5 kg"
+    assert loaded.platform.inertia.mass == bare.platform.inertia.mass + 1.5
+    assert none == ()
+    peaks = r"loaded.csv: its forces are not .* the peak of leg 3 is 53\.\d+ N there and 34\.\d+ N"
+    assert re.match(f"{peaks} here; was it made with a payload", doubt)
+    frame = pl.read_csv("loaded.csv").with_columns(payload=1.5)
+    frame.write_csv("column.csv")
+    (doubt,) = force_doubts(bare, playback(bare, "column.csv"))
+    assert "its column payload has up to 1.5 kg" in doubt
 
 
 def test_a_motion_that_cannot_be_shown_is_one_line():

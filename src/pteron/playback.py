@@ -58,6 +58,8 @@ class Playback:
     forces: Array | None = None
     source: str = ""
     log: bool = False
+    payload: float | None = None
+    """The largest of its column `payload`, kg; None where it has none."""
 
 
 Given = Motion | Simulation | Playback | Table | Log | str | Path
@@ -177,7 +179,8 @@ def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
         warn_unlikely(text)
     has_forces = set(rows.columns) >= set(robot.force_names)
     forces = rows.numbers(robot.force_names) / reading_scales(robot) if has_forces else None
-    return Playback(motion, forces, Path(rows.source).name)
+    heaviest = rows.numbers(["payload"]).max() if "payload" in rows.columns else None
+    return Playback(motion, forces, Path(rows.source).name, payload=heaviest)
 
 
 def of_log(robot: Manipulator, log: Log) -> Playback:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import Machine
-from pteron.cli.motion_argument import played
+from pteron.cli.motion_argument import Carried, played
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import plain, table, warn
@@ -24,10 +25,12 @@ def report(
     *,
     out: str,
     motion: str | None = None,
+    carried: Carried,
 ) -> Result:
     """Write a report on a machine: one page with pictures, and its numbers.
 
-    The page is report.html, the numbers are in report.json beside it.
+    The page is report.html, the numbers are in report.json beside it. Its forces are what the
+    machine needs with its payload, not those of a file, and it says where these differ.
 
     Options
     -------
@@ -37,8 +40,10 @@ def report(
     Examples
     --------
     pteron report quadrupteron --out report
-    pteron report quadrupteron --motion motion.csv --out report
+    pteron report quadrupteron --motion motion.csv --payload 0.5 --out report
     """
+    # The name is the page's heading, which says what the forces on it are with.
+    machine = replace(carried.on(machine), name=f"{machine.name}{carried}")
     with spinner(f"Writing the report on {machine.name}"):
         from pteron.report import write_report
 
@@ -49,7 +54,7 @@ def report(
     cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
     tables = _machine(found), _legs(found["cycle"], found["joints"])
     told = [*tables, f"Written to {plain(str(page))}"]
-    return Result({"page": str(page), **found, "cycle": cycle}, told)
+    return Result({"page": str(page), **found, **asdict(carried), "cycle": cycle}, told)
 
 
 vars(report)["warns"] = True

@@ -27,6 +27,7 @@ from pteron.motion import (
 from pteron.playback import Playback
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
+from pteron.report.given_forces import force_doubts
 from pteron.report.motion_frames import Frames, frames
 from pteron.workspace import (
     BEYOND_LIMITS,
@@ -173,7 +174,10 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     base = base_parameters(robot)
     return Report(
         robot=robot,
-        doubts=(*machine_warnings(robot), *load_warnings(robot, home), *screw_warnings(robot)),
+        doubts=(
+            *(machine_warnings(robot) + load_warnings(robot, home) + screw_warnings(robot)),
+            *(() if motion is None else force_doubts(robot, motion)),
+        ),
         home=home,
         margins=at_home,
         least=least_margin(robot, home),

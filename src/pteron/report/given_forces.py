@@ -1,0 +1,46 @@
+"""Doubts about a motion whose forces are not those that the machine needs for it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.dynamics import drive_forces
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.playback import Playback
+
+_CLEAR = 0.1
+"""RMS of a difference, as a share of the largest force's, above which it is told: no friction of a
+good drive and no smoothing of a log is as large, while a payload is."""
+
+
+def force_doubts(robot: Manipulator, given: Playback) -> tuple[str, ...]:
+    """Return a doubt where the forces that came with a motion are clearly those of another load.
+
+    A report shows what the machine needs, and not what the file has: a file that was made with a
+    payload would else seem to be shown with it.
+    """
+    motion, loaded = given.motion, ""
+    if given.payload:
+        loaded = f"its column payload has up to {given.payload:g} kg"
+    if given.forces is None:
+        return (f"{given.source}: {loaded}: is that in the machine?",) if loaded else ()
+    path = motion.pose, motion.velocity, motion.acceleration
+    needed = np.asarray(drive_forces(robot, *path, smooth=True))
+    differences = _rms(given.forces - needed)
+    leg = int(differences.argmax())
+    # The largest force of all legs is the measure: a leg that bears nothing has only noise.
+    if differences[leg] <= _CLEAR * max(_rms(needed).max(), _rms(given.forces).max()):
+        return ()
+    there, here = (np.abs(forces[:, leg]).max() for forces in (given.forces, needed))
+    unit = robot.legs[leg].joint.force_unit
+    why = loaded or "was it made with a payload or a tool?"
+    return (
+        f"{given.source or 'the motion'}: its forces are not those that {robot.name} needs for it, "
+        f"which are shown: the peak of leg {leg + 1} is {there:.4g} {unit} there and {here:.4g} "
+        f"{unit} here; {why} (pteron report has --payload and --tool)",
+    )
+
+
+def _rms(forces: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(forces**2, axis=0)))
