@@ -1,6 +1,7 @@
 """Machines chosen for a job: what they keep, why kinds fall out, files, going on, bad jobs."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 import tomlkit
 from mechanisms import CLIENTS
 from scipy.spatial.transform import Rotation
-from test_cli import done, refused, run
+from test_cli import refused, run
 
 import pteron
 from pteron.design import Job, choose_machine
@@ -35,7 +36,7 @@ from pteron.errors import DataError
 from pteron.kernels import numeric
 from pteron.kinematics import inverse_kinematics, pose_of
 from pteron.motion import along, line_path, with_payload
-from pteron.report.choice.write import write_choice
+from pteron.report.choice.write import page, write_choice
 from pteron.workspace import Box, clearance, pose_margins, prove
 
 JOB = {
@@ -95,6 +96,36 @@ def test_a_chosen_machine_keeps_what_was_asked(chosen):
     assert one.figures["error"] <= 5e-4
     assert min(one.figures[f"{k}_margin"] for k in ("rated", "peak", "speed")) >= 1.0
     assert one.figures["shortest_time"] < 0.3
+
+
+def test_what_is_tried_is_told_first_and_the_page_says_it_well(chosen, tmp_path):
+    choice, folder = chosen
+    told = []
+    again = choose_machine(
+        of(search={"evaluations": 12}),
+        begun=lambda names, before: told.append((names, before)),
+        finished=lambda one: told.append(one.kind),
+    )
+    assert told == [(("linear-delta",), ()), "linear-delta"]
+    assert again.resumed == ()
+    file = tmp_path / "job.toml"
+    file.write_text(tomlkit.dumps(JOB | {"search": {"evaluations": 12}}))
+    first, kind = run(f"choose {file}").stderr.splitlines()
+    assert first == (
+        "One kind with 12 designs to rate, the best of them to be proved: linear-delta"
+    )
+    assert re.fullmatch(r"1 of 1: linear-delta: (falls out; )?\d+ of 12 designs keep all .*", kind)
+    file.write_text(tomlkit.dumps(JOB))
+    found = run(f"choose {file} --out {folder}")
+    assert found.stderr == f"Gone on in {folder}: linear-delta finished before\n"
+    text = (folder / "choose.html").read_text(encoding="utf-8")
+    assert "linear-delta, the one kind of machine that was tried, does what is asked." in text
+    assert "linear-delta in the middle of its workspace" in text
+    assert "price (as in lists)" in text
+    assert not re.search(r"proved: [^<]*not proved", text)
+    one = choice.best
+    alone = replace(choice, candidates=(replace(one, front=one.front[:1]),))
+    assert "What costs what" not in page(alone)
 
 
 @CLIENTS
@@ -509,8 +540,10 @@ def test_workers_end_with_the_process_that_asked(tmp_path):
 def test_the_command_writes_a_page_and_files_that_other_commands_take(tmp_path):
     file, out = tmp_path / "job.toml", tmp_path / "out"
     file.write_text(tomlkit.dumps(JOB | {"kinds": ["linear-delta", "delta"]}))
-    text = done(f"choose {file} --out {out}")
-    assert "linear-delta" in text
+    found = run(f"choose {file} --out {out}")
+    assert found.exit_code == 0
+    assert found.stderr.startswith("2 kinds with 40 designs each to rate, ")
+    assert "linear-delta" in found.stdout
     assert "linear-delta" in (out / "choose.html").read_text()
     data = json.loads((out / "choose.json").read_text())
     for one in data["kinds"]:

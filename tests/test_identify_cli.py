@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from dataclasses import replace
 from functools import lru_cache
@@ -18,7 +19,7 @@ from test_report import Reader, strict
 
 import pteron
 from pteron.cli import identify as command
-from pteron.cli.progress import stages
+from pteron.cli.progress import TimeLeft, stages
 from pteron.extras import install_command
 from pteron.identification import METHODS, write_log
 from pteron.identification.model import Passive
@@ -238,6 +239,27 @@ def test_files_that_are_read_are_not_replaced():
     write_log(log("tripteron"), "log.csv")
     refused("identify log.csv --robot tripteron.toml --out .", "would replace a file that is read")
     refused("identify no.csv --robot tripteron --out out", "no.csv: no such file")
+
+
+@QUICK
+def test_the_time_left_is_that_of_this_run_and_grows_while_nothing_is_done():
+    clock = [0.0]
+    left = TimeLeft(lambda: clock[0])
+    assert left.words() == ""
+    left.tell(0.5)  # an earlier run's
+    for second in range(1, 401):
+        clock[0] = float(second)
+        left.tell(0.5 + second / 2000.0)
+        # A share of 0.5 took 1000 s; before 20 s too little is done to say so.
+        assert left.seconds() == (pytest.approx(1000.0 - second) if second >= 20 else None)
+    assert left.words() == "about 10 min left"
+    clock[0] = 800.0  # 0.3 is left; 0.1 was done in the last 600 s
+    assert left.seconds() == pytest.approx(1800.0, rel=0.01)
+    clock[0] = 804.0
+    left.tell(0.99)
+    assert re.fullmatch(r"about \d+ s left", left.words())
+    left.tell(1.0)
+    assert left.words() == "about 0 s left"
 
 
 @QUICK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.design import Choice
+    from pteron.design.choosing.candidate import Candidate
 
 _NONE = 1
 """Exit code where no machine does the job."""
@@ -29,6 +31,8 @@ def choose(
     motors to choose from, and what is to be small. All kinds of the catalog that can do the motion
     are searched; the best design of each is proved over the workspace, and its drives are told
     with their margins at the worst place and in the worst direction.
+
+    What is tried is told at the start, and each kind when it is finished, on standard error.
 
     A folder gets choose.html, choose.json and a TOML file for each machine, with its drives. Kinds
     that are finished are kept there, so that the same command goes on where it was ended. The exit
@@ -57,17 +61,21 @@ def choose(
         from pteron.report.write import checked_folder
 
         checked_folder(out)
+    log = _Log(asked.search.evaluations, out)
     try:
         with progress_bar("Choosing") as bar:
             found = choose_machine(
-                asked, folder=out, workers=workers, progress=lambda share, _: bar(share)
+                asked,
+                folder=out,
+                workers=workers,
+                progress=lambda share, _: bar(share),
+                begun=log.begin,
+                finished=log.finish,
             )
     except KeyboardInterrupt:
         if out is not None:
             note(f"What is finished is kept in {out}; the same command goes on there")
         raise
-    if found.resumed:
-        note(f"Gone on in {out}: {', '.join(found.resumed)} finished before")
     files = []
     if out is not None:
         from pteron.report.choice.write import write_choice
@@ -75,6 +83,34 @@ def choose(
         files = write_choice(found, out)
     data = found.data() | ({"files": [str(file) for file in files]} if files else {})
     return Result(data, partial(_show, found), files, _NONE if found.best is None else 0)
+
+
+class _Log:
+    """A line on what is tried, and one for each kind that is finished."""
+
+    def __init__(self, evaluations: int, out: str | None) -> None:
+        self._evaluations, self._out = evaluations, out
+        self._count = self._done = 0
+
+    def begin(self, kinds: Sequence[str], resumed: Sequence[str]) -> None:
+        """Tell what will be tried, before it takes its time."""
+        self._count = len(kinds)
+        if resumed:
+            note(f"Gone on in {self._out}: {', '.join(resumed)} finished before")
+        if kinds:
+            many = f"{len(kinds)} kinds" if len(kinds) > 1 else "One kind"
+            each = " each" if len(kinds) > 1 else ""
+            note(
+                f"{many} with {self._evaluations} designs{each} to rate, the best of them to be "
+                f"proved: {', '.join(kinds)}"
+            )
+
+    def finish(self, one: Candidate) -> None:
+        """Tell what became of a kind."""
+        self._done += 1
+        found = f"{one.kept} of {one.evaluated} designs keep all that is asked"
+        verdict = found if one.serves else f"falls out; {found}"
+        note(f"{self._done} of {self._count}: {one.kind}: {verdict}")
 
 
 def _show(found: Choice) -> None:
@@ -91,7 +127,8 @@ def _show(found: Choice) -> None:
         show(
             f"[bold]{one.kind}[/bold]: {plain(drives(one))}",
             f"  mm: {dimensions(one)}",
-            f"  {plain(one.proved)}; {plain(one.clear)}",
+            f"  {plain(one.proved)}",
+            f"  {plain(one.clear)}",
             f"  margins: {plain(margins(one))}",
         )
     for one in found.candidates:

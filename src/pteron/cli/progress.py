@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
@@ -15,6 +16,15 @@ if TYPE_CHECKING:
 
 _SHORT = 0.05
 """Time below which a stage is not listed, s."""
+
+_APART = 1.0
+"""Time between the shares that a rate is taken from, s."""
+
+_UNKNOWN, _LITTLE = 5.0, 0.02
+"""Time, s, and share of the work, before which the time that is left is not known."""
+
+_RECENT = 60.0
+"""Time that a rate is taken over at least, s."""
 
 
 def is_watched() -> bool:
@@ -40,10 +50,71 @@ def spinner(task: str) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(task: str) -> Iterator[Callable[[float], None]]:
-    """Show a person how much of long work is done: the callable takes the share, from 0 to 1."""
-    with _bar() as progress:
+    """Show a person how much of long work is done, and what time it needs yet.
+
+    The callable takes the share, from 0 to 1; what it takes first may have been done before.
+    """
+    left = TimeLeft()
+    with _bar(left) as progress:
         number = progress.add_task(plain(task), total=1.0)
-        yield lambda share: progress.update(number, completed=share)
+
+        def tell(share: float) -> None:
+            left.tell(share)
+            progress.update(number, completed=share)
+
+        yield tell
+
+
+class TimeLeft:
+    """What time work needs yet, by how fast it went of late.
+
+    Work that goes on where an earlier run was ended begins with what that had done, at no rate.
+    While nothing is done the time grows, since the rate is that up to now.
+
+    Parameters
+    ----------
+    clock : callable
+        Returns the time, s.
+    """
+
+    def __init__(self, clock: Callable[[], float] = perf_counter) -> None:
+        self._clock = clock
+        self._told: deque[tuple[float, float]] = deque()
+        self._first: tuple[float, float] | None = None
+        self._share = 0.0
+
+    def tell(self, share: float) -> None:
+        """Take the share that is done, from 0 to 1."""
+        now = self._clock()
+        self._share = share
+        if self._first is None:
+            self._first = now, share
+        if not self._told or now - self._told[-1][0] >= _APART:
+            self._told.append((now, share))
+        # The rate counts over half of the time, or all of a short one.
+        since = now - max(_RECENT, 0.5 * (now - self._first[0]))
+        while len(self._told) > 1 and self._told[1][0] <= since:
+            self._told.popleft()
+
+    def seconds(self) -> float | None:
+        """Return what time is left, s; None as long as that is not known."""
+        if self._first is None:
+            return None
+        now, (began, base) = self._clock(), self._first
+        (start, before), share = self._told[0], self._share
+        if now - began < _UNKNOWN or share - base < _LITTLE * (1.0 - base) or share <= before:
+            return None
+        return (now - start) * max(1.0 - share, 0.0) / (share - before)
+
+    def words(self) -> str:
+        """Return what time is left in words, of two digits; empty as long as it is not known."""
+        left = self.seconds()
+        if left is None:
+            return ""
+        for name, unit in (("s", 1.0), ("min", 60.0)):
+            if left < 90.0 * unit:
+                return f"about {float(f'{left / unit:.2g}'):.0f} {name} left"
+        return f"about {float(f'{left / 3600.0:.2g}'):g} h left"
 
 
 @contextmanager
@@ -72,15 +143,20 @@ def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
         yield tell
 
 
-def _bar() -> Progress:
+def _bar(left: TimeLeft | None = None) -> Progress:
     from rich import progress
     from rich.console import Console
+    from rich.text import Text
+
+    class Left(progress.ProgressColumn):
+        def render(self, task: progress.Task) -> Text:
+            return Text("" if left is None else left.words())
 
     return progress.Progress(
         progress.TextColumn("{task.description}"),
         progress.BarColumn(),
         progress.TaskProgressColumn(),
-        progress.TimeRemainingColumn(),
+        progress.TimeRemainingColumn() if left is None else Left(),
         console=Console(stderr=True),
         disable=not is_watched(),
         transient=True,

@@ -136,8 +136,9 @@ def ascii_number(text: str) -> str:
 
 
 def note(message: str) -> None:
-    """Print a line on standard error."""
-    echo(_visible(message), err=True)
+    """Print a line on standard error, above a bar that is there."""
+    # What `err=True` writes to is the stream behind that of the bar.
+    echo(_visible(message), file=sys.stderr)
 
 
 def warn(messages: Iterable[str], source: str = "") -> None:

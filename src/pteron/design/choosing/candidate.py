@@ -203,8 +203,8 @@ def _clear_words(case: Case, robot: Manipulator, middle: Array) -> str:
     if not len(case.between) and is_clear(case, robot, middle):
         return f"proved: no two links, guides or the platform {kept}"
     return (
-        f"no two links, guides or the platform {kept} at {count} sample poses and about the worst "
-        "of them; not proved"
+        f"at {count} sample poses and about the worst of them no two links, guides or the "
+        f"platform {kept}: seen there, without a proof"
     )
 
 

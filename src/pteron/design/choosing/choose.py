@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -90,6 +90,8 @@ def choose_machine(
     folder: str | Path | None = None,
     workers: int = 1,
     progress: Callable[[float, str], None] | None = None,
+    begun: Callable[[Sequence[str], Sequence[str]], None] | None = None,
+    finished: Callable[[Candidate], None] | None = None,
 ) -> Choice:
     """Search all kinds of machines for one that does a job, with its dimensions and drives.
 
@@ -108,6 +110,10 @@ def choose_machine(
         Processes that do the work.
     progress : callable, optional
         Takes the share that is done, and the kind.
+    begun : callable, optional
+        Takes the kinds that are searched, and those that an earlier run had finished.
+    finished : callable, optional
+        Takes each kind that is finished.
 
     Returns
     -------
@@ -131,10 +137,16 @@ def choose_machine(
             progress(sum(shares.values()) / len(shares), name)
 
     left = {name: case for name, case in cases.items() if name not in found}
+    if begun is not None:
+        begun(tuple(left), resumed)
+    if progress is not None and left:  # what was done before is not this run's
+        progress(sum(shares.values()) / len(shares), next(iter(left)))
     for name, candidate in _searched(left, workers, tell):
         found[name] = candidate
         kept.keep(candidate)
         tell(name, 1.0)
+        if finished is not None:
+            finished(candidate)
     objective = job.objectives[0]
     order = sorted(
         found.values(), key=lambda v: (not v.serves, v.figures.get(objective, np.inf), v.kind)

@@ -141,8 +141,8 @@ def told(case: Case, proofs: Sequence[Proof]) -> str:
         between = f"; so do the cycles between them at {len(case.between)} samples"
         return kept + (between if len(case.between) else "")
     one = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
-    found = f"proved: every {one} keeps reach, limits and floors, by intervals over {boxes} boxes"
-    return f"{found}; not proved between the sampled tilts" if space.tilt else found
+    found = f"every {one} keeps reach, limits and floors, by intervals over {boxes} boxes"
+    return f"proved at the sampled tilts alone: {found}" if space.tilt else f"proved: {found}"
 
 
 def is_clear(case: Case, robot: Manipulator, middle: Array) -> bool:

@@ -10,7 +10,7 @@ from pteron.design.choosing.choose import Choice
 from pteron.design.choosing.job import Job
 
 _FIGURES = {
-    "price": ("price", 1.0),
+    "price": ("price (as in lists)", 1.0),
     "cycle_time": ("cycle (s)", 1.0),
     "shortest_time": ("shortest (s)", 1.0),
     "error": ("error (mm)", 1e3),
@@ -116,6 +116,7 @@ def assumed(choice: Choice) -> list[str]:
     exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
     return [
         *examples,
+        "A price is the sum of those in the lists of motors and gearboxes, in their currency.",
         f"Drives are chosen for {motors.margin:g} times what is asked, with dry friction of "
         f"{motors.friction:.0%} of their rated torque; the least margins are told as they are "
         "between the places of the search, too.",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pteron.atomic import write_texts
 from pteron.design import Choice
@@ -13,7 +15,8 @@ from pteron.design.choosing.candidate import Candidate
 from pteron.design.choosing.job import OBJECTIVES
 from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
 from pteron.json_values import json_text
-from pteron.plots import fronts_figure
+from pteron.manipulator import load
+from pteron.plots import draw, fronts_figure
 from pteron.report.typeset import template
 
 
@@ -51,11 +54,26 @@ def reasons(choice: Choice, serving: list[Candidate]) -> list[str]:
     """Return the verdict on a choice, a sentence each."""
     first, tried = choice.job.objectives[0].replace("_", " "), len(choice.candidates)
     if not serving:
-        return [f"None of the {tried} kinds of machines that were tried does what is asked."]
-    best = serving[0]
+        alone = f"{choice.candidates[0].kind}, the one kind of machine that was tried, does not do"
+        none = f"None of the {tried} kinds of machines that were tried does"
+        return [f"{alone if tried == 1 else none} what is asked."]
+    best, count = serving[0], len(serving)
+    if tried == 1:
+        does = f"{best.kind}, the one kind of machine that was tried, does what is asked."
+    elif count == 1:
+        does = (
+            f"Of the {tried} kinds of machines that were tried {best.kind} alone does what is "
+            "asked."
+        )
+    else:
+        every = "Both" if tried == 2 else f"All {tried}"
+        many = every if count == tried else f"{count} of the {tried}"
+        does = (
+            f"{many} kinds of machines that were tried do what is asked; {best.kind} has the "
+            f"least {first}."
+        )
     return [
-        f"{len(serving)} of the {tried} kinds of machines that were tried do what is asked; "
-        f"{best.kind} has the least {first}.",
+        does,
         f"Drives: {drives(best)}. Margins over what is asked: {margins(best)}.",
     ]
 
@@ -76,15 +94,24 @@ def next_steps(choice: Choice, serving: list[Candidate]) -> list[str]:
     ]
 
 
+def picture(one: Candidate) -> Figure:
+    """Return the picture of a machine, its tool in the middle of its workspace."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / f"{one.kind}.toml"
+        file.write_text(one.robot, encoding="utf-8")
+        robot = load(file)
+    return draw(robot, one.middle)
+
+
 def page(choice: Choice) -> str:
     """Return the page as HTML without reference to another file."""
     serving = [one for one in choice.candidates if one.serves]
     headings = list(dict.fromkeys(key for one in serving for key in cells(one)))
     figure = None
-    if serving:
+    if len(serving) > 1 or any(len(one.front) > 1 for one in serving):
         first, second = list(serving[0].front[0])[:2]
         fronts = {one.kind: np.array([list(p.values())[:2] for p in one.front]) for one in serving}
-        units = [OBJECTIVES[first], OBJECTIVES[second]]
+        units = [OBJECTIVES[name] or "as in the lists" for name in (first, second)]
         figure = fronts_figure(fronts, [first, second], units)
     return template("choice/page.html.j2").render(
         choice=choice,
@@ -100,4 +127,5 @@ def page(choice: Choice) -> str:
         asked=asked(choice.job),
         assumed=assumed(choice),
         figure=figure,
+        pictures={one.kind: picture(one) for one in serving},
     )
