@@ -12,7 +12,7 @@ from mechanisms import CLIENTS
 from test_cli import done, refused, run
 
 import pteron
-from pteron.motion import pick_and_place, size, with_payload
+from pteron.motion import Motor, choose, choose_common, pick_and_place, size, with_payload
 from pteron.workspace import home_pose
 
 MOTORS = (
@@ -165,13 +165,52 @@ def test_a_person_sees_tables_within_80_columns(driven: str, monkeypatch: pytest
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
     text = run(f"size {driven} --motors motors.csv --payload 0.2", COLUMNS="80").stdout
     assert max(map(len, text.splitlines())) <= 80
-    for words in ("with 0.2 kg", "RMS force", "takes back (J)", "J a cycle", "400 W"):
+    for words in ("with 0.2 kg", "RMS torque", "takes back (J)", "J a cycle", "400 W"):
         assert words in text
     # A table that is too wide breaks its headings; no cell loses its unit.
     rotors = text[text.index("load/rotor") :].splitlines()
     assert rotors[2].split()[0] == "1"
     assert rotors[2].split()[-2:] == ["N", "m"]
     assert "…" not in text
+
+
+def test_legs_that_are_alike_get_one_motor_and_one_ratio():
+    robot = pteron.load("delta")
+    # The legs are asked for different loads: the way is not symmetric.
+    way = pick_and_place(robot, home(robot) + np.array([0.05, 0.1, 0.0]), scale=0.5, samples=51)
+    found = size(robot, way)
+    # A motor that is large for the load, so that no limit binds the ratio.
+    motor = Motor("one", 4e-5, 100.0, 300.0, 1e5)
+    own = [fit.ratio for fit in choose(found, [motor])]
+    (common,) = choose_common(found, [motor])
+    assert common.legs == (1, 2, 3)
+    assert min(own) < common.ratio < max(own)
+    assert len(set(np.round(own, 6))) > 1
+
+    def largest(ratio):
+        loads = found.loads / ratio + motor.rotor_inertia * ratio * found.accelerations
+        return np.sqrt(found.mean(loads**2)).max()
+
+    tried = np.linspace(min(own), max(own), 201)
+    assert largest(common.ratio) <= min(map(largest, tried)) * (1 + 1e-9)
+    assert common.worst.margin == min(fit.margin for fit in common.fits)
+    assert {fit.ratio for fit in common.fits} == {common.ratio}
+    with pytest.raises(pteron.DataError, match=r"margin: 0\.5 given"):
+        choose_common(found, [motor], margin=0.5)
+
+
+def test_the_common_motor_is_told_and_torques_are_called_so(driven: str):
+    Path("motors.csv").write_text(MOTORS, encoding="utf-8")
+    line = f"size {driven} --within here --motors motors.csv"
+    first, second = json.loads(done(f"{line} --json"))["common_motors"]
+    assert (first["legs"], first["motor"], second["motor"]) == ([1, 2], "100 W", "400 W")
+    assert first["least_ratio"] <= first["ratio"] <= first["greatest_ratio"]
+    text = done(line)
+    assert "Legs that are alike, with one motor" in text
+    assert "peak torque  RMS torque" in text
+    assert "force (" not in run(f"cycle {driven}").stdout
+    assert "torque (N m)" in run(f"cycle {driven}").stdout
+    assert "peak force  RMS force" in done("size tripteron --within here")
 
 
 def test_a_motion_of_a_table_is_sized_as_it_is():

@@ -24,13 +24,24 @@ def peaks_table(found: Sequence[Peak]) -> Table:
     numbers = ("leg", "size", "limit", "share")
     rows = (
         (
-            f"{peak.name.replace('_', ' ')} ({peak.unit})" + " (binds)" * (peak.share >= _BINDS),
+            f"{_word(peak)} ({peak.unit})" + " (binds)" * (peak.share >= _BINDS),
             *(str(peak.leg or ""), f"{peak.size:.4g}"),
             *((f"{peak.limit:.4g}", f"{peak.share:.0%}") if math.isfinite(peak.limit) else "--"),
         )
         for peak in found
     )
     return table("largest", *numbers, rows=rows, numbers=numbers)
+
+
+def _word(peak: Peak) -> str:
+    """Return the quantity of a peak: what a crank gives is a torque."""
+    torque = peak.name == "force" and peak.unit == "N m"
+    return "torque" if torque else peak.name.replace("_", " ")
+
+
+def force_word(robot: Manipulator) -> str:
+    """Return what the drives give: "force", "torque", or "force or torque"."""
+    return " or ".join(sorted({leg.joint.force for leg in robot.legs}))
 
 
 def motion_frame(machine: Manipulator, motion: Motion) -> pl.DataFrame:

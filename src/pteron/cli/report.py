@@ -86,7 +86,7 @@ def _machine(found: dict[str, Any]) -> Table:
 
 
 def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
-    force = " or ".join(dict.fromkeys(joint["force"] for joint in joints))
+    force = " or ".join(sorted({joint["force"] for joint in joints}))
     headings = ("leg", f"peak {force}", f"RMS {force}", "peak speed")
     of = "Of the drives, with friction." if cycle["with_drives"] else "Of the bodies, no friction."
     rows = []

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pteron.cli.arguments import STANDARD, Machine, check_rate, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
+from pteron.cli.motion_table import force_word
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import is_terminal, note, plain, show, table, warn, write
@@ -227,7 +228,8 @@ def _show(found: Simulation, data: dict[str, Any], carried: Carried) -> None:
         sizes = (f"{row[key]:.4g} {unit}" for key, unit in units.items())
         limited = leg.drive and leg.drive.max_force
         drives.append((str(row["leg"]), *sizes, f"{row['at_its_limit']:.1%}" if limited else "-"))
-    names = ("leg", "peak force", "RMS force", "peak speed", "peak power", "at its limit")
+    word = force_word(robot)
+    names = ("leg", f"peak {word}", f"RMS {word}", "peak speed", "peak power", "at its limit")
     show(
         f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, cycle {plain(data['cycle'])}, "
         f"{plain(data['controller'])}: {data['duration']:.4g} s in {steps}",

@@ -12,32 +12,29 @@ from typing import TYPE_CHECKING, Any
 from pteron.cli.arguments import STANDARD, Machine
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
+from pteron.cli.motion_table import force_word
+from pteron.cli.motor_tables import common_rows, common_table, fits_frame, motors_table
 from pteron.cli.pose_ranges import box_of, pose_spans
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import plain, show, table, warn
 from pteron.errors import UnlikelyValue
-from pteron.json_values import picked
 
 if TYPE_CHECKING:
-    import polars as pl
     import rich.table
 
     from pteron.manipulator import Manipulator
-    from pteron.motion import Fit, Motion, Sizing
+    from pteron.motion import CommonFit, Fit, Motion, Sizing
     from pteron.workspace import Box
 
 _OVERLOADED = 1
 """Exit code where a drive is overloaded."""
 
-_NAMED = {"peak_force": "peak force", "rms_force": "RMS force", "peak_speed": "speed"}
+_NAMED = {"peak_force": "peak {}", "rms_force": "RMS {}", "peak_speed": "speed"}
 """Quantities whose worst places are told."""
 
 _ROUNDING = 1e-9
 """Share of a margin by which it may be missed."""
-
-_BEST = 3
-"""Motors shown for each joint, the best ones."""
 
 
 def size(
@@ -65,7 +62,8 @@ def size(
 
     A list of motors has the columns name, rotor_inertia (kg m^2), rated_torque and peak_torque
     (N m), max_speed (rad/s). For each joint it is told which serve, the smallest first, from what
-    ratio to what ratio, and which ratio is best: least RMS torque.
+    ratio to what ratio, and which ratio is best: least RMS torque. For legs that are alike the one
+    motor and ratio for all of them is told, too.
 
     A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv; the pictures
     are of the place where the most power is needed.
@@ -91,7 +89,7 @@ def size(
     pteron size quadrupteron --cycle pick.csv --dwell 0.2 --cycle home.csv --dwell 5
     pteron size delta --within x=-0.1:0.1,y=-0.1:0.1,z=-0.9:-0.8
     """
-    from pteron.motion import choose, read_motors, size as sized
+    from pteron.motion import choose, choose_common, read_motors, size as sized
 
     with warnings.catch_warnings():  # each motor's are notes below
         warnings.simplefilter("ignore", UnlikelyValue)
@@ -111,15 +109,16 @@ def size(
         how: dict[str, Any] = {"dwell": dwell or [0.0], "friction": friction}
         found = sized(carrying, motions, places=region, **how)
         fits = choose(found, chosen, margin=margin)
+        common = choose_common(found, chosen, margin=margin)
     lacking = [*_weak(found, margin), *_unserved(found, fits, margin)]
     warn(lacking)
     asked = _Asked(" and ".join(cycles), carried, where, margin)
     # A list of motors is what its choice is asked for.
     return destination.deliver(
-        _fits_table(found, fits) if fits and out is None else found.table(),
-        _data(found, fits, asked),
+        fits_frame(machine, fits) if fits and out is None else found.table(),
+        _data(found, fits, asked) | {"common_motors": common_rows(machine, common)},
         partial(_more, found, fits),
-        partial(_show, found, fits, asked),
+        partial(_show, found, fits, common, asked),
         _OVERLOADED if lacking else 0,
     )
 
@@ -199,7 +198,7 @@ def _data(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> dict[str, Any]
         "assumed_friction": found.assumed_friction.tolist(),
         "margins": [one._asdict() | {"margin": one.margin} for one in found.margins],
         "overloads": list(found.overloads),
-        "motors": _fits_table(found, fits).to_dicts() if fits else [],
+        "motors": fits_frame(found.robot, fits).to_dicts() if fits else [],
     }
 
 
@@ -213,25 +212,6 @@ def _worst(found: Sizing) -> list[dict[str, Any]]:
     return rows
 
 
-def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
-    import polars as pl
-
-    rows = [
-        {
-            "leg": fit.leg,
-            "motor": fit.motor.name,
-            "serves": fit.fits,
-            "ratio": fit.ratio,
-            "ratio_unit": f"rad/{found.robot.legs[fit.leg - 1].joint.unit}",
-            "least_ratio": fit.span.least if fit.fits else None,
-            "greatest_ratio": fit.span.greatest if fit.fits else None,
-            **picked(fit, "rated_margin peak_margin speed_margin inertia_ratio"),
-        }
-        for fit in fits
-    ]
-    return pl.DataFrame(rows, infer_schema_length=None)
-
-
 def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
     """Return the further files of a folder."""
     from pteron.plots import svg_file
@@ -240,10 +220,12 @@ def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
     if found.places:
         found = found.at(int(found.power.sum(axis=-1).max(axis=0).argmax()))
     texts = {"power.svg": svg_file(power(found)), "force-speed.svg": svg_file(force_speed(found))}
-    return texts | ({"motors.csv": _fits_table(found, fits).write_csv()} if fits else {})
+    return texts | ({"motors.csv": fits_frame(found.robot, fits).write_csv()} if fits else {})
 
 
-def _show(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> None:
+def _show(
+    found: Sizing, fits: tuple[Fit, ...], common: tuple[CommonFit, ...], asked: _Asked
+) -> None:
     """Print for a person: loads, power, motors, and the choice."""
     rest = f", {found.dwell:g} s of it at rest" if found.dwell else ""
     places = (
@@ -260,7 +242,8 @@ def _show(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> None:
         _powers(found),
         *_rotors(found),
         *_energy(found),
-        *_choice(found, fits),
+        *([motors_table(found.robot, fits)] if fits else []),
+        *common_table(found.robot, common),
         *_verdict(found, fits, asked.margin),
     )
 
@@ -313,10 +296,9 @@ def _places(found: Sizing) -> list[rich.table.Table]:
     rows = []
     for one in _worst(found):
         pose = " ".join(f"{round(value, 6) + 0.0:.4g}" for value in one["pose"])
+        quantity = _NAMED[one["quantity"]].format(found.robot.legs[one["leg"] - 1].joint.force)
         leg = str(one["leg"]) if one["quantity"] == "peak_force" else ""
-        rows.append(
-            (leg, _NAMED[one["quantity"]], pose, f"{math.degrees(one['turn']) % 360:.4g} deg")
-        )
+        rows.append((leg, quantity, pose, f"{math.degrees(one['turn']) % 360:.4g} deg"))
     platform, coordinates = found.robot.platform, " ".join(found.robot.coordinates)
     units = ", ".join(["m"] * bool(platform.lengths) + ["rad"] * bool(platform.angles))
     names = "leg", "is greatest", f"about {coordinates} ({units})", "turned"
@@ -324,7 +306,8 @@ def _places(found: Sizing) -> list[rich.table.Table]:
 
 
 def _loads(found: Sizing) -> rich.table.Table:
-    names = ("leg", "peak force", "RMS force", "peak speed", "RMS speed")
+    force = force_word(found.robot)
+    names = ("leg", f"peak {force}", f"RMS {force}", "peak speed", "RMS speed")
     columns = found.peak_forces, found.rms_forces, found.peak_speeds, found.rms_speeds
     rows = []
     for i, leg in enumerate(found.robot.legs):
@@ -356,20 +339,3 @@ def _rotors(found: Sizing) -> list[rich.table.Table]:
         rows.append((str(row["leg"]), *cells))
     caption = "Inertia at the joint, the load's greatest."
     return [table(*names, rows=rows, numbers=names, caption=caption)]
-
-
-def _choice(found: Sizing, fits: tuple[Fit, ...]) -> list[rich.table.Table]:
-    if not fits:
-        return []
-    rows = []
-    for i, leg in enumerate(found.robot.legs, start=1):
-        own = [fit for fit in fits if fit.leg == i][:_BEST]
-        for fit in own:
-            ratio = f"{fit.ratio:.4g} rad/{leg.joint.unit}"
-            span = [f"{end:.4g}" for end in fit.span] if fit.fits else ["none", ""]
-            margins = (f"{v:.2f}" for v in (fit.rated_margin, fit.peak_margin, fit.speed_margin))
-            first = str(i) if fit is own[0] else ""
-            rows.append((first, plain(fit.motor.name), ratio, *span, *margins))
-    names = ("ratio", "from", "to", "rated", "peak", "speed")
-    caption = "Ratios that serve, the best first; then margins at it: rated, peak torque, speed."
-    return [table("leg", "motor", *names, rows=rows, numbers=("leg", *names), caption=caption)]

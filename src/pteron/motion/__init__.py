@@ -29,6 +29,11 @@ if TYPE_CHECKING:
         simulate as simulate,
         simulate_many as simulate_many,
     )
+    from pteron.motion.sizing.common_choice import (
+        CommonFit as CommonFit,
+        alike_legs as alike_legs,
+        choose_common as choose_common,
+    )
     from pteron.motion.sizing.drive_loads import (
         Sizing as Sizing,
         best_ratio as best_ratio,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _STILL = 1e-9
 """Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
 
-_HOLDING = 100.0
+HOLDING = 100.0
 """Ratio to the best one of the places where a joint moves, up to which a ratio is sought if it
 rests at others."""
 
@@ -355,7 +355,7 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     own = np.sqrt(np.sqrt(force[moving] / acceleration[moving]) / rotor_inertia)
     least, most = float(own.min()), float(own.max())
     if not moving.all():  # where it only holds, more is better
-        most *= _HOLDING
+        most *= HOLDING
     if most - least <= _SAME * most:
         return most
     # The greatest of convex functions of i^2.

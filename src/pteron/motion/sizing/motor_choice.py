@@ -113,25 +113,40 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
     found = []
     for leg in range(1, sizing.robot.joint_count + 1):
         fits = [_fit(sizing, leg, motor, margin) for motor in motors]
-        found += sorted(fits, key=_place)
+        found += sorted(fits, key=lambda fit: order(fit.motor, fit.span, fit.margin))
     return tuple(found)
 
 
-def _place(fit: Fit) -> tuple[bool, float]:
-    """Return the sort key of a fit."""
-    size = fit.motor.rated_torque * fit.motor.max_speed
-    return not fit.fits, size if fit.fits else -fit.margin
+def order(motor: Motor, span: Span, margin: float) -> tuple[bool, float]:
+    """Return the sort key of a motor that serves at these ratios, or comes so near."""
+    return not span, motor.rated_torque * motor.max_speed if span else -margin
+
+
+def fast_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
+    """Return the ratios that a motor's speed allows."""
+    return speed_span(sizing, leg, motor.max_speed / margin)
+
+
+def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
+    """Return the ratios at which a motor keeps its speed and its torques."""
+    rotor = motor.rotor_inertia
+    fast = fast_span(sizing, leg, motor, margin)
+    span = fast.within(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
+    return span.within(peak_span(sizing, leg, rotor, motor.peak_torque / margin))
 
 
 def _fit(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Fit:
-    rotor = motor.rotor_inertia
-    fast = speed_span(sizing, leg, motor.max_speed / margin)
-    span = fast.within(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
-    span = span.within(peak_span(sizing, leg, rotor, motor.peak_torque / margin))
-    least, greatest = span if span else fast
-    ratio = min(max(best_ratio(sizing, leg, rotor), least), greatest)
+    span = serving_span(sizing, leg, motor, margin)
+    least, greatest = span if span else fast_span(sizing, leg, motor, margin)
+    ratio = min(max(best_ratio(sizing, leg, motor.rotor_inertia), least), greatest)
     if not math.isfinite(ratio):  # the joint only holds: any ratio from the least on serves
         ratio = least or 1.0
+    return fit_at(sizing, leg, motor, span, ratio)
+
+
+def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> Fit:
+    """Return a motor's margins at a ratio."""
+    rotor = motor.rotor_inertia
     rms, peak = torques(sizing, leg, ratio, rotor)
     moved = float(sizing.load_inertia[1, leg - 1])
     return Fit(
