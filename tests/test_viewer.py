@@ -28,7 +28,7 @@ from pteron.viewer import view
 from pteron.viewer.boundary import allowed
 from pteron.viewer.guard import is_here
 from pteron.viewer.motion_files import motion_of_file
-from pteron.viewer.panel import action
+from pteron.viewer.panel import action, values
 from pteron.viewer.pushing import DRIVES
 from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
@@ -142,8 +142,38 @@ def test_a_payload_that_cannot_be_changes_nothing(homes, text):
     assert "decimal sign as a point" in found.message or "," not in text
 
 
+def test_a_payload_likely_in_grams_is_doubted_as_long_as_it_is_carried():
+    with pytest.warns(pteron.UnlikelyValue, match="in grams"):
+        session = Session(pteron.load("quadrupteron"), 300.0)
+    session.set_payload("300")  # a page's: it says so itself
+    doubt = "A payload of 300 kg, and the machine moves 5.95 kg of its own: is it in grams?"
+    session.load_standard()
+    session.advance(0.05)  # the motion's state has no message
+    shown = values(session, session.state.joints)
+    assert (shown["payload"], shown["payloadDoubt"]) == ("300", doubt)
+    session.set_payload("0.3")
+    assert values(session, session.state.joints)["payloadDoubt"] == ""
+
+
+def test_a_pose_that_looks_like_metres_gets_a_hint():
+    session = Session(pteron.load("quadrupteron"))
+    session.type_pose("0.05, 0.02, -0.04, 0")
+    hint = "Lengths are typed in mm: is 0.05 0.02 -0.04 in m? That is 50 20 -40 here."
+    assert session.state.message == hint
+    assert np.allclose(session.state.pose, [5e-5, 2e-5, -4e-5, 0.0])
+    for text in ("50 20 -40 0", "0 0 0 10", "2.5 0 0 0"):  # the last would be out of reach
+        session.type_pose(text)
+        assert session.state.message == ""
+
+
 def test_a_typed_pose_is_in_mm_and_degrees(homes):
     robot = homes["quadrupteron"].robot
+    for text in ("10,-20,30.5,90", "10, -20, 30.5, 90", "10; -20; 30,5; 90", "10,0 -20 30,5 90,0"):
+        assert np.allclose(typed_pose(robot, text), [0.01, -0.02, 0.0305, np.pi / 2])
+    # As in a field of one number, a comma is the decimal sign.
+    assert np.allclose(typed_pose(robot, "1,000 2 3 4")[:3], [0.001, 0.002, 0.003])
+    with pytest.raises(pteron.DataError, match="5 numbers given, 4 expected"):
+        typed_pose(robot, "1,5,2,3,4")
     assert np.allclose(typed_pose(robot, "10 -20 30.5 90"), [0.01, -0.02, 0.0305, np.pi / 2])
     for text, told in (("1 2", "4 expected: x y z phi"), ("1 2 x 4", "z: 'x' given")):
         with pytest.raises(pteron.DataError, match=told):
@@ -733,7 +763,10 @@ def test_what_is_typed_wrongly_is_told_on_the_page(page, viewer):
     for text in ("-1", "half a kilo"):
         payload(text)
         assert "The payload stays 0.4 kg." in said(page, "a mass of 0 kg or more expected")
+    payload("300")
+    wait_for(page, "() => document.getElementById('payload-doubt').innerText.includes('in grams?')")
     payload("0")
+    wait_for(page, "() => document.getElementById('payload-doubt').hidden")
     page.fill("#type", "10 20 thirty 0")
     page.get_by_role("button", name="Go there").click()
     assert "z: 'thirty' given, a number expected" in said(page, "thirty")

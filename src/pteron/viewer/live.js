@@ -46,6 +46,9 @@
     the("readout").innerHTML = found.readout;
     putAll();
     if (document.activeElement !== the("payload")) the("payload").value = found.payload;
+    const doubt = the("payload-doubt");
+    if (doubt.textContent !== found.payloadDoubt) doubt.textContent = found.payloadDoubt;
+    doubt.hidden = !found.payloadDoubt;
     for (const id of ["mode", "plane", "speed"]) the(id).value = found[id];
     the("screws").checked = found.screws;
     const play = the("play"), push = the("push"), time = the("time");

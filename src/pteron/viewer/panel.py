@@ -63,6 +63,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
         "pose": _tenths(pose_factors(state.robot) * state.pose),
         "joints": _tenths(np.array(shown_joints(state.robot, joints))),
         "payload": f"{state.payload:g}",
+        "payloadDoubt": state.payload_doubt,
         "mode": signs(leg.elbow for leg in state.robot.legs),
         "screws": session.screws,
         "plane": session.plane,

@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from pteron.dynamics import drive_forces
-from pteron.errors import DataError, ModelError
+from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, working_modes
 from pteron.motion import Motion, pick_and_place
+from pteron.motion.payload import payload_warning
 from pteron.motion.trajectories.checks import check_motion
 from pteron.platforms.nearest_pose import pose_nearest_frame
 from pteron.viewer.boundary import allowed, followed
@@ -34,6 +35,7 @@ from pteron.viewer.state import (
     current_assembly,
     in_working_mode,
     joint_moved,
+    metres_hint,
     moved,
     stopped,
     typed_pose,
@@ -92,6 +94,8 @@ class Session:
             self.state = carrying(self.state, repr(payload))
             if self.state.message:
                 raise DataError(f"payload: {payload!r} given, a mass of 0 kg or more expected")
+            if self.state.payload_doubt:
+                warn_unlikely(payload_warning(robot, payload))
         self.motion: Motion | None = None
         self.title = ""
         self.time, self.playing, self.speed = 0.0, False, 1.0
@@ -183,7 +187,10 @@ class Session:
 
     def type_pose(self, text: str) -> None:
         """Move the platform to a pose that is typed in mm or degrees, as its coordinates are."""
-        self.set_pose(typed_pose(self.state.robot, text))
+        pose = typed_pose(self.state.robot, text)
+        self.set_pose(pose)
+        if hint := metres_hint(self.state.robot, pose):
+            self.state = replace(self.state, message=f"{hint} {self.state.message}".strip())
 
     def set_joint(self, i: int, value: float) -> None:
         """Move one joint, from 0, to a value in m or rad."""

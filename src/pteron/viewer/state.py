@@ -13,8 +13,8 @@ from pteron.kernels import Array
 from pteron.kinematics import direct_kinematics, inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import with_elbows
-from pteron.motion import Motion, with_payload
-from pteron.motion.payload import payload_warning
+from pteron.motion import Motion
+from pteron.motion.payload import carrying as loaded_robot, payload_warning
 from pteron.platforms.coordinates import SHOWN
 from pteron.viewer.boundary import allowed, followed, told_rest, what_stops
 from pteron.viewer.sliding import nearest
@@ -22,6 +22,9 @@ from pteron.workspace import home_pose
 
 _SAME_POSE = 1e-6
 """Difference of two poses, m or rad, up to which they are one assembly mode."""
+
+_METRES = 3.0
+"""Largest length, mm, up to which it is asked whether what was typed is in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,13 @@ class ViewerState:
     @property
     def loaded(self) -> Manipulator:
         """The machine with its payload."""
-        return with_payload(self.robot, self.payload) if self.payload else self.robot
+        return loaded_robot(self.robot, self.payload)
+
+    @property
+    def payload_doubt(self) -> str:
+        """Why the payload is unlikely, a sentence; empty where it is not."""
+        doubt = payload_warning(self.robot, self.payload)
+        return f"{doubt[:1].upper()}{doubt[1:]}"
 
 
 def at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
@@ -141,32 +150,49 @@ def carrying(state: ViewerState, text: str) -> ViewerState:
     """Return the machine with a payload that is typed in kg; one that cannot be changes nothing."""
     try:
         mass = _number(text, "payload", "a mass of 0 kg or more")
-        with_payload(state.robot, mass)
+        loaded_robot(state.robot, mass)
     except PteronError as error:
         return replace(state, message=f"{error}. The payload stays {state.payload:g} kg.")
-    doubt = payload_warning(state.robot, mass)
-    return replace(state, payload=mass, message=f"{doubt[:1].upper()}{doubt[1:]}")
+    return replace(state, payload=mass, message="")
 
 
 def typed_pose(robot: Manipulator, text: str) -> Array:
     """Return a pose that is typed in the units of its coordinates, mm or degrees.
 
+    Between numbers are blanks, semicolons or commas. Where blanks alone give the right count a
+    comma within a number is its decimal sign, as where one number alone is typed.
+
     Examples
     --------
     >>> import pteron
-    >>> typed_pose(pteron.load("five-bar"), "10 -20")
-    array([ 0.01, -0.02])
+    >>> robot = pteron.load("five-bar")
+    >>> typed_pose(robot, "10 -20"), typed_pose(robot, "10,-20"), typed_pose(robot, "1,5; 20")
+    (array([ 0.01, -0.02]), array([ 0.01, -0.02]), array([0.0015, 0.02  ]))
     """
-    words = text.replace(";", " ").split()
+    parts = (word.strip(",") for word in text.replace(";", " ").split())
+    words = [word.replace(",", ".", 1) for word in parts if word]
+    if len(words) != robot.freedom:
+        words = text.replace(";", " ").replace(",", " ").split()
     names = " ".join(robot.coordinates)
     if len(words) != robot.freedom:
         raise DataError(
             f"pose: {len(words)} numbers given, {robot.freedom} expected: {names}, in "
-            f"{pose_units(robot)}, with blanks between them"
+            f"{pose_units(robot)}, with blanks or commas between them"
         )
     factors = pose_factors(robot)
     pairs = zip(words, robot.coordinates, strict=True)
     return np.array([_number(word, name, "a number") for word, name in pairs]) / factors
+
+
+def metres_hint(robot: Manipulator, pose: Array) -> str:
+    """Return a hint where the lengths of a pose that was typed in mm are likely in m; else ""."""
+    lengths = ~robot.platform.angular
+    typed = 1e3 * pose[lengths]
+    meant = np.where(lengths, 1e3 * pose, pose)
+    if not 0.0 < np.abs(typed).max(initial=0.0) < _METRES or not allowed(robot, meant):
+        return ""
+    told, mm = (" ".join(f"{x:g}" for x in np.round(v, 9)) for v in (typed, 1e3 * typed))
+    return f"Lengths are typed in mm: is {told} in m? That is {mm} here."
 
 
 def pose_factors(robot: Manipulator) -> Array:
