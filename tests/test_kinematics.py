@@ -242,7 +242,8 @@ def test_direct_kinematics_is_nan_where_no_pose_is(name):
         rows = column(robot, "direction")
         far += np.linalg.svd(rows / inner(rows, column(robot, "e"))[:, None])[0][:, 3]
     else:
-        far[:, 0] += 5.0  # m, out of the others' reach, or rad: then other joints are unlike these
+        # Out of the others' reach, or at an angle with which other joints are unlike these.
+        far[:, 0] += 5.0 if robot.legs[0].joint.unit == "m" else 3.0
     found = pteron.direct_kinematics(robot, far)
     if robot.legs[0].joint.unit == "m":
         assert np.isnan(found).all()

@@ -253,7 +253,7 @@ def test_what_a_new_machine_keeps_of_the_old_one_is_told(program):
     told = " ".join(done.stdout.split())
     assert "kg (lower) (--mass-from)" in told
     assert "(upper)" not in told
-    assert "where a crank is at 0, 5.33 deg below horizontal (zero_direction)." in told
+    assert "where a crank is at 0, 5.33 deg below horizontal." in told
     assert "At 0 cranks point 5.33 deg below horizontal." in program("check", "new.toml").stdout
 
 

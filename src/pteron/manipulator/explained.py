@@ -74,7 +74,7 @@ def kept(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
     if "limits" not in dimensions:
         told.append("the joints' limits (--limits)")
     if zero not in ("", LEVEL):
-        told.append(f"where a crank is at 0, {zero} (zero_direction)")
+        told.append(f"where a crank is at 0, {zero}")
     return [f"As in {shown(robot.name, bare=True)} still: {'; '.join(told)}."] if told else []
 
 

@@ -66,7 +66,9 @@ class ColumnSearch(ColumnNames):
         else:
             columns = tuple(self.family(kind, [0])[0])
         guessed = declared is None and columns != ("t",)
-        return self._in_units([kind] * len(columns), columns, guessed=guessed)
+        found = self._in_units([kind] * len(columns), columns, guessed=guessed)
+        # What a name says of the time's unit is told, declared or not.
+        return found._replace(told=found.told or self.unit_of(columns[0], kind) is not None)
 
     def group(
         self,
