@@ -710,6 +710,25 @@ def test_the_machine_is_in_sight_at_any_size(browser, viewer, width, height):
         assert wide <= width
 
 
+@CLIENTS
+def test_while_the_panel_is_folded_pose_and_limit_stand_over_the_picture(browser, viewer):
+    with opened(browser, viewer.url, 390, 844) as tab:
+        for x in (0.0, 1.0):
+            viewer.move_to([x, 0.0, 0.0, 0.0])
+            assert viewer.wait(10.0)
+        said(tab, "mm from the pose asked for")
+        x = fixed(1e3 * viewer.state.pose[0])
+        assert tab.inner_text("#where") == f"x {x} y 0.0 z 0.0 mm, phi 0.0°"
+        status = tab.get_by_role("status")
+        assert status.is_visible()
+        above = tab.locator(".tools").bounding_box()
+        assert status.bounding_box()["y"] >= above["y"] + above["height"]
+        assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+        tab.get_by_role("button", name="Controls").click()
+        assert not tab.locator("#where").is_visible()
+        assert tab.locator("#panel").get_by_role("status").is_visible()
+
+
 def _colors(tab, png):
     """Return the colours in a picture, as the browser itself decodes it."""
     from base64 import b64encode

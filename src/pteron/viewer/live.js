@@ -43,6 +43,7 @@
     const status = the("status");
     if (status.textContent !== found.message) status.textContent = found.message;
     status.classList.toggle("warns", found.warns);
+    the("where").textContent = found.where;
     the("readout").innerHTML = found.readout;
     putAll();
     if (document.activeElement !== the("payload")) the("payload").value = found.payload;
@@ -224,7 +225,10 @@
   on("reset", "click", () => picture.reset());
   on("whole", "click", () => { if (document.fullscreenElement) document.exitFullscreen(); else document.documentElement.requestFullscreen(); });
   the("whole").hidden = !document.fullscreenEnabled;
-  function fold(away) { document.body.classList.toggle("folded", away); the("fold").setAttribute("aria-expanded", !away); }
+  function fold(away) {
+    document.body.classList.toggle("folded", away); the("fold").setAttribute("aria-expanded", !away);
+    if (away) the("brief").append(the("status")); else the("panel").prepend(the("status"));
+  }
   on("fold", "click", () => fold(!document.body.classList.contains("folded")));
   fold(window.matchMedia("(max-width: 759px)").matches);
   the("legend").open = window.matchMedia("(min-width: 1000px) and (min-height: 700px)").matches;

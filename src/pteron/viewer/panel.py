@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
     """Return where the controls stand."""
     state, motion = session.state, session.motion
     return {
+        "where": _where(state.robot, state.pose),
         "pose": _tenths(pose_factors(state.robot) * state.pose),
         "joints": _tenths(np.array(shown_joints(state.robot, joints))),
         "payload": f"{state.payload:g}",
@@ -75,6 +77,15 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
         "duration": motion.duration if motion else None,
         "title": session.title,
     }
+
+
+def _where(robot: Manipulator, pose: Array) -> str:
+    """Return a pose (m,) in a line, each unit once."""
+    values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
+    named = zip(robot.coordinates, values, units, strict=True)
+    groups = groupby(((f"{name} {fixed(x)}", unit) for name, x, unit in named), lambda one: one[1])
+    parts = ((" ".join(text for text, _ in group), unit) for unit, group in groups)
+    return ", ".join(f"{text}{unit if unit == '°' else f' {unit}'}" for text, unit in parts)
 
 
 def shown_joints(robot: Manipulator, joints: Array) -> list[float]:
