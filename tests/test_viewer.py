@@ -28,7 +28,7 @@ from pteron.viewer import view
 from pteron.viewer.boundary import allowed
 from pteron.viewer.guard import is_here
 from pteron.viewer.motion_files import motion_of_file
-from pteron.viewer.panel import action, values
+from pteron.viewer.panel import action, doing, values
 from pteron.viewer.pushing import DRIVES
 from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
@@ -215,7 +215,7 @@ def test_where_the_forces_are_not_determined_the_page_says_why():
 def test_every_machine_is_pushed_by_a_spring_and_stays_where_it_may_be(name):
     robot = MECHANISMS[name]
     session = Session(robot)
-    session.begin_push(next(iter(DRIVES)))
+    session.begin_push("off: no force")
     push = session.push
     place, _ = robot.platform.at(session.home)
     rng = np.random.default_rng(0)
@@ -231,7 +231,7 @@ def test_every_machine_is_pushed_by_a_spring_and_stays_where_it_may_be(name):
 
 def test_a_damped_spring_only_takes_energy_and_the_free_machine_falls_as_simulated(homes):
     robot, home = homes["five-bar"].robot, homes["five-bar"].pose
-    push = Session(robot).prepare_push("free: no force")
+    push = Session(robot).prepare_push("off: no force")
     free = simulate(robot, start=(home, np.zeros(2)), duration=0.048)
     push.go(0.048)
     np.testing.assert_allclose(push.pose, free.pose[-1], atol=1e-9)
@@ -254,9 +254,10 @@ def test_a_damped_spring_only_takes_energy_and_the_free_machine_falls_as_simulat
 
 def test_a_spring_lifts_a_small_machine_that_has_fallen():
     session = Session(pteron.load("ball-table"))
-    session.begin_push("free: no force")
+    session.begin_push("off: no force")
     for _ in range(20):
         session.advance(1.0 / 30.0)
+    assert doing(session) == "Drives off: it falls. Pull at its platform."
     fallen = session.state.pose[0]
     assert fallen < session.home[0] - 0.02
     place, _ = session.state.robot.platform.at(session.state.pose)
@@ -264,6 +265,15 @@ def test_a_spring_lifts_a_small_machine_that_has_fallen():
     for _ in range(20):
         session.advance(1.0 / 30.0)
     assert session.state.pose[0] > fallen + 0.02
+
+
+def test_drives_hold_what_is_left_to_itself_unless_they_are_off():
+    session = Session(pteron.load("five-bar"))
+    session.begin_push(next(iter(DRIVES)))
+    for _ in range(10):
+        session.advance(1.0 / 30.0)
+    assert doing(session) == "The drives hold its pose. Pull at its platform."
+    np.testing.assert_allclose(session.state.pose, session.home, atol=1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -626,6 +636,16 @@ def test_a_drag_out_of_reach_slides_and_a_slider_at_its_end_blocks_no_other(page
     assert 50.0 < float(ends.rstrip("%")) <= 100.0
 
 
+WATCH = """() => {
+    const button = document.getElementById('push');
+    window.seen = [];
+    new MutationObserver(() => {
+        if (seen.at(-1) !== button.textContent) seen.push(button.textContent);
+    }).observe(button, { childList: true });
+}"""
+"""Keeps in `seen` what is written on the button of a push."""
+
+
 @CLIENTS
 def test_the_mouse_drags_the_platform_and_pushes_it(page, viewer):
     box = page.locator("#view").bounding_box()
@@ -644,9 +664,11 @@ def test_the_mouse_drags_the_platform_and_pushes_it(page, viewer):
     assert np.linalg.norm(viewer.state.pose[:3]) > 0.02
     assert viewer.state.pose[3] == 0.0
     viewer.move_to([0.0, 0.0, 0.0, 0.0])
-    page.select_option("#drives", "soft springs (PD, gravity balanced)")
+    page.evaluate(WATCH)
     page.click("#push")
     wait_for(page, "() => document.getElementById('push').textContent === 'Bring it to rest'")
+    assert page.evaluate("seen").count("Preparing …") == 1
+    assert page.inner_text("#does") == "The drives hold its pose. Pull at its platform."
     drag(60)
     page.wait_for_timeout(800)
     pulled = viewer.state.pose

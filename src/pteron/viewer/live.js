@@ -54,7 +54,9 @@
     the("screws").checked = found.screws;
     const play = the("play"), push = the("push"), time = the("time");
     play.setAttribute("aria-pressed", found.playing); play.textContent = found.playing ? "Pause" : "Play";
-    push.setAttribute("aria-pressed", found.pushing); push.textContent = found.pushing ? "Bring it to rest" : "Let it move";
+    push.setAttribute("aria-pressed", found.pushing); push.setAttribute("aria-busy", found.preparing);
+    push.textContent = found.pushing ? "Bring it to rest" : found.preparing ? "Preparing …" : "Let it move";
+    the("does").textContent = found.pushed;
     if (found.pushing && document.activeElement !== the("stiffness") && !the("stiffness").value) the("stiffness").value = found.stiffness;
     time.disabled = found.duration === null;
     if (found.duration !== null) {
@@ -218,7 +220,10 @@
     const data = await file.arrayBuffer();
     send({ do: "file", name: file.name }); socket.send(data); event.target.value = "";
   });
-  on("push", "click", () => { if (state.pushing) send({ do: "rest" }); else { the("stiffness").value = ""; send({ do: "push", drives: the("drives").value }); } });
+  on("push", "click", () => {
+    if (state.pushing) send({ do: "rest" });
+    else if (!state.preparing) { the("stiffness").value = ""; send({ do: "push", drives: the("drives").value }); }
+  });
   on("drives", "change", () => { if (state.pushing) send({ do: "push", drives: the("drives").value }); });
   for (const id of ["show-forces", "show-handles", "show-trail"]) on(id, "change", () => { if (id === "show-trail") trail = []; show(); });
   on("plots", "toggle", plot);

@@ -6,6 +6,7 @@ import json
 import threading
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from secrets import token_hex
 from time import monotonic
 from typing import Any
@@ -140,18 +141,24 @@ class Live:
 
     def _push(self, drives: str) -> None:
         """Compile the equations of motion, for which others do not wait, and begin."""
+        session = self.session
 
         def prepare() -> None:
-            try:
-                self.session.prepare_push(drives)
-            except PteronError as error:
-                told = str(error)
-                self.do("push", lambda: self._tell(told))
-            else:
-                self.do("push", lambda: self.session.begin_push(drives))
+            session.playing, session.preparing = False, True
+            if session.push is None:
+                session.state = stopped(session.state)
 
-        self.do("prepare", lambda: self._tell("Preparing the equations of motion."))
-        threading.Thread(target=prepare, name="pteron push", daemon=True).start()
+        def begin() -> None:
+            session.preparing = False
+            session.begin_push(drives)
+
+        def compile_equations() -> None:
+            with suppress(Exception):  # `begin` meets it again, and tells it
+                session.prepare_push(drives)
+            self.do("push", begin)
+
+        self.do("prepare", prepare)
+        threading.Thread(target=compile_equations, name="pteron push", daemon=True).start()
 
     def _tell(self, text: str) -> None:
         self.session.playing = False

@@ -72,6 +72,8 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
         "speed": next(name for name, factor in SPEEDS.items() if factor == session.speed),
         "playing": session.playing,
         "pushing": session.push is not None,
+        "preparing": session.preparing,
+        "pushed": _pushed(session),
         "stiffness": session.push.stiffness if session.push else None,
         "time": session.time,
         "duration": motion.duration if motion else None,
@@ -120,12 +122,21 @@ def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any]
 def doing(session: Session) -> str:
     """Return what the machine does, in words."""
     name, state = session.state.robot.name, session.state
-    if session.push is not None:
-        return f"{name} moves by itself: pull at its platform"
+    if words := _pushed(session):
+        return words
     if session.playing:
         return f"{name} moves: forces are those of the motion"
     moving = bool(state.velocity.any() or state.acceleration.any())
     return f"{name} {'at a moment of its motion' if moving else 'at rest'}"
+
+
+def _pushed(session: Session) -> str:
+    """Return what the machine does by itself, or is about to; empty where it does nothing."""
+    if session.push is not None:
+        return f"{session.push.does}. Pull at its platform."
+    if session.preparing:
+        return "Preparing the equations of motion: the first time takes some seconds."
+    return ""
 
 
 def action(session: Session, text: str) -> tuple[str, Callable[[], object]]:

@@ -12,16 +12,19 @@ from pteron.motion.simulation.plant import advance, allowed_step, drive_states
 from pteron.viewer.boundary import allowed, what_stops
 from pteron.viewer.sliding import nearest
 
+_NO_PULL = 1e-6
+"""Gravity along the platform's lengths, m/s^2, up to which the machine does not fall."""
+
 _PERIOD = 4e-3
 """Time for which the forces of the spring and of a controller are held, s."""
 
 DRIVES = {
-    "free: no force": None,
     "soft springs (PD, gravity balanced)": PDGravity(_PERIOD, bandwidth=8.0),
     "stiff springs (PD, gravity balanced)": PDGravity(_PERIOD, bandwidth=40.0),
     "computed torque": ComputedTorque(_PERIOD, bandwidth=8.0),
+    "off: no force": None,
 }
-"""Controllers of the drives while somebody pulls, by names that people read."""
+"""Controllers of the drives while somebody pulls, by names for people; the first is the usual one."""
 
 _STEP = 5e-4
 """Longest step of the integration, s."""
@@ -45,6 +48,8 @@ class Push:
         m, rad and s.
     forces : array, shape (n,)
         Of the drives, N or N m.
+    does : str
+        What the machine does by itself, in words.
     stops : str
         What stopped the platform in the last span; empty where nothing did.
     stiffness : float
@@ -70,6 +75,8 @@ class Push:
         rate = max(_RATE, np.sqrt(pull / sag))
         self.stiffness = round(float(rate**2 * self._mass), 1)
         self.forces, self.stops = np.zeros(robot.joint_count), ""
+        off = f"Drives off: {'it falls' if pull > _NO_PULL else 'nothing holds it'}"
+        self.does = off if self._law is None else "The drives hold its pose"
         self._arm: Array | None = None
         self._held = np.zeros(3)
         self._move(_PERIOD)  # compiles it

@@ -83,6 +83,8 @@ class Session:
         Seconds of the motion in one second.
     push : Push or None
         The machine's own motion, while somebody may pull at it.
+    preparing : bool
+        Whether its equations are being compiled.
     screws : bool
         Whether joint axes are shown, and `plane`, the name of the slice that is.
     """
@@ -100,6 +102,7 @@ class Session:
         self.title = ""
         self.time, self.playing, self.speed = 0.0, False, 1.0
         self.push: Push | None = None
+        self.preparing = False
         self.screws, self.plane = False, NONE
         self._before = list[ViewerState]()
         self._set_ranges()
