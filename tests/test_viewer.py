@@ -29,6 +29,7 @@ from pteron.viewer.boundary import allowed
 from pteron.viewer.guard import is_here
 from pteron.viewer.motion_files import motion_of_file
 from pteron.viewer.panel import action, doing, values
+from pteron.viewer.picture import Picture
 from pteron.viewer.pushing import DRIVES
 from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
@@ -201,6 +202,24 @@ def test_the_numbers_are_the_librarys(homes, name):
         assert f"<td>{readable(joint, leg.joint.unit)}</td>" in page
 
 
+def test_a_torques_arrow_goes_round_its_axis_from_the_crank_on(homes):
+    state = homes["3-rrr"]
+    picture = Picture(state.robot, state.pose[None], None)
+    forces = np.array([1.0, -0.5, 0.25])
+    moment = picture.moment(state, forces, np.full(3, 0.5), screws=False)
+    for i, (points, leg, _) in enumerate(moment["forces"]):
+        assert leg == i
+        foot, crank = (np.array(moment["now"]["chains"][i][k]) for k in (0, 1))
+        x, y, z = (np.array(points) - foot).T
+        angles = np.unwrap(np.arctan2(y, x))
+        turned = min(2.0 * abs(forces[i]), 1.75) * np.pi * np.sign(forces[i])
+        assert angles[-1] - angles[0] == pytest.approx(turned, abs=1e-3)
+        assert np.ptp(z) < 1e-6
+        to_crank = crank - foot
+        assert angles[0] == pytest.approx(np.arctan2(to_crank[1], to_crank[0]), abs=1e-3)
+    assert picture.legend(np.full(3, 18.04)).endswith("half a turn stands for 18.0 N m")
+
+
 def test_where_the_forces_are_not_determined_the_page_says_why():
     robot = pteron.load("quadrupteron")
     state = at_rest(robot, np.array([0.0, 0.0, 0.0, np.pi / 2.0]))
@@ -208,7 +227,7 @@ def test_where_the_forces_are_not_determined_the_page_says_why():
     assert np.isnan(found.forces).all()
     page = readout(state, found)
     assert "No forces here: pose: singular (type II" in page
-    assert '<span class="close">close</span>' in page
+    assert '<span class="close">very near</span>' in page
 
 
 @pytest.mark.parametrize("name", gated(MECHANISMS, ["delta", "tripteron-oblique"]))

@@ -279,17 +279,22 @@ class Picture {
       put([m.tool], () => this.ball(m.tool, grey || colors.ink, 1.1 * radii.platform), 0.02);
     }
   }
-  arrow([start, tip, color, radius]) {
-    const [a, b] = this.deep([start, tip]), whole = Math.hypot(...sub(b, a)), thick = radius * this.size;
+  // An arrow along a path, straight or bent: its head begins where the path comes so near to its tip.
+  arrow([points, color, radius]) {
+    const path = this.deep(points), b = path.pop(), away = (p, q) => Math.hypot(...sub(q, p)), thick = radius * this.size;
+    const whole = path.reduce((sum, p, i) => sum + away(p, path[i + 1] || b), 0);
     if (whole < 1e-9) return [];
-    const tint = this.colors[color] || this.colors.legs[color], head = Math.min(6 * thick, 0.6 * whole), neck = add(b, unit(sub(b, a)), -head);
+    const tint = this.colors[color] || this.colors.legs[color], head = Math.min(6 * thick, 0.6 * whole);
+    while (path.length > 1 && away(path[path.length - 1], b) < head) path.pop();
+    const neck = add(b, unit(sub(b, path[path.length - 1])), -head);
     const cone = () => {
       const p = this.pixel(neck), q = this.pixel(b), w = Math.max(3, 2.6 * thick * p[3]), { pen } = this;
       const n = unit([q[1] - p[1], p[0] - q[0], 0]);
       pen.beginPath(); pen.moveTo(q[0], q[1]); pen.lineTo(p[0] + w * n[0], p[1] + w * n[1]); pen.lineTo(p[0] - w * n[0], p[1] - w * n[1]); pen.closePath();
       pen.fillStyle = tint; pen.fill(); pen.strokeStyle = this.colors.paper; pen.lineWidth = 1; pen.stroke();
     };
-    return [[[a, neck], () => this.rod(a, neck, tint, thick)], [[b], cone]];
+    const shaft = path.map((p, i) => [p, path[i + 1] || neck]).map((ends) => [ends, () => this.rod(...ends, tint, thick)]);
+    return [...shaft, [[b], cone]];
   }
 
   draw() {

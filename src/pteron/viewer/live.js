@@ -68,8 +68,7 @@
     if (!end || Math.hypot(...sub(end, found.tip)) > 1e-4 * picture.size) trail = [...trail.slice(-_TRAIL), found.tip];
     past.push({ clock: found.clock, ...found.plotted });
     while (past[0].clock < found.clock - _SPAN) past.shift();
-    const scales = machine.forceUnits.map((unit, i) => `${Number(found.scale[i].toPrecision(3))} ${unit}`);
-    the("force-scale").textContent = `a drive’s force, up to ${[...new Set(scales)].join(" or ")} at the usual length${machine.forceUnits.includes("N m") ? "; a torque along its axis, as a screw turns" : ""}`;
+    the("force-scale").textContent = found.legend;
     every("[data-if]").forEach((one) => { one.hidden = one.dataset.if === "screws" ? !found.screws : found.plane === "none"; });
     show(); plot();
   }

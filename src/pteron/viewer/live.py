@@ -265,7 +265,7 @@ class Live:
                     "joints": panel.shown_joints(state.robot, found.joints),
                     "power": _finite(found.power),
                 },
-                "scale": _finite(self._scale),
+                "legend": self._picture.legend(self._scale),
                 "spring": spring and [seen(state.robot, end) for end in spring],
             },
         )

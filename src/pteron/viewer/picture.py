@@ -13,6 +13,7 @@ from pteron.manipulator import Manipulator
 from pteron.motion import JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_points
 from pteron.report.motion_frames import moving, seen, still
+from pteron.report.typeset import significant
 from pteron.viewer.boundary import allowed
 from pteron.viewer.state import ViewerState
 
@@ -20,11 +21,18 @@ _SCREW, _FORCE = 0.09, 0.3
 """Half the length of the arrow along a joint's axis, and the length of the largest force's, as
 shares of the machine's size."""
 
-_SCREW_RADIUS, _SLIDING_RADIUS, _FORCE_RADIUS = 0.0035, 0.006, 0.009
-"""Radii of arrows, as such shares."""
+_SCREW_RADIUS, _SLIDING_RADIUS, _FORCE_RADIUS, _BENT_RADIUS = 0.0035, 0.006, 0.009, 0.005
+"""Radii of arrows, as such shares; a torque's is thinner than any bar."""
 
 _MOST = 2.0
 """Longest arrow of a force, over the one of the force that the scale is made for."""
+
+_BEND, _TURN, _WHOLE = 0.085, np.pi, 1.75 * np.pi
+"""Radius of a torque's bent arrow as such a share, how far it goes round for the torque that the
+scale is made for, and at most, rad."""
+
+_BENDS = 25
+"""Points of a bent arrow."""
 
 _POSES = 40
 """Most poses that the picture's size is made for."""
@@ -32,8 +40,8 @@ _POSES = 40
 _NEAR = 0.6
 """Distance of these from the home pose, over that of random ones."""
 
-Arrow = tuple[Any, Any, str | int, float]
-"""Start and tip, colour by its name or its leg from 0, and radius over the machine's size."""
+Arrow = tuple[Any, str | int, float]
+"""Points from start to tip, colour by name or by leg from 0, radius over the machine's size."""
 
 
 class Picture:
@@ -81,8 +89,22 @@ class Picture:
             return None
         return moving(self._robot, moved)
 
-    def _arrow(self, start: Array, way: Array, color: str | int, radius: float) -> Arrow:
-        return seen(self._robot, start), seen(self._robot, start + way), color, radius
+    def legend(self, scale: Array) -> str:
+        """Return what the arrows of forces (n,) with a scale (n,) say."""
+        square = self.still["grid"] / (_FORCE * self.size)
+        stands = {"N": (square, "the length of a square"), "N m": (1.0, "half a turn")}
+        units = [leg.joint.force_unit for leg in self._robot.legs]
+        sizes = dict(zip(units, scale, strict=True))
+        told = [
+            f"{words} stands for {significant(share * sizes[unit])} {unit}"
+            for unit, (share, words) in stands.items()
+            if unit in sizes
+        ]
+        bent = ", round its axis the way it turns" if "N m" in sizes else ""
+        return f"arrows: what each drive gives{bent}; {', '.join(told)}"
+
+    def _arrow(self, points: Array, color: str | int, radius: float) -> Arrow:
+        return seen(self._robot, points), color, radius
 
     def _screws(self, state: ViewerState, points: JointPoints) -> list[Arrow]:
         """Return the axes of all joints; those of sliding joints are thicker, in another colour."""
@@ -99,19 +121,35 @@ class Picture:
                 if np.isfinite([*at, *axis]).all() and axis.any():
                     way = length * axis / np.linalg.norm(axis)
                     look = ("ink", _SCREW_RADIUS) if turns else ("warning", _SLIDING_RADIUS)
-                    found.append(self._arrow(at - way, 2.0 * way, *look))
+                    found.append(self._arrow(np.array([at - way, at + way]), *look))
         return found
 
     def _forces(self, points: JointPoints, forces: Array, scale: Array) -> list[Arrow]:
-        """Return the drives' forces; a torque's arrow is along its axis, as a screw turns.
+        """Return the drives' forces; a torque's arrow goes round its axis, from the crank on.
 
         A ram's begins at its base joint, along it.
         """
         found = list[Arrow]()
-        shares = np.clip(np.nan_to_num(forces) / scale, -_MOST, _MOST)
+        shares = np.nan_to_num(forces) / scale
         for i, (line, guide) in enumerate(zip(points.links, self._guides, strict=True)):
             along = line[-1] - line[0]
             axis = along / np.linalg.norm(along) if points.rams[i] else guide.axis
-            way = _FORCE * self.size * shares[i] * axis
-            found.append(self._arrow(line[0], way, i, _FORCE_RADIUS))
+            if self._robot.legs[i].joint.force_unit == "N m":
+                angle = np.clip(_TURN * shares[i], -_WHOLE, _WHOLE)
+                path = line[0] + _BEND * self.size * _round(axis, line[1] - line[0], angle)
+                found.append(self._arrow(path, i, _BENT_RADIUS))
+            else:
+                way = _FORCE * self.size * np.clip(shares[i], -_MOST, _MOST) * axis
+                found.append(self._arrow(np.array([line[0], line[0] + way]), i, _FORCE_RADIUS))
         return found
+
+
+def _round(axis: Array, arm: Array, angle: float) -> Array:
+    """Return unit vectors (K, 3) across an axis, turned by up to an angle from an arm's side on."""
+    across = np.cross(axis, arm)
+    if np.linalg.norm(across) < 1e-6 * np.linalg.norm(arm):  # an arm along the axis has no side
+        across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    across /= np.linalg.norm(across)
+    turns = np.linspace(0.0, angle, _BENDS)[:, None]
+    found: Array = np.cos(turns) * np.cross(across, axis) + np.sin(turns) * across
+    return found

@@ -24,7 +24,7 @@ DRIVES = {
     "computed torque": ComputedTorque(_PERIOD, bandwidth=8.0),
     "off: no force": None,
 }
-"""Controllers of the drives while somebody pulls, by names for people; the first is the usual one."""
+"""Controllers of the drives while somebody pulls, by names for people; the first is usual."""
 
 _STEP = 5e-4
 """Longest step of the integration, s."""

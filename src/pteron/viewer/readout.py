@@ -22,6 +22,9 @@ _COLORS: dict[Level, tuple[str, str]] = {
 }
 """Colours of background and text, of enough contrast for every eye; words say the same."""
 
+_WORDS: dict[Level, str] = {"far": "far", "near": "near", "close": "very near"}
+"""What people read of a margin."""
+
 PLACES = 2
 """Decimal places of a force."""
 
@@ -58,7 +61,7 @@ def readout(state: ViewerState, found: Readings) -> str:
         ),
         limited=limited,
         condition=found.condition,
-        margins=[(name, value, level(value)) for name, value in margins.items()],
+        margins=[(name, at, level(at), _WORDS[level(at)]) for name, at in margins.items()],
         fault=found.fault,
     )
 
