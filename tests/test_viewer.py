@@ -709,6 +709,7 @@ def test_a_reload_a_second_tab_and_a_link_show_the_same(page, viewer, browser):
     slide(page, "phi (°)", ["ArrowRight"] * 9)
     wait_for(page, SHOWN, [0.0, 0.0, 0.7, 0.9])
     with opened(browser, viewer.url) as other:
+        assert "All who open this page move one machine." in other.inner_text("#panel")
         assert other.inner_text("table.legs") == page.inner_text("table.legs")
         slide(other, "x (mm)", ["ArrowLeft"] * 3)
         wait_for(page, SHOWN, [-0.3, 0.0, 0.7, 0.9])
