@@ -876,6 +876,35 @@ OPENS = """url => new Promise(done => {
 })"""
 
 
+POSES = r"""() => {
+    const fields = [0, 1, 2].map(i => Number(document.getElementById(`pose${i}n`).value));
+    const words = document.getElementById('assembly').selectedOptions[0].text;
+    const listed = words.replace(/^.*: /, '').replaceAll('\u2212', '-').split(' ').map(Number);
+    return [fields, listed];
+}"""
+"""The pose in the fields, and the one in the list of assembly modes."""
+
+
+@CLIENTS
+def test_while_a_cycle_plays_the_assembly_mode_has_the_pose_of_the_fields(browser):
+    with view(pteron.load("delta"), motion="adept", port=0) as viewer:
+        with opened(browser, viewer.url) as tab:
+            seen = set()
+            for _ in range(20):
+                fields, listed = tab.evaluate(POSES)
+                assert listed == pytest.approx(fields, abs=0.11)  # one rounds half up, one to even
+                seen.add(tuple(listed))
+                tab.wait_for_timeout(60)
+            assert len(seen) > 3
+            unfold(tab, "player")
+            tab.click("#play")
+            numbered = "() => document.getElementById('assembly').options[0].text.startsWith('1: ')"
+            wait_for(tab, numbered)
+            fields, listed = tab.evaluate(POSES)
+            assert listed == pytest.approx(fields, abs=0.11)
+        assert viewer.faults == ()
+
+
 @contextmanager
 def other_server():
     """A server of somebody else's page on this machine; its port."""

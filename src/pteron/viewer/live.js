@@ -2,7 +2,7 @@
 (() => {
   const the = (id) => document.getElementById(id), every = (query) => [...document.querySelectorAll(query)];
   const _SPAN = 10, _HELD = 500, _TRAIL = 3000;
-  let picture, machine, state, slice = [], socket, trail = [], held = null;
+  let picture, machine, state, settled, listed, slice = [], socket, trail = [], held = null;
   const touched = {}, past = [];
   const send = (asked) => { if (socket && socket.readyState === 1) socket.send(JSON.stringify(asked)); };
   const round = (value) => Math.round(10 * value) / 10;
@@ -45,7 +45,7 @@
     status.classList.toggle("warns", found.warns);
     the("where").textContent = found.where;
     the("readout").innerHTML = found.readout;
-    putAll();
+    putAll(); nameAssemblies();
     if (document.activeElement !== the("payload")) the("payload").value = found.payload;
     const doubt = the("payload-doubt");
     if (doubt.textContent !== found.payloadDoubt) doubt.textContent = found.payloadDoubt;
@@ -95,10 +95,17 @@
         slider.title = `from here ${round(low)} to ${round(spans[1][i])}`;
       });
     }
-    const list = the("assembly");
-    list.replaceChildren(...found.assemblies.map((words) => new Option(words)));
-    list.selectedIndex = found.assembly;
+    settled = found; listed = null;
+    nameAssemblies();
     setTimeout(putAll, _HELD);
+  }
+  // The list of assembly modes is that of a pose; while the machine moves it has the pose alone.
+  function nameAssemblies() {
+    const same = settled && free() && settled.label === state.label, names = same ? settled.assemblies : [state.label];
+    if (listed === names.join()) return;
+    listed = names.join();
+    the("assembly").replaceChildren(...names.map((words) => new Option(words)));
+    the("assembly").selectedIndex = same ? settled.assembly : 0;
   }
   function takeSlice(found) { slice = found.parts; the("map").innerHTML = found.map; show(); }
 

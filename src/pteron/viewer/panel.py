@@ -62,6 +62,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
     state, motion = session.state, session.motion
     return {
         "where": _where(state.robot, state.pose),
+        "label": _label(state.robot, state.pose),
         "pose": _tenths(pose_factors(state.robot) * state.pose),
         "joints": _tenths(np.array(shown_joints(state.robot, joints))),
         "payload": f"{state.payload:g}",
@@ -90,6 +91,12 @@ def _where(robot: Manipulator, pose: Array) -> str:
     return ", ".join(f"{text}{unit if unit == '°' else f' {unit}'}" for text, unit in parts)
 
 
+def _label(robot: Manipulator, pose: Array) -> str:
+    """Return a pose (m,) as the list of assembly modes has it."""
+    parts = zip(pose_factors(robot) * pose, robot.platform.angular, strict=True)
+    return " ".join(fixed(x) + "°" * bool(angle) for x, angle in parts)
+
+
 def shown_joints(robot: Manipulator, joints: Array) -> list[float]:
     """Return joint coordinates (n,) in mm and degrees."""
     found: list[float] = (_joint_factors(robot) * joints).tolist()
@@ -104,18 +111,16 @@ def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any]
     spans = session.spans(busy)
     if spans is None or busy():
         return None
-    factors, turns = pose_factors(session.state.robot), session.state.robot.platform.angular
+    robot, factors = session.state.robot, pose_factors(session.state.robot)
     poses, now = session.assemblies()
-    labels = []
-    for k, pose in enumerate(poses, start=1):
-        parts = zip(factors * pose, turns, strict=True)
-        labels.append(f"{k}: {' '.join(fixed(x) + '°' * bool(angle) for x, angle in parts)}")
+    labels = [f"{k}: {_label(robot, pose)}" for k, pose in enumerate(poses, start=1)]
     pose_span, joint_span = spans
     return {
+        "label": _label(robot, session.state.pose),
         "assemblies": labels if now is not None else [*labels, _NO_MODE],
         "assembly": len(labels) if now is None else now,
         "poseSpan": (factors * pose_span).tolist(),
-        "jointSpan": (_joint_factors(session.state.robot) * joint_span).tolist(),
+        "jointSpan": (_joint_factors(robot) * joint_span).tolist(),
     }
 
 
