@@ -14,11 +14,13 @@ from urllib.parse import urlsplit
 import numpy as np
 import polars as pl
 import pytest
+from matplotlib.path import Path
 from measured import built
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated
 
 import pteron
 from pteron.errors import DataError
+from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.jacobian_at import jacobian_at
 from pteron.legs import Reading
 from pteron.motion import simulate
@@ -35,7 +37,7 @@ from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
 from pteron.viewer.server import free_port
 from pteron.viewer.session import Session
-from pteron.viewer.slices import choices, slice_map, slice_strips
+from pteron.viewer.slices import choices, slice_map, slice_parts
 from pteron.viewer.sliding import nearest
 from pteron.viewer.state import (
     assembled,
@@ -301,18 +303,27 @@ def sessions(homes):
     return {name: Session(homes[name].robot) for name in ("delta", "five-bar")}
 
 
-def test_a_slice_holds_the_poses_in_reach(homes):
-    state = homes["quadrupteron"]
-    span = 0.3 * np.array([[-1.0] * 4, [1.0] * 4])
-    (_, serves), (_, limited) = slice_strips(state.robot, state.pose, "xz", span)
-    poses = np.zeros((*serves.shape[:2], 4))
-    poses[..., :3] = serves
-    margins = pteron.workspace.pose_margins(state.robot, poses).least
-    assert len(poses) > 50
-    assert (margins >= 0.0).all()
-    assert np.ptp(serves[..., 1]) == 0.0
-    assert not len(limited)
-    assert list(choices(state.robot)) == ["none", "xy", "xz", "yz"]
+@pytest.mark.parametrize(("name", "plane"), [("quadrupteron", "xz"), ("3-rrr", "xy")])
+def test_a_slice_goes_round_what_serves_and_what_only_a_limit_forbids(homes, name, plane):
+    robot, home = homes[name].robot, homes[name].pose
+    i, j = ("xyz".index(letter) for letter in plane)
+    (_, serves), (_, limited) = slice_parts(robot, home, plane, Session(robot).pose_range)
+    poses = np.tile(home, (4000, 1))
+    poses[:, [i, j]] += np.random.default_rng(0).uniform(-0.3, 0.3, (4000, 2))
+
+    def within(rings):
+        paths = [Path(ring[:, [i, j]]) for ring in rings]
+        return sum((path.contains_points(poses[:, [i, j]]) for path in paths), np.zeros(4000)) % 2
+
+    reached = np.isfinite(inverse_kinematics(robot, poses, on_failure="nan")).all(axis=-1)
+    served = reached & allowed(robot, poses)
+    assert served.mean() > 0.05
+    assert (within(serves) == served).mean() > 0.997
+    assert (within(limited) == (reached & ~served)).mean() > 0.997
+
+
+def test_a_machine_has_a_slice_by_any_two_lengths(homes):
+    assert list(choices(homes["quadrupteron"].robot)) == ["none", "xy", "xz", "yz"]
 
 
 @CLIENTS

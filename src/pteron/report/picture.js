@@ -305,10 +305,10 @@ class Picture {
     this.written = [];
     this.ground();
     if (!machine.planar) this.shadow(m);
-    for (const { color, quads } of extra.slice || []) {
+    for (const { color, rings } of extra.slice || []) {
       pen.beginPath();
-      for (const quad of this.deep(quads)) quad.forEach((p, i) => { const q = this.pixel(p); if (i) pen.lineTo(q[0], q[1]); else pen.moveTo(q[0], q[1]); });
-      pen.globalAlpha = 0.42; pen.fillStyle = color; pen.fill(); pen.globalAlpha = 1;
+      for (const ring of this.deep(rings)) ring.forEach((p, i) => { const q = this.pixel(p); if (i) pen.lineTo(q[0], q[1]); else pen.moveTo(q[0], q[1]); });
+      pen.globalAlpha = 0.42; pen.fillStyle = color; pen.fill("evenodd"); pen.globalAlpha = 1;
     }
     const items = [];
     const put = (points, run, nearer = 0) => {

@@ -23,7 +23,7 @@ from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
 from pteron.viewer.server import Tab
 from pteron.viewer.session import Session
-from pteron.viewer.slices import choices, slice_map, slice_strips
+from pteron.viewer.slices import choices, slice_map, slice_parts
 from pteron.viewer.state import stopped
 
 _FRAME = 1.0 / 30.0
@@ -291,8 +291,8 @@ class Live:
         given = state.robot, state.pose
         map_, parts = "", []
         if isinstance(plane, str):
-            for color, strips in slice_strips(*given, plane, span):
-                parts.append({"color": color, "quads": seen(state.robot, strips)})
+            for color, rings in slice_parts(*given, plane, span):
+                parts.append({"color": color, "rings": [seen(state.robot, r) for r in rings]})
         elif plane is not None:
             map_ = slice_map(*given, plane, span)
         self._send("slice", {"parts": parts, "map": map_})

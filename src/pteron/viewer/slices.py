@@ -8,17 +8,20 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
+from matplotlib.figure import Figure
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.plots.printing import svg
 from pteron.plots.reach import reach_figure
-from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
+from pteron.workspace import reach_slice
 from pteron.workspace.reach_slices import Plane, slice_planes
 
 POINTS = 111
 """Points along each side of a slice."""
+
+_COARSE = 61
+"""The same of the slice that shows how wide it is."""
 
 SERVES, BEYOND = "#2f7fc4", "#e0a030"
 """Colours of poses in reach, and of those in reach but beyond a joint's limit."""
@@ -38,43 +41,62 @@ def choices(robot: Manipulator) -> dict[str, Plane | None]:
     }
 
 
-def slice_strips(
+def slice_parts(
     robot: Manipulator, pose: Array, plane: str, span: Array
-) -> list[tuple[str, Array]]:
-    """Return the parts of a slice through a pose: a colour, and strips (S, 4, 3) in space, m.
+) -> list[tuple[str, list[Array]]]:
+    """Return the parts of a slice through a pose: a colour, and rings (K, 3) in space, m.
 
-    They are where poses serve, and where only a joint's limit forbids them, within the least and
-    the greatest of each coordinate (2, m). A strip is a row of grid cells whose corners all do.
+    They bound where poses serve, and where only a joint's limit forbids them; what an odd number
+    of rings goes round belongs to the part. The slice is as wide as both, or ends with the least
+    and the greatest of each coordinate (2, m) where it has no end soon after.
     """
-    cut = _slice(robot, pose, plane, span)
+    i, j = (robot.coordinates.index(name) for name in plane)
+    extent = _sides(robot, pose, plane, (*map(float, span[:, i]), *map(float, span[:, j])))
+    cut = reach_slice(robot, pose, plane, extent=extent, points=POINTS)
+    legs = cut.leg_margins.min(axis=-1)
     found = []
-    for status, color in ((REACHABLE, SERVES), (BEYOND_LIMITS, BEYOND)):
-        flat = _strips(cut.first, cut.second, np.asarray(cut.status == status))
-        found.append((color, _in_space(robot, pose, *cut.places, flat)))
+    for field, color in ((cut.margin, SERVES), (np.minimum(legs, -cut.margin), BEYOND)):
+        rings = _rings(cut.first, cut.second, field)
+        found.append((color, [_in_space(robot, pose, i, j, ring) for ring in rings]))
     return found
 
 
 def slice_map(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> str:
-    """Return the map of a slice along an angle, in HTML; see `slice_strips`, `reach_figure`."""
-    cut = _slice(robot, pose, plane, span)
+    """Return the map of a slice along an angle, in HTML; see `slice_parts`, `reach_figure`."""
+    i, j = (robot.coordinates.index(name) for name in plane)
+    (left, right), (low, high) = (map(float, span[:, k]) for k in (i, j))
+    cut = reach_slice(robot, pose, plane, extent=(left, right, low, high), points=POINTS)
     return str(svg(reach_figure(cut), name="slice", title=f"Reach over {' and '.join(plane)}"))
 
 
-def _slice(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> ReachSlice:
-    i, j = (robot.coordinates.index(name) for name in plane)
-    (left, right), (low, high) = (map(float, span[:, k]) for k in (i, j))
-    return reach_slice(robot, pose, plane, extent=(left, right, low, high), points=POINTS)
+def _sides(
+    robot: Manipulator, pose: Array, plane: str, sides: tuple[float, ...]
+) -> tuple[float, float, float, float]:
+    """Return the extent of what the legs reach; a side where it goes on stays as it is."""
+    left, right, low, high = sides
+    wide, tall = right - left, high - low
+    extent = left - wide, right + wide, low - tall, high + tall
+    cut = reach_slice(robot, pose, plane, extent=extent, points=_COARSE)
+    held = cut.leg_margins.min(axis=-1) >= 0.0
+    found = list[float]()
+    for values, axis, ends in ((cut.first, 0, (left, right)), (cut.second, 1, (low, high))):
+        at, step = np.flatnonzero(held.any(axis=axis)), float(values[1] - values[0])
+        if not len(at):
+            at = np.array([0, len(values) - 1])
+        found += [
+            ends[0] if at[0] == 0 else float(values[at[0]]) - step,
+            ends[1] if at[-1] == len(values) - 1 else float(values[at[-1]]) + step,
+        ]
+    return found[0], found[1], found[2], found[3]
 
 
-def _strips(first: Array, second: Array, inside: NDArray[np.bool_]) -> Array:
-    """Return the rows of cells of a grid (B, A) whose corners are inside, as (S, 4, 2)."""
-    whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
-    edges = np.diff(np.pad(whole.astype(int), ((0, 0), (1, 1))), axis=1)
-    rows, starts = np.nonzero(edges == 1)
-    ends = np.nonzero(edges == -1)[1]
-    left, right, low, high = first[starts], first[ends], second[rows], second[rows + 1]
-    corners = [(left, low), (right, low), (right, high), (left, high)]
-    return np.stack([np.stack(corner, axis=-1) for corner in corners], axis=1)
+def _rings(first: Array, second: Array, field: Array) -> list[Array]:
+    """Return the closed lines (K, 2) about where a field (B, A) over a grid is not negative."""
+    if not field.max() > 0.0:
+        return []
+    axes = Figure().add_subplot()
+    drawn = axes.contourf(first, second, field, levels=[0.0, np.inf], colors=[SERVES])
+    return [np.asarray(ring) for path in drawn.get_paths() for ring in path.to_polygons()]
 
 
 def _in_space(robot: Manipulator, pose: Array, i: int, j: int, flat: Array) -> Array:
