@@ -10,7 +10,7 @@ from mechanisms import CLIENTS, gated
 from test_faults import RATE, brisk, clean, found, late_by, noisy
 
 import pteron
-from pteron.controllers import FeedForwardPD
+from pteron.controllers import ComputedTorque, FeedForwardPD
 from pteron.identification import (
     FaultIsolation,
     Limits,
@@ -314,6 +314,16 @@ def test_no_delay_is_taken_out_of_a_log_that_has_none(noise):
     assert result.unknowns.delay == 0.0
     assert not result.notes
     assert not any(said.startswith("Below zero") for said in result.verdict.reasons)
+
+
+def test_no_play_is_named_where_it_changes_next_to_nothing():
+    """What sampling leaves without noise is largest where loads turn: 0.0001 % of the forces."""
+    robot = pteron.load("delta")
+    series = random_excitation(robot, limits=Limits(6.0, 80.0), period=4.0, seed=3)
+    run = simulate(robot, series.at(np.arange(8001) / 1000.0), ComputedTorque())
+    result = found(robot, Log("log.csv", run.time, run.joints, run.forces))
+    assert not result.fault_isolation.faults
+    assert result.verdict.grade == "trustworthy"
 
 
 def test_friction_below_zero_is_told_before_all_else():

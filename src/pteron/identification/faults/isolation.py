@@ -222,7 +222,7 @@ def _isolated(
 
     # Play, which no column has
     play = _play(parts, estimate.values, step)
-    if play is not None:
+    if play is not None and not (play.cycle < _NAMED).all():
         faults.insert(0, play)
         spoiled = np.hypot(spoiled, play.cycle)
 
