@@ -433,3 +433,48 @@ def test_where_no_cycle_fits_it_is_said(tmp_path: Path, monkeypatch):
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         *("motion.csv", "motion.toml", "narrow.toml")
     ]
+
+
+def about_home(low: float, high: float) -> pteron.Manipulator:
+    """Return a Delta whose joints go so far from the home pose, rad."""
+    robot = CATALOG["delta"]
+    q = pteron.inverse_kinematics(robot, home_pose(robot)).tolist()
+    legs = zip(robot.legs, q, strict=True)
+    legs = tuple(replace(leg, limits=(at + low, at + high)) for leg, at in legs)
+    return replace(robot, legs=legs)
+
+
+def test_a_safe_distance_from_the_joints_limits_is_kept_unasked(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    robot = about_home(-0.3, 0.3)
+    pteron.save(robot, "robot.toml")
+    nearest, said = {}, {}
+    for given in ("", " --keep-off 0"):
+        result = run(f"excite robot.toml {QUICK} --speed 5 --out motion.csv{given}")
+        assert result.exit_code == 0, result.stderr
+        joints = read_log("motion.csv", robot).joints
+        low, high = np.array([leg.limits for leg in robot.legs]).T
+        nearest[given] = min((joints - low).min(), (high - joints).min())
+        said[given] = " ".join(result.stdout.split())
+    # 2 % of 0.6 rad; the limits bind in both, so that a smaller distance is used.
+    assert 0.012 <= nearest[""] < 0.02
+    assert 0.005 <= nearest[" --keep-off 0"] < 0.012
+    assert "where 0.012 was to be kept (--keep-off, --clearance)" in said[""]
+    assert "where 0.005 was to be kept" in said[" --keep-off 0"]
+
+
+def test_a_share_of_the_range_leaves_half_of_what_the_home_pose_has():
+    """Its best pose is off the middle of the range: almost half of that is more than it has."""
+    robot = about_home(-0.02, 1.3)
+    low, high = np.array([leg.limits for leg in robot.legs]).T
+    joints = pteron.inverse_kinematics(robot, home_pose(robot))
+    has = np.minimum(joints - low, high - joints)
+    assert (has < 0.49 * (high - low)).all()
+    motion = random_excitation(robot, harmonics=2, period=2.0, limits=Limits(joint_share=0.49))
+    moved = motion.joints(motion.uniform_times(2000))[0]
+    assert (np.minimum(moved - low, high - moved) >= 0.5 * has - 1e-9).all()
+
+
+def test_a_share_of_the_range_is_refused_where_nothing_would_be_left():
+    with pytest.raises(pteron.DataError, match=r"joint_share 0.5 given, at least 0 and below 0.5"):
+        Limits(joint_share=0.5)

@@ -10,7 +10,7 @@ from mechanisms import CLIENTS, gated
 from test_faults import RATE, brisk, clean, found, late_by, noisy
 
 import pteron
-from pteron.controllers import FeedForwardPD
+from pteron.controllers import ComputedTorque, FeedForwardPD
 from pteron.identification import (
     FaultIsolation,
     Limits,
@@ -271,13 +271,66 @@ def motion_of(robot):
 # Without noise ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", gated(["delta", "par4"]))
-def test_forces_held_from_sample_to_sample_are_no_fault(name):
-    """As `pteron simulate` writes them: half a step late, and not a trace of noise."""
+def held(name):
+    """Return a machine, its log as `pteron simulate` writes it, half a step late, and friction."""
     robot, log, friction = clean(name)
     later = log_of(robot, time=log.time + 0.5 / RATE, friction=friction, **motion_of(robot))
-    result = found(robot, replace(log, forces=later.forces))
-    assert not any(one.matters for one in result.fault_isolation.faults)
+    return robot, replace(log, forces=later.forces), friction
+
+
+@pytest.mark.parametrize("name", gated(["delta", "par4"]))
+def test_forces_held_from_sample_to_sample_are_no_fault_and_spoil_no_value(name):
+    robot, log, friction = held(name)
+    result = found(robot, log)
+    assert result.verdict.grade == "trustworthy"
+    assert not result.fault_isolation.faults
+    assert not result.understated
+    assert result.unknowns.delay == pytest.approx(-0.5 / RATE, rel=1e-3)
+    words = f"The positions are half a sample ({500.0 / RATE:.3g} ms) late for the forces"
+    assert any(note.startswith(words) for note in result.notes)
+    # What is left of the errors is next to nothing of what the delay makes when it is left in.
+    left_in = found(robot, log, processing=Processing(delay=0.0))
+    true = np.r_[result.model.base.values(robot), friction.values]
+    off, spoiled = (np.abs(one.estimate.values - true) for one in (result, left_in))
+    assert off.max() < 0.02 * spoiled.max()
+
+
+@pytest.mark.parametrize("name", gated(["delta", "par4"]))
+def test_a_delay_of_held_forces_that_is_left_in_marks_the_intervals(name):
+    robot, log, _ = held(name)
+    result = found(robot, log, processing=Processing(delay=0.0))
     assert [one.fault for one in result.fault_isolation.faults] == ["delay"]
     assert "half a sample" in result.fault_isolation.faults[0].message
     assert result.verdict.grade == "trustworthy"
+    assert not result.fault_isolation.matters
+    assert result.understated
+    assert "The stated errors of the values do not allow for that." in result.verdict.reasons
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_no_delay_is_taken_out_of_a_log_that_has_none(noise):
+    robot, log, _ = clean("delta")
+    result = found(robot, noisy(log, noise=noise) if noise else log)
+    assert result.unknowns.delay == 0.0
+    assert not result.notes
+    assert not any(said.startswith("Below zero") for said in result.verdict.reasons)
+
+
+def test_no_play_is_named_where_it_changes_next_to_nothing():
+    """What sampling leaves without noise is largest where loads turn: 0.0001 % of the forces."""
+    robot = pteron.load("delta")
+    series = random_excitation(robot, limits=Limits(6.0, 80.0), period=4.0, seed=3)
+    run = simulate(robot, series.at(np.arange(8001) / 1000.0), ComputedTorque())
+    result = found(robot, Log("log.csv", run.time, run.joints, run.forces))
+    assert not result.fault_isolation.faults
+    assert result.verdict.grade == "trustworthy"
+
+
+def test_friction_below_zero_is_told_before_all_else():
+    """A joint that something pushes which no model has."""
+    robot, log, friction = clean("delta")
+    pushed = replace(friction, viscous=np.array([-0.3, 1.0, 1.0]) * friction.viscous)
+    log = noisy(log_of(robot, friction=pushed, **brisk(robot)), noise=1e-3)
+    first = found(robot, log).verdict.reasons[0]
+    assert first.startswith("Below zero beyond its interval, which no friction is: Fv1 = -")
+    assert "Fv2" not in first

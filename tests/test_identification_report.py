@@ -312,3 +312,20 @@ def test_pictures_show_what_they_are_given():
     ratios = np.array([5.0, np.inf, 0.0])
     axes = certainty_figure(["a", "b", "c"], ratios, ratios < 2.0, 2).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["c", "b", "a"]
+
+
+def test_marks_at_the_right_edge_of_a_picture_are_whole():
+    """Without noise errors span many decades, and a value known exactly is at the end."""
+    errors = errors_figure(np.array([1e-1, 1e-2]), np.array([30.0, 20.0]), np.array([1e-11, 1e-11]))
+    ratios = np.array([5.0, np.inf, 1e9])
+    certainty = certainty_figure(["a", "b", "c"], ratios, ratios < 2.0, 2)
+    for figure in (errors, certainty):
+        figure.canvas.draw()
+        axes = figure.axes[0]
+        page, inside = figure.bbox.extents, axes.bbox.extents
+        marks = [line for line in axes.lines if line.get_marker() in ("o", "s")]
+        assert marks
+        for mark in marks:
+            ends = mark.get_window_extent().extents
+            assert (ends[2] <= inside[2]) or not mark.get_clip_on()
+            assert ends[2] <= page[2]

@@ -14,7 +14,11 @@ from pteron.errors import ModelError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from pteron.identification.excitation import Excitation, Margins, RepeatedCycle
+    from pteron.identification.excitation import Excitation, Limits, Margins, RepeatedCycle
+    from pteron.manipulator import Manipulator
+
+_CLEARANCE = "joint_clearance"
+"""The limit of the joints' distance from their limits."""
 
 _MEASURES = {
     "type_i": "type-I measure",
@@ -39,6 +43,7 @@ def excite(
     type_i: float = 0.25,
     type_ii: float = 0.3,
     clearance: float = 0.005,
+    keep_off: float = 0.02,
     passive_clearance: float = 0.02,
     rate: float = 1000.0,
     contents: Literal["all", "joints", "poses"] = "all",
@@ -92,6 +97,7 @@ def excite(
     --type-i: Least type-I measure of every leg.
     --type-ii: Least type-II measure.
     --clearance: Of the joints from their limits, m or rad.
+    --keep-off: The same, share of each joint's range; the larger of the two is kept.
     --passive-clearance: Of passive joints and the platform's angles, share of half their range.
 
     File
@@ -149,6 +155,7 @@ def excite(
         type_i=type_i,
         type_ii=type_ii,
         joint_clearance=clearance,
+        joint_share=keep_off,
         passive_clearance=passive_clearance,
     )
     if out is None and not json:
@@ -187,7 +194,9 @@ def excite(
     more |= {"held_out": cycles and cycles.as_dict(), "slow": slow and slow.duration}
     data = {**found.as_dict(), **more, "files": [str(path) for path in files]}
     told: list[str | Table] = [
-        *(_quality(found), _margins(left)),
+        _quality(found),
+        _margins(left),
+        *_kept_off(machine, limits, left),
         f"From rest to rest in {led.duration:g} s: periodic from {led.start:g} to {led.end:g} s, "
         "lead-in before, lead-out behind.",
     ]
@@ -229,6 +238,24 @@ def _quality(found: Excitation) -> Table:
 
 def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+
+
+def _kept_off(machine: Manipulator, limits: Limits, left: dict[str, Margins]) -> list[str]:
+    """Return the distance that the joints keep from their limits, in a sentence, if they have any.
+
+    A least margin is what is left beyond what was asked for, which is not what a person looks for.
+    """
+    from pteron.identification.excitation.limits import joint_clearances
+
+    tightest = [one for margins in left.values() for one in margins if one.limit == _CLEARANCE]
+    if not tightest:
+        return []
+    least = min(tightest, key=lambda one: one.least)
+    asked = float(joint_clearances(limits, machine)[(least.leg or 1) - 1])
+    return [
+        f"Leg {least.leg} comes nearest to its joint's limits: {asked + least.least:.3g} "
+        f"{least.unit}, where {asked:.3g} was to be kept (--keep-off, --clearance)."
+    ]
 
 
 def _margins(left: dict[str, Margins]) -> Table:

@@ -91,7 +91,8 @@ def identify(
     --without TERMS: Leave out: coulomb,viscous,offset.
     --joints: Viscous friction in the passive joints.
     --stribeck SPEED,...|auto: Friction falls with this speed, m/s or rad/s.
-    --delay S|auto: How late forces are for positions, s; auto: find it.
+    --delay S|auto: How late forces are for positions, s; auto: find it. [default: 0, or the half
+        sample of forces that are held]
     --rotors: With the inertia of the motors.
     --payload: A payload too: logs with it and without, column payload 1 and 0.
     --shared: All legs share one set of inertial parameters.
@@ -153,9 +154,9 @@ def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
         ) from None
 
 
-def _delay(text: str | None) -> float | Literal["auto"]:
+def _delay(text: str | None) -> float | Literal["auto"] | None:
     if text in (None, "auto"):
-        return 0.0 if text is None else "auto"
+        return "auto" if text else None
     try:
         return float(str(text))
     except ValueError:

@@ -17,6 +17,7 @@ from pteron.identification.estimators import (
     weighted,
 )
 from pteron.identification.faults import delay_of, isolate_faults
+from pteron.identification.faults.fault import is_half, of_held_forces
 from pteron.identification.fitting import (
     METHODS,
     balanced,
@@ -34,7 +35,11 @@ from pteron.identification.logs import Log, LogFile
 from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations
-from pteron.identification.plausibility import plausibility_warnings, unphysical
+from pteron.identification.plausibility import (
+    friction_below_zero,
+    plausibility_warnings,
+    unphysical,
+)
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification
@@ -152,31 +157,37 @@ def identify(
         found = Unknowns(searched_speeds(model, observe, usual))
         model = model.falling(np.asarray(found.speeds))
     observations = observe(model)
-    with findings_told(whole):
-        if wanted.delay == "auto" or found.speeds is not None:
-            first, late = weighted(observations), wanted.delay == "auto"
-            begin = delay_of(model, first, fit, preprocessing) if late else float(wanted.delay)
-            model, observations, found, more = settled(
-                model, observe, replace(found, delay=begin), first.values, late=late
-            )
-            wanted = replace(wanted, delay=found.delay)
-            preprocessing = tuple(replace(how, delay=found.delay) for how in preprocessing)
-        estimate = estimated(estimator, model, fit, preprocessing, observations)
-        estimate = replace(estimate, covariance=estimate.covariance + more)
+    used, late, given = wanted, wanted.delay == "auto", wanted.delay
+    while True:
+        with findings_told(whole):
+            if late or found.speeds is not None:
+                first = weighted(observations)
+                begin = delay_of(model, first, fit, preprocessing) if late else float(given or 0)
+                model, observations, found, more = settled(
+                    model, observe, replace(found, delay=begin), first.values, late=late
+                )
+                used = replace(wanted, delay=found.delay)
+                preprocessing = tuple(replace(how, delay=found.delay) for how in preprocessing)
+            estimate = estimated(estimator, model, fit, preprocessing, observations)
+            estimate = replace(estimate, covariance=estimate.covariance + more)
 
-    # Judge by what was held out, which betrays columns that are not what they are called
-    modes = [None] * len(check) if others else [how.start for how in preprocessing]
-    held = [
-        judged(model, estimate.values, one, preprocessing_for(robot, one, wanted, start))
-        for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
-    ]
-    trusted = verdict_of(held, repeats=not others).grade == "trustworthy"
-    with findings_told(whole):
-        if not trusted or unphysical(model, observations, estimate):
-            check_columns(model, fit[0], preprocessing[0])
-        hidden = check_motion(model, estimate, preprocessing, fit[0])
-    report("Looking for faults", 0, 0)
-    faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
+        # Judge by what was held out, which betrays columns that are not what they are called
+        modes = [None] * len(check) if others else [how.start for how in preprocessing]
+        held = [
+            judged(model, estimate.values, one, preprocessing_for(robot, one, used, start))
+            for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
+        ]
+        trusted = verdict_of(held, repeats=not others).grade == "trustworthy"
+        with findings_told(whole):
+            if not trusted or unphysical(model, observations, estimate):
+                check_columns(model, fit[0], preprocessing[0])
+            hidden = check_motion(model, estimate, preprocessing, fit[0])
+        report("Looking for faults", 0, 0)
+        faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
+        if late or given is not None or not faults.held:
+            break
+        # Forces that are held are no fault, but they move values: fit again, with that taken out.
+        late = True
     verdict = verdict_of(held, faults, repeats=not others, limits=limits)
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how)
@@ -194,8 +205,10 @@ def identify(
         consistency, share, off, missing = _real_bodies(
             model, estimate, known, observations, drawn, bounds
         )
-    verdict = with_bodies(verdict, consistency, off)
+    pushed = friction_below_zero(model, observations, estimate)
+    verdict = with_bodies(replace(verdict, reasons=(*pushed, *verdict.reasons)), consistency, off)
     advice = plausibility_warnings(model, estimate, known, consistency, drawn)
+    step = 1.0 / max(how.rate for how in preprocessing)
     if hidden or essential.dropped:
         weak = dict.fromkeys((*hidden, *essential.dropped))
         advice[:0] = _more_motion(model, list(weak))
@@ -215,7 +228,7 @@ def identify(
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=(
             *_notes(model, estimate, _reflected(rotors)),
-            *_unknowns_notes(found, model),
+            *_unknowns_notes(found, model, held=given is None and is_half(found.delay, step)),
             *missing,
         ),
         rotors=rotors,
@@ -282,10 +295,15 @@ def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
     return advice
 
 
-def _unknowns_notes(found: Unknowns, model: Model) -> list[str]:
-    """Return notes on the delay and the speeds of Stribeck's friction that were found."""
+def _unknowns_notes(found: Unknowns, model: Model, *, held: bool) -> list[str]:
+    """Return notes on the delay and the speeds of Stribeck's friction that were found.
+
+    `held` says that the delay was taken out unasked, as that of forces that are held.
+    """
     notes = []
-    if found.delay_deviation:
+    if held:
+        notes.append(f"{of_held_forces(found.delay)}; that is taken out (--delay 0 leaves it in).")
+    elif found.delay_deviation:
         notes.append(
             f"The forces are {1e3 * found.delay:.3g} ms (+- {2e3 * found.delay_deviation:.1g}) "
             "late for the positions; that is taken out."

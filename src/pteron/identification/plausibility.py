@@ -61,6 +61,12 @@ slightest is certain."""
 _PUSHED = 0.05
 """Share of the forces from which friction that pushes counts, likewise."""
 
+_FELT = 1e-4
+"""Share of the forces from which friction below zero is told: without noise rounding has a sign."""
+
+_FRICTION = ("coulomb", "viscous", "passive")
+"""Terms of friction, which brakes."""
+
 _POSITIVE = ("coulomb", "viscous", "passive", "rotor")
 """Terms that no machine has below zero."""
 
@@ -123,6 +129,26 @@ def plausibility_warnings(
                 "at geometry, working mode and units: other ones can explain forces as well."
             )
     return found
+
+
+def friction_below_zero(model: Model, observations: Observations, fit: Estimate) -> tuple[str, ...]:
+    """Return a sentence on friction that is below zero by more than its interval; none else."""
+    high = fit.intervals()[1]
+    effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
+    size = np.sqrt((observations.forces**2).mean(axis=0))
+    felt = (effect > _FELT * size[:, None]).any(axis=0)
+    chosen = np.flatnonzero(np.isin(model.kinds, _FRICTION) & (high < 0.0) & felt)
+    if not len(chosen):
+        return ()
+    told = ", ".join(
+        f"{fit.names[k]} = {fit.values[k]:.2g} (+- {high[k] - fit.values[k]:.1g}) {fit.units[k]}"
+        for k in chosen
+    )
+    return (
+        f"Below zero beyond its interval, which no friction is: {told}. Where there is none, one "
+        "in 40 is so by chance; else something acts that the model has not, and intervals are too "
+        "short.",
+    )
 
 
 def common_factor(model: Model, estimate: Estimate, known: Array, drawn: Array) -> float:

@@ -61,7 +61,8 @@ class Identification:
     rotors : tuple of (float, float), optional
         Inertia and ratio of each joint's motor, where they are known: no part of the real bodies.
     unknowns : Unknowns
-        The delay, and the speeds with which friction falls, where they were asked for.
+        The delay, and the speeds with which friction falls, where they were asked for; the delay
+        also where it is that of forces held from sample to sample.
     """
 
     robot: Manipulator
@@ -113,8 +114,8 @@ class Identification:
 
     @property
     def understated(self) -> bool:
-        """Whether a fault that matters shows, for which the values' stated errors do not allow."""
-        return self.fault_isolation.matters
+        """Whether a fault shows for which the values' stated errors do not allow."""
+        return self.fault_isolation.understates
 
     @cached_property
     def machine(self) -> Manipulator | None:

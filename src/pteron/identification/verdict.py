@@ -207,6 +207,7 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
     found = Opinion(reasons=[one.message for one in shown.faults])
     if shown.matters:
         found.grade = "usable with care"
+    if shown.understates:
         found.reasons.append("The stated errors of the values do not allow for that.")
     if not shown.tried:
         found.grade = "usable with care"

@@ -118,7 +118,9 @@ def certainty_figure(
         color = WARNING if weak[k] else REACH if k < inertial else LEG_COLORS[1]
         axes.plot([_CERTAIN, ratio], [y, y], color=color, linewidth=1.2, alpha=0.6)
         marker = "o" if k < inertial else "s"
-        spot(axes, ratio, y, color, PAPER, 5.5, marker=marker, markeredgewidth=0.6)
+        # The largest values stand on the right edge, whole.
+        whole = {"marker": marker, "markeredgewidth": 0.6, "clip_on": False}
+        spot(axes, ratio, y, color, PAPER, 5.5, **whole)
     axes.axvline(_CERTAIN, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
     axes.set_ylim(-0.8, p - 0.2)
     log_scale(axes, 0.1, high)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from pteron.errors import DataError
+from pteron.identification.signals.states import home
 from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.workspace.margins import joint_distances
 
 UNITS = {
     "type_i": "",
@@ -32,6 +36,7 @@ _SHARES: dict[str, tuple[Callable[[float], bool], str]] = {
     "type_i": (lambda value: 0.0 < value < 1.0, "between 0 and 1"),
     "type_ii": (lambda value: 0.0 < value < 1.0, "between 0 and 1"),
     "joint_clearance": (lambda value: value >= 0.0, "0 or more"),
+    "joint_share": (lambda value: 0.0 <= value < 0.5, "at least 0 and below 0.5"),
     "passive_clearance": (lambda value: 0.0 <= value < 1.0, "at least 0 and below 1"),
 }
 """Whether a number can be each of the other limits, and what is expected."""
@@ -62,6 +67,9 @@ class Limits:
     joint_clearance : float
         Least distance of the actuated joints from their limits, m or rad; without effect on a joint
         that has none.
+    joint_share : float
+        The same as a share of each joint's range, in [0, 0.5); the larger of the two counts, but no
+        more of this one than half of what the home pose has.
     passive_clearance : float
         Least distance of the passive joints and of the pose's angles from their limits, over half
         their ranges, in [0, 1).
@@ -85,6 +93,7 @@ class Limits:
     type_ii: float = 0.3
     joint_clearance: float = 0.005
     passive_clearance: float = 0.02
+    joint_share: float = 0.0
 
     @classmethod
     def of(cls, robot: Manipulator, **given: Any) -> Limits:
@@ -136,6 +145,20 @@ def joint_sizes(robot: Manipulator) -> Array:
     """Return half the range (n,) of each joint, m or rad; 1 where it has no limits."""
     ranges = [leg.limits or (-1.0, 1.0) for leg in robot.legs]
     return np.array([0.5 * (high - low) for low, high in ranges])
+
+
+def joint_clearances(limits: Limits, robot: Manipulator) -> Array:
+    """Return how far (n,) the joints are to keep from their limits, m or rad."""
+    # A share is for safety, and must not refuse a machine whose home pose is near a limit.
+    most = 0.5 * np.maximum(_home_distances(robot), 0.0)
+    share = np.minimum(2.0 * limits.joint_share * joint_sizes(robot), most)
+    return np.asarray(np.maximum(limits.joint_clearance, share))
+
+
+@lru_cache(maxsize=64)
+def _home_distances(robot: Manipulator) -> Array:
+    """Return the distance (n,) of the joints from their nearer limits in the home pose, or inf."""
+    return joint_distances(robot, inverse_kinematics(robot, np.array(home(robot))))
 
 
 def unit_of(robot: Manipulator, name: str, leg: int) -> str:

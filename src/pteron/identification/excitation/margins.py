@@ -14,6 +14,7 @@ from pteron.errors import ModelError
 from pteron.identification.excitation.limits import (
     PER_JOINT,
     Limits,
+    joint_clearances,
     joint_sizes,
     per_joint,
     unit_of,
@@ -170,7 +171,8 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
         type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
         found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
     if any(leg.limits for leg in robot.legs):
-        found["joint_clearance"] = joint_distances(robot, state.joints) - limits.joint_clearance
+        clearances = joint_clearances(limits, robot)
+        found["joint_clearance"] = joint_distances(robot, state.joints) - clearances
     if _limits_passive(robot):
         passive = unchecked(robot, "passive_room", state.pose)[0]
         found["passive_clearance"] = passive - limits.passive_clearance

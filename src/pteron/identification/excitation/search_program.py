@@ -18,7 +18,12 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.equations.drives import Drives, drives_of
 from pteron.identification.excitation.fourier import Space
-from pteron.identification.excitation.limits import Limits, joint_sizes, per_joint
+from pteron.identification.excitation.limits import (
+    Limits,
+    joint_clearances,
+    joint_sizes,
+    per_joint,
+)
 from pteron.identification.excitation.random_motions import sizes
 from pteron.identification.excitation.sequential import NonlinearProgram, sequential_minimum
 from pteron.identification.signals.states import home, home_mode
@@ -199,7 +204,7 @@ def _path(
         rates = program(robot, "joint_rates").function(pose, velocity)[0].T
         seconds = program(robot, "joint_accelerations").function(*state)[0].T
     ranges = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs])
-    clearance = limits.joint_clearance + _BACK_OFF * joint_sizes(robot)
+    clearance = joint_clearances(limits, robot) + _BACK_OFF * joint_sizes(robot)
     found["joint_clearance"] = joints, ranges[:, 0] + clearance, ranges[:, 1] - clearance
     passive = program(robot, "passive_room").function(pose)[0].T
     found["passive_clearance"] = passive, limits.passive_clearance + _BACK_OFF, np.inf

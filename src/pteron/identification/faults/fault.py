@@ -35,17 +35,21 @@ _SHIFT = 1.0
 _CYCLE = 1.0
 """Error in a reference cycle's forces, percent, above which a fault matters."""
 
-_HALF_STEP = 0.6
-"""Steps of the log up to which a delay is one of sampling: a force that is held from one sample to
-the next belongs to the instant between them."""
+_HALF_STEP = (0.4, 0.6)
+"""Steps of the log between which a delay is half a step, as where forces are held: one that is held
+from one sample to the next belongs to the instant between them. What is less is of sampling too."""
 
 _CYCLE_OF_SAMPLING = 3.0
 """Percent of a reference cycle's forces above which a delay of sampling matters all the same."""
 
+_SAMPLING = (
+    "The {late} are half a sample ({size_ms:.3g} ms) late for the {early}, as where "
+    "forces are held from sample to sample"
+)
+
 _SENTENCES = {
     "delay": "The {late} are {size_ms:.3g} ms (+- {error_ms:.1g}) late for the {early}",
-    "sampling": "The {late} are half a sample ({size_ms:.3g} ms) late for the {early}, as where "
-    "forces are held from sample to sample",
+    "sampling": _SAMPLING,
     "scale": "{label} is {percent:.2g} % (+- {error:.1g}) too {more} beside the others",
     "gravity": "Gravity is {tilt:.2g} degrees (+- {tilt_error:.1g}) off the direction in the model",
     "gain": "All forces are {percent:.3g} % (+- {error:.1g}) too {more} for what is known",
@@ -79,6 +83,17 @@ _REMEDY: dict[FaultName, str] = {
     "play": "take the play out of that drive, or keep to motions whose load does not change "
     "direction; faults named after it may be its own",
 }
+
+
+def is_half(delay: float, step: float) -> bool:
+    """Say whether a delay, s, of forces or of positions (below 0) is half a step of the log, s."""
+    return _HALF_STEP[0] * step <= abs(delay) <= _HALF_STEP[1] * step
+
+
+def of_held_forces(delay: float) -> str:
+    """Return the words, without a full stop, for a delay, s, of forces that are held."""
+    late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
+    return _SAMPLING.format(late=late, early=early, size_ms=1e3 * abs(delay))
 
 
 @dataclass(frozen=True)
@@ -120,11 +135,16 @@ class IsolatedFault:
     @property
     def of_sampling(self) -> bool:
         """Whether it is the half step by which forces that are held differ from positions."""
-        return self.fault == "delay" and abs(self.sizes[0]) <= _HALF_STEP * self.step
+        return self.fault == "delay" and abs(self.sizes[0]) <= _HALF_STEP[1] * self.step
+
+    @property
+    def understates(self) -> bool:
+        """Whether a value is off by more than its stated error, which does not allow for it."""
+        return self.matters or self.shift > _SHIFT
 
     @property
     def matters(self) -> bool:
-        """Whether values or forces are off by more than their stated errors allow for."""
+        """Whether that lowers the grade: a delay of sampling hardly changes a machine's forces."""
         if self.of_sampling:
             return bool((self.cycle > _CYCLE_OF_SAMPLING).any())
         # Play is no error of a value: what it makes is in the residuals, wherever it is.

@@ -13,7 +13,7 @@ from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
-from pteron.identification.faults.fault import FaultName, IsolatedFault
+from pteron.identification.faults.fault import FaultName, IsolatedFault, is_half
 from pteron.identification.faults.play import Record, knocks
 from pteron.identification.faults.search import FoundFault, cannot_be_told, searched
 from pteron.identification.logs import Log
@@ -75,6 +75,9 @@ class FaultIsolation:
     hidden : tuple of {"gain", "clock", "scale"}
         Faults that these logs cannot tell by the rank of their equations: a factor that all forces
         have, a clock at another rate, one force out of scale beside the others.
+    held : bool
+        Whether forces are seen to be half a sample early or late, as where they are held from
+        sample to sample: named or not, it moves values of a log without noise.
     """
 
     tried: tuple[str, ...]
@@ -83,6 +86,7 @@ class FaultIsolation:
     spoiled: Array
     why_not: str = ""
     hidden: tuple[FaultName, ...] = ()
+    held: bool = False
 
     suspicions = former_attribute("suspicions", "faults")
 
@@ -93,8 +97,13 @@ class FaultIsolation:
 
     @property
     def matters(self) -> bool:
-        """Whether a fault shows for which the values' stated errors do not allow."""
+        """Whether a fault shows that lowers the grade."""
         return any(one.matters for one in self.faults)
+
+    @property
+    def understates(self) -> bool:
+        """Whether a fault shows for which the values' stated errors do not allow."""
+        return any(one.understates for one in self.faults)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -213,7 +222,7 @@ def _isolated(
 
     # Play, which no column has
     play = _play(parts, estimate.values, step)
-    if play is not None:
+    if play is not None and not (play.cycle < _NAMED).all():
         faults.insert(0, play)
         spoiled = np.hypot(spoiled, play.cycle)
 
@@ -235,7 +244,8 @@ def _isolated(
         left_open.insert(0, "gain")
     shown = {one.fault for one in faults}
     hidden = tuple(fault for fault in left_open if fault not in shown)
-    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden)
+    half = any(one.family is DELAY and is_half(float(one.sizes[0]), step) for one in found)
+    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, held=half)
 
 
 def _play(parts: Sequence[_Part], values: Array, step: float) -> IsolatedFault | None:

@@ -99,9 +99,11 @@ class Processing:
     slow : float
         Speed, as a share of each joint's root mean square, below which the joint's equation is
         not used: dry friction holds a joint at rest with any force, and turns in no time.
-    delay : float or "auto"
+    delay : float or "auto", optional
         By how much the log's forces are late for its positions, s: they belong to the motion of so
-        much before; negative where positions are late. "auto" lets `identify` find it.
+        much before; negative where positions are late. "auto" lets `identify` find it. By default
+        it finds and takes out the half sample by which forces that are held from sample to sample
+        are early or late, where the residuals show that, and else takes out none.
     """
 
     derivatives: Derivatives | None = None
@@ -109,7 +111,7 @@ class Processing:
     band: float | None = None
     period: float | None = None
     slow: float = 0.02
-    delay: float | Literal["auto"] = 0.0
+    delay: float | Literal["auto"] | None = None
 
     def __post_init__(self) -> None:
         if self.derivatives is not None:
@@ -120,7 +122,7 @@ class Processing:
                 raise DataError(f"{name}: {value} given, a number above 0 expected")
         if not 0.0 <= self.slow < 1.0:
             raise DataError(f"slow: {self.slow} given, a share from 0 to below 1 expected")
-        if self.delay != "auto" and not abs(float(self.delay)) <= LATEST:
+        if self.delay not in (None, "auto") and not abs(float(self.delay)) <= LATEST:
             raise DataError(f'delay: {self.delay} s given, at most {LATEST:g} s or "auto" expected')
 
 
@@ -280,7 +282,7 @@ def preprocessing_of(
         slow=wanted.slow * usual,
         usual=usual,
         stroke=_stroke(rates, rate),
-        delay=0.0 if wanted.delay == "auto" else wanted.delay,
+        delay=0.0 if wanted.delay in (None, "auto") else float(wanted.delay),
     )
 
 
