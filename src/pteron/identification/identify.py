@@ -17,7 +17,7 @@ from pteron.identification.estimators import (
     weighted,
 )
 from pteron.identification.faults import delay_of, isolate_faults
-from pteron.identification.faults.fault import is_half, of_held_forces
+from pteron.identification.faults.fault import of_held_forces
 from pteron.identification.fitting import (
     METHODS,
     balanced,
@@ -208,7 +208,6 @@ def identify(
     pushed = friction_below_zero(model, observations, estimate)
     verdict = with_bodies(replace(verdict, reasons=(*pushed, *verdict.reasons)), consistency, off)
     advice = plausibility_warnings(model, estimate, known, consistency, drawn)
-    step = 1.0 / max(how.rate for how in preprocessing)
     if hidden or essential.dropped:
         weak = dict.fromkeys((*hidden, *essential.dropped))
         advice[:0] = _more_motion(model, list(weak))
@@ -228,7 +227,7 @@ def identify(
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=(
             *_notes(model, estimate, _reflected(rotors)),
-            *_unknowns_notes(found, model, held=given is None and is_half(found.delay, step)),
+            *_unknowns_notes(found, model, held=late and given is None),
             *missing,
         ),
         rotors=rotors,

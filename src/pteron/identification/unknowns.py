@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
-from pteron.identification.extended_model import extended
-from pteron.identification.model import Model, diagonal
+from pteron.identification.model import Model, diagonal, extended
 from pteron.identification.observation import LinearModel, Observations, scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST

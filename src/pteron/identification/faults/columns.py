@@ -14,10 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from pteron.equations.friction import passive_joints
-from pteron.identification.extended_model import ExtendedModel
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
-from pteron.identification.model import Model, diagonal
+from pteron.identification.model import ExtendedModel, Model, diagonal
 from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
