@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from logs_of_motions import log_of, machine, truth
+from mechanisms import CLIENTS
 from typer.testing import CliRunner
 
 import pteron
@@ -70,6 +71,7 @@ def test_what_the_drives_do_not_tell_is_said_with_the_formula(tmp_path):
         identify(bare, log)
 
 
+@CLIENTS
 def test_all_that_is_undeclared_is_told_at_once_as_lines_to_paste(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     robot = driven()

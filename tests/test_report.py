@@ -65,7 +65,7 @@ MACHINES = {
     "shaft": with_a_tool(CATALOG["delta-4"]),
     "planar": CATALOG["3-rrr"],
 }
-EVERY = in_turn(MACHINES, ("quadrupteron", "hostile", "planar"), share=1)
+EVERY = in_turn(MACHINES, ("quadrupteron", "hostile"), share=1)
 
 VOID = {"meta", "input", "br", "hr", "img", "link"}
 
@@ -406,6 +406,7 @@ def test_a_shafts_gear_does_not_count_in_the_condition_number():
     assert found[2] == pytest.approx(found[3])
 
 
+@CLIENTS
 def test_what_turns_a_platform_does_not_carry_it():
     assert "three legs of crank and rod carry a platform that translates" in read("shaft").text
     assert "(3T1R, Schoenflies motion); a shaft turns it." in read("shaft").text

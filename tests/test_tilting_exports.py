@@ -30,6 +30,7 @@ def drawn(motion, count=3):
     return driven(robot), (poses[far][:count], *(rate[far][:count] for rate in rates))
 
 
+@CLIENTS
 @pytest.mark.parametrize("motion", gated(tilting.LEGS, ["2R"]))
 def test_c_of_a_tilting_machine_returns_what_the_library_does(tmp_path, motion):
     robot, states = drawn(motion)

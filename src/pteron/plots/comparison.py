@@ -97,11 +97,12 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
     for i, color in zip(range(n), LEG_COLORS, strict=False):
         y = n - 1 - i
         least = max(float(floor[i]), low)
-        axes.plot([least, max(without_friction[i], low)], [y, y], color=GRID, linewidth=3.0)
-        axes.plot([least, max(errors[i], low)], [y, y], color=color, linewidth=3.0)
+        own, bare = max(errors[i], low), max(without_friction[i], low)
+        axes.plot([least, bare], [y, y], color=GRID, linewidth=3.0)
+        axes.plot([least, own], [y, y], color=color, linewidth=3.0)
         # Over many decades, as without noise, the largest stand on the right edge: whole.
-        spot(axes, without_friction[i], y, PAPER, color, 7.0, markeredgewidth=1.6, clip_on=False)
-        spot(axes, errors[i], y, color, PAPER, 8.0, clip_on=False)
+        spot(axes, bare, y, PAPER, color, 7.0, markeredgewidth=1.6, clip_on=False)
+        spot(axes, own, y, color, PAPER, 8.0, clip_on=False)
         axes.plot([least], [y], marker="|", markersize=15.0, color=INK, markeredgewidth=1.8)
     log_scale(axes, low, high)
     axes.set_ylim(-0.6, n - 0.4)
