@@ -16,8 +16,7 @@ import pteron
 from pteron import Manipulator, OutputError
 from pteron.legs import KINDS
 from pteron.manipulator import with_dimensions
-from pteron.manipulator.explained import explained
-from pteron.manipulator.explained import pointing
+from pteron.manipulator.explained import explained, pointing
 from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.saving import document_of
 from pteron.manipulator.tables import PlatformTable
