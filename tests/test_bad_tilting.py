@@ -95,6 +95,7 @@ def test_equal_plates_are_told_to_move_with_their_rams_held(tmp_path):
     assert words in " ".join(done.stdout.split())
 
 
+@CLIENTS
 def test_a_screws_length_is_that_of_a_ram_between_universal_joints(tmp_path):
     """Against the chain of its joints' rotations, solved by Powell's method."""
     robot, lead = TILTED["stewart"], 0.005

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from logs_of_motions import machine
+from mechanisms import CLIENTS
 from test_payload import (
     EACH,
     LOAD,
@@ -75,6 +76,7 @@ def test_standard_deviations_cover_the_error(name):
     assert np.square(relative).mean() < 1.2 * np.square(start).mean()
 
 
+@CLIENTS
 def test_the_gains_make_the_log_one_of_forces():
     log = current_log("quadrupteron")
     robot, base = machine("quadrupteron"), base_of("quadrupteron")

@@ -50,6 +50,7 @@ def _drawn_quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 QUICK = pytest.mark.usefixtures("_drawn_quickly")
 
 
+@CLIENTS
 def test_the_files_agree_with_each_other_and_with_the_terminal():
     robot = "tripteron"
     write_log(log(robot), "fit.csv")

@@ -280,6 +280,7 @@ def found_of(name):
     return nearest_singularities(CATALOG[name], AWAY[name], most=2000)
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", gated(AWAY, ["five-bar"]))
 @pytest.mark.parametrize("scale", gated([1e-3, 1e3], [1e-3]))
 def test_distances_do_not_depend_on_the_unit_of_length(name, scale):

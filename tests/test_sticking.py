@@ -5,6 +5,7 @@ from dataclasses import replace
 import mechanisms
 import numpy as np
 import pytest
+from mechanisms import CLIENTS
 
 import pteron
 from pteron.controllers import ComputedTorque
@@ -258,6 +259,7 @@ def test_mujocos_friction_comes_to_it_as_its_step_and_softness_shrink(name, shar
     assert (np.abs(found.joint_rates[-1, ~stuck]) > 0.01).all()
 
 
+@CLIENTS
 def test_a_controllers_loop_is_the_same_in_c_in_numpy_and_called_back(monkeypatch):
     robot = driven(pteron.load("quadrupteron"), Drive(coulomb=3.0, viscous=9.0, max_force=60))
     motion = pick_and_place(robot, home_pose(robot), least=0.1)

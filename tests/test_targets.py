@@ -365,6 +365,7 @@ def test_the_cheapest_base_parameters_give_the_same_forces(name):
     assert relative_error(doubled(*motion), 2 * expected) < 1e-12
 
 
+@CLIENTS
 @pytest.mark.parametrize("size", gated([1e-3, 1e3], [1e-3]))
 def test_the_cheapest_base_parameters_know_no_unit_of_length(size):
     machine = random_machine(11, "PPP")
