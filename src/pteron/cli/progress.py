@@ -66,7 +66,7 @@ def progress_bar(task: str) -> Iterator[Callable[[float], None]]:
 
 
 class TimeLeft:
-    """What time work needs yet, by how fast it went of late.
+    """The time that work still needs, by its recent rate.
 
     Work that goes on where an earlier run was ended begins with what that had done, at no rate.
     While nothing is done the time grows, since the rate is that up to now.

@@ -28,7 +28,7 @@ _KINDS = {
 
 
 class _Changed(NamedTuple):
-    """What trials change: in a heading, in the column's head with {} for the unit, the factor."""
+    """A quantity that trials change: in a heading, in a column's head ({} for the unit), its factor."""
 
     many: str
     one: str

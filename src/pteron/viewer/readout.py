@@ -23,7 +23,7 @@ _COLORS: dict[Level, tuple[str, str]] = {
 """Colours of background and text, of enough contrast for every eye; words say the same."""
 
 _WORDS: dict[Level, str] = {"far": "far", "near": "near", "close": "very near"}
-"""What people read of a margin."""
+"""The words for a margin."""
 
 PLACES = 2
 """Decimal places of a force."""

@@ -1,4 +1,4 @@
-"""What configurations of firmware share: number formats, comments and refusals."""
+"""Common parts of firmware configurations: number formats, comments and refusals."""
 
 from __future__ import annotations
 

@@ -33,11 +33,11 @@ _FEWEST = 4
 
 
 class Record(NamedTuple):
-    """What a log's part has of each joint, (T, n), at even times."""
+    """Load, residual and motion of each joint in a part of a log, (T, n), at even times."""
 
     time: Array
     load: Array
-    """What its transmission passes on, by the fit."""
+    """The force that its transmission passes on, by the fit."""
     residual: Array
     moving: NDArray[np.bool_]
     """Where it moves: as it turns round, dry friction alone makes residuals."""

@@ -83,7 +83,7 @@ class Machines:
 
     @property
     def numbers(self) -> dict[str, Array]:
-        """What `pteron.kernels.loops.Loop.run` takes of them."""
+        """Their numbers as `pteron.kernels.loops.Loop.run` takes them."""
         found = {"plant_parameters": self.loaded, "plant_drives": self.drives}
         if self.geometry is not None:
             found |= dict.fromkeys(("plant_geometry", "sensed_geometry"), self.geometry)
