@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.design.choosing.cycles import Places
 from pteron.design.choosing.margins import DENSE, margins_of
 from pteron.design.choosing.proofs import is_clear, proofs_of, told
 from pteron.design.choosing.rating import Case, Rating
-from pteron.design.choosing.samples import Places, sample_poses
+from pteron.design.choosing.samples import sample_poses
 from pteron.design.choosing.search import front
 from pteron.design.choosing.tool import elasticity, greatest_errors, joint_errors, tolerances
 from pteron.errors import PteronError

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pteron.design.choosing.cycles import Places, near_places
 from pteron.design.choosing.drives import in_duty
 from pteron.design.choosing.rating import Case
 from pteron.design.choosing.room import tool_places
-from pteron.design.choosing.samples import Places, about_the_worst, near_places
+from pteron.design.choosing.samples import about_the_worst
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
 from pteron.kernels import Array

@@ -8,17 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
+from pteron.design.choosing.cycles import Places, cycles_of
 from pteron.design.choosing.drives import JointLoads, Option, Options
 from pteron.design.choosing.job import OBJECTIVES, Job
 from pteron.design.choosing.kinds import Kind, slides
 from pteron.design.choosing.room import Room
-from pteron.design.choosing.samples import (
-    Places,
-    about_the_worst,
-    cycles_of,
-    half_sides,
-    sample_poses,
-)
+from pteron.design.choosing.samples import about_the_worst, half_sides, sample_poses
 from pteron.design.choosing.tool import (
     compliance_with,
     compliances,
