@@ -260,6 +260,35 @@ def test_mujocos_friction_comes_to_it_as_its_step_and_softness_shrink(name, shar
 
 
 @CLIENTS
+@pytest.mark.parametrize(
+    "drive",
+    [
+        Drive(coulomb=3.0, viscous=9.0, rotor_inertia=0.1),
+        Drive(coulomb=3.0, rotor_inertia=0.1, elastic=pteron.legs.Elastic(3e4, 5.0)),
+    ],
+    ids=["rigid", "elastic"],
+)
+def test_a_state_goes_on_alone_as_beside_others_that_stick_and_in_numpy(drive, monkeypatch):
+    robot = driven(pteron.load("quadrupteron"), drive)
+    home, rng = home_pose(robot), np.random.default_rng(3)
+    pose = home + 0.01 * rng.normal(size=(21, 4))
+    velocity = 0.2 * rng.normal(size=pose.shape) * (rng.random((21, 1)) < 0.6)
+    holding = pteron.inverse_dynamics(robot, pose, 0.0 * pose, 0.0 * pose)
+    forces = holding + 4.0 * rng.normal(size=holding.shape)
+    given = pose, velocity, forces
+    in_numpy = advance(robot, *given, 1e-4, 30)
+    monkeypatch.delenv("PTERON_KERNELS")
+    beside = advance(robot, *given, 1e-4, 30)
+    alone = [advance(robot, *(part[k] for part in given), 1e-4, 30) for k in range(21)]
+    rests = ~beside[1].any(axis=1)
+    if drive.elastic is None:
+        assert 0 < rests.sum() < 21
+    for part, values in enumerate(beside):
+        np.testing.assert_array_equal(values, in_numpy[part])
+        np.testing.assert_array_equal(values, [one[part] for one in alone])
+
+
+@CLIENTS
 def test_a_controllers_loop_is_the_same_in_c_in_numpy_and_called_back(monkeypatch):
     robot = driven(pteron.load("quadrupteron"), Drive(coulomb=3.0, viscous=9.0, max_force=60))
     motion = pick_and_place(robot, home_pose(robot), least=0.1)

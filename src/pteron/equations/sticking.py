@@ -38,6 +38,9 @@ from pteron.equations.transmissions import (
 )
 from pteron.equations.virtual_work import generalized_forces
 
+STUCK = "stuck_"
+"""Before the name of what joints that stick change."""
+
 
 class Sides(NamedTuple):
     """The joints that slide, and how fast those that stick come to rest."""
@@ -88,7 +91,10 @@ def moved(
     dict
         `acceleration` x'' (m, 1); `rates` (n, 1) of what friction acts on, joints or motors, with
         their `growth`; `friction`, and the `breakaway` that it cannot exceed; `motor_growth`,
-        `change` and `yield`, the rates of `motor_rate`, `current` and `bristle`.
+        `change` and `yield`, the rates of `motor_rate`, `current` and `bristle`. These are as if
+        joints that stick had no friction, which is all where none does; with `stuck_` before their
+        names, `acceleration`, `growth`, `friction` and `motor_growth` are those with the friction
+        that holds them.
     """
     state = machine.state(pose, velocity)
     rows = jacobian(state)
@@ -119,40 +125,43 @@ def moved(
         given.append(motor_force(*numbers, force, motor) - rubs)
         bent = motors.motor[i] - coordinates[i], motors.motor_rate[i] - joint_rates[i]
         passed.append(transmitted(*numbers, *bent) if kind.elastic[i] else ca.SX(0))
-    pull = ca.vertcat(*given) - drives.viscous * rates - drives.offset
+    friction = breakaway = ca.SX.zeros(n)
+    if sides is not None:
+        breakaway = most * ca.SX([float(not one) for one in kind.lugre])
+        friction = -sides.side * breakaway
+    pull = ca.vertcat(*given) - drives.viscous * rates - drives.offset + friction
     inertia = rigid * drives.inertia
     load = rigid * (pull - drives.inertia * drift) + ca.vertcat(*passed)
     load = ca.mtimes(rows.T, load) + applied(machine, state, wrench)
     load -= generalized_forces(machine, state, parameters)
     mass = mass_matrix(machine, pose, parameters)
     mass += ca.mtimes(rows.T, ca.mtimes(ca.diag(inertia), rows))
-    breakaway = most * ca.SX([float(not one) for one in kind.lugre])
     lower, pivots = factors(mass)
-    free = forward(lower, load)
-    motors_alone = [
-        (pull[i] - passed[i]) / drives.inertia[i] if kind.elastic[i] else ca.SX(0) for i in range(n)
-    ]
-    if sides is None:
-        friction = breakaway = ca.SX.zeros(n)
-        acceleration = backward(lower, free / pivots)
-        growth = rigid * (ca.mtimes(rows, acceleration) + drift) + ca.vertcat(*motors_alone)
-    else:
-        # What friction acts on: joints, which share the machine's mass, and motors by themselves.
-        reach = forward(lower, ca.mtimes(ca.diag(rigid), rows).T)
-        scaled = reach / ca.repmat(pivots, 1, n)
-        own = [1 / drives.inertia[i] if kind.elastic[i] else ca.SX(0) for i in range(n)]
-        mobility = ca.mtimes(reach.T, scaled) + ca.diag(ca.vertcat(*own))
-        alone = ca.mtimes(scaled.T, free) + rigid * drift + ca.vertcat(*motors_alone)
-        # Those that stick have the friction that their rest asks for, W tau = q'' - q''_alone.
-        sliding = -sides.side * breakaway
-        sticks = 1 - sides.side * sides.side
-        asked = sides.hold - sides.brake * rates - alone - ca.mtimes(mobility, sliding)
-        matrix = mobility * ca.mtimes(sticks, sticks.T) + ca.diag(1 - sticks)
-        friction = sliding + solve_positive_definite(matrix, sticks * asked)
-        acceleration = backward(lower, (free + ca.mtimes(reach, friction)) / pivots)
-        growth = alone + ca.mtimes(mobility, friction)
+    acceleration = backward(lower, forward(lower, load) / pivots)
+    growth = rigid * (ca.mtimes(rows, acceleration) + drift) + ca.vertcat(
+        *(
+            (pull[i] - passed[i]) / drives.inertia[i] if kind.elastic[i] else ca.SX(0)
+            for i in range(n)
+        )
+    )
     found = {"acceleration": acceleration, "rates": rates, "growth": growth}
     found |= {"friction": friction, "breakaway": breakaway}
     more = {"motor_growth": bends * growth, "change": ca.vertcat(*change)}
     more["yield"] = ca.vertcat(*yields)
-    return found | {name: more[name] for _, name in kind.more if name in more}
+    found |= {name: more[name] for _, name in kind.more if name in more}
+    if sides is None:
+        return found
+    # What friction acts on: joints, which share the machine's mass, and motors by themselves.
+    reach = forward(lower, ca.mtimes(ca.diag(rigid), rows).T)
+    scaled = reach / ca.repmat(pivots, 1, n)
+    own = [1 / drives.inertia[i] if kind.elastic[i] else ca.SX(0) for i in range(n)]
+    mobility = ca.mtimes(reach.T, scaled) + ca.diag(ca.vertcat(*own))
+    # Those that stick have the friction that their rest asks for, W tau = q'' - q''_alone.
+    sticks = 1 - sides.side * sides.side
+    asked = sides.hold - sides.brake * rates - growth
+    matrix = mobility * ca.mtimes(sticks, sticks.T) + ca.diag(1 - sticks)
+    holding = solve_positive_definite(matrix, sticks * asked)
+    growth += ca.mtimes(mobility, holding)
+    found["stuck_acceleration"] = acceleration + backward(lower, ca.mtimes(scaled, holding))
+    found |= {"stuck_growth": growth, "stuck_friction": friction + holding}
+    return found | ({"stuck_motor_growth": bends * growth} if any(kind.elastic) else {})

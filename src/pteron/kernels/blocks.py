@@ -21,11 +21,15 @@ class Block:
     """The statements of a program's C for one lane k; `loop.c.j2` puts functions around them.
 
     Its rows are the elements of its inputs: `in` of those of a state, `numbers` of those that are
-    the machine's own, of which `own` is computed once.
+    the machine's own, of which `own` is computed once. An output whose name begins with `later`
+    stands for that without it in lanes that do not `slide`. Where the block is `split` they come in
+    a second part, which reads rows that the first has `kept`; else all is one.
     """
 
     name: str
     program: Program
+    later: str | None = None
+    split: bool = False
 
     @cached_property
     def varying(self) -> tuple[Port, ...]:
@@ -45,7 +49,7 @@ class Block:
     @cached_property
     def out(self) -> dict[str, int]:
         """The first row of each output."""
-        return _starts(self.program.outputs)
+        return _starts([port for port in self.program.outputs if not self._is_late(port)])
 
     @cached_property
     def sizes(self) -> dict[str, int]:
@@ -54,7 +58,8 @@ class Block:
             "in": max(1, sum(port.size for port in self.varying)),
             "numbers": max(1, sum(port.size for port in self.fixed)),
             "own": max(1, len(self._own)),
-            "out": sum(port.size for port in self.program.outputs),
+            "kept": max(1, len(self._kept)),
+            "out": sum(port.size for port in self.program.outputs if not self._is_late(port)),
         }
 
     @cached_property
@@ -69,10 +74,38 @@ class Block:
         graph, names = self._graph, self._names()
         for k, row in self._own.items():
             names[k] = f"own[{row}][k]"
-        rest = [k for k in graph.operations() if k not in self._shared]
+        late = self._late if self.split else frozenset[int]()
+        rest = [k for k in graph.operations() if k not in self._shared and k not in late]
         lines = self._lines(rest, names, sincos)
-        places = [k for part in graph.outputs for k in part]
-        return [*lines, *(f"out[{row}][k] = {names[k]};" for row, k in enumerate(places))]
+        lines += (f"kept[{row}][k] = {names[k]};" for k, row in self._kept.items())
+        found = {row: names[k] for row, k in self._results(later=False)}
+        if not self.split:
+            found |= {
+                row: f"slides ? {found[row]} : {names[k]}" for row, k in self._results(later=True)
+            }
+        return [*lines, *(f"out[{row}][k] = {value};" for row, value in found.items())]
+
+    @cached_property
+    def second(self) -> list[str]:
+        """The statements of the second part."""
+        names = self._names()
+        for where, rows in (("own", self._own), ("kept", self._kept)):
+            for k, row in rows.items():
+                names[k] = f"{where}[{row}][k]"
+        lines = self._lines(sorted(self._late), names, "sincos_")
+        return [*lines, *(f"out[{row}][k] = {names[k]};" for row, k in self._results(later=True))]
+
+    def _results(self, *, later: bool) -> list[tuple[int, int]]:
+        """Return rows of `out` and their nodes, of one of the parts."""
+        return [
+            (self.out[port.name.removeprefix(self.later or "")] + i, k)
+            for port, part in zip(self.program.outputs, self._graph.outputs, strict=True)
+            if self._is_late(port) == later
+            for i, k in enumerate(part)
+        ]
+
+    def _is_late(self, port: Port) -> bool:
+        return self.later is not None and port.name.startswith(self.later)
 
     @property
     def has_angles(self) -> bool:
@@ -88,6 +121,29 @@ class Block:
     def _shared(self) -> frozenset[int]:
         graph = self._graph
         return frozenset(k for k in graph.operations() if graph.nodes[k].shared)
+
+    @cached_property
+    def _late(self) -> frozenset[int]:
+        """The nodes that only the later outputs ask for."""
+        graph, needed = self._graph, {k for _, k in self._results(later=False)}
+        late = set[int]()
+        for k in reversed(graph.operations()):
+            if k in needed:
+                needed |= set(graph.nodes[k].arguments)
+            elif k not in self._shared:
+                late.add(k)
+        return frozenset(late)
+
+    @cached_property
+    def _kept(self) -> dict[int, int]:
+        """The rows of `kept`, by node: what the second part reads of the first."""
+        if not self.split:
+            return {}
+        graph = self._graph
+        first = set(graph.operations()) - self._late - self._shared
+        read = {i for k in self._late for i in graph.nodes[k].arguments}
+        read |= {k for _, k in self._results(later=True)}
+        return {k: row for row, k in enumerate(sorted(read & first))}
 
     @cached_property
     def _own(self) -> dict[int, int]:

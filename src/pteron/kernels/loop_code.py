@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from pteron.equations.sticking import STUCK
 from pteron.equations.transmissions import DriveKind
 from pteron.kernels.blocks import Block
 from pteron.kernels.c import FLAGS, LINKED, SUFFIX, c_compiler, compiler_version
@@ -141,8 +142,12 @@ class LoopCode:
 
     @cached_property
     def _blocks(self) -> list[Block]:
-        parts = {"plant": self.plant, "sensed": self.sensed, "law": self.law}
-        return [Block(name, part) for name, part in parts.items() if part is not None]
+        parts = {"sensed": self.sensed, "law": self.law}
+        blocks = [Block(name, part) for name, part in parts.items() if part is not None]
+        # Machines side by side rarely slide all at once, and one part fills the pipeline better.
+        later = STUCK if self.kind.dry else None
+        plant = Block("plant", self.plant, later, split=later is not None and self.lanes == 1)
+        return [plant, *blocks]
 
     @cached_property
     def source(self) -> str:

@@ -21,7 +21,7 @@ from pteron.kernels.samples import Ask, Evaluated, Plant, run_samples
 from pteron.kernels.targets import FIXED
 from pteron.manipulator import Manipulator
 
-LANES = 8
+LANES = 16
 """Machines that share a vector."""
 
 _FEW = 4
@@ -163,10 +163,17 @@ def loop(
 def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, Array]:
     """Return a machine's own numbers for a program of the loop, as `Loop.run` takes them."""
     return {
-        f"{name}_{port.name}": FIXED[port.name](robot).reshape(1, 1, -1)
+        f"{name}_{port.name}": _numbers(robot, port.name)
         for port in part.inputs
         if port.name in FIXED
     }
+
+
+@lru_cache(maxsize=256)
+def _numbers(robot: Manipulator, what: str) -> Array:
+    found = FIXED[what](robot).reshape(1, 1, -1)
+    found.setflags(write=False)  # all runs of the machine read it
+    return found
 
 
 _plant = lru_cache(maxsize=64)(motion_program)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from pteron.equations.sticking import STUCK
 from pteron.equations.transmissions import DriveKind
 from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array
@@ -66,7 +67,7 @@ class Plant:
     """The plant of some machines: which joints stick, and steps under forces that stay."""
 
     def __init__(self, program: Program, kind: DriveKind) -> None:
-        self._moved = Evaluated("plant", program)
+        self._program = Evaluated("plant", program)
         self._kind, self._dry, self.elastic = kind, kind.dry, kind.elastic
 
     def split(self, y: Array) -> dict[str, Array]:
@@ -77,6 +78,16 @@ class Plant:
         starts = (2 * m + n * k for k in range(len(names)))
         more = {name: y[:, k : k + n] for name, k in zip(names, starts, strict=True)}
         return {"pose": y[:, :m], "velocity": y[:, m : 2 * m]} | more
+
+    def _moved(self, held: dict[str, Array], arrays: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what happens in a state, with the friction that holds joints where some stick."""
+        found = self._program(held, arrays)
+        stuck = {name: found.pop(name) for name in list(found) if name.startswith(STUCK)}
+        if stuck:
+            sticks = (held["side"] == 0.0).any(axis=1)
+            for name, values in stuck.items():
+                found[name.removeprefix(STUCK)][sticks] = values[sticks]
+        return found
 
     def begin(
         self, held: dict[str, Array], arrays: Mapping[str, Array], side: Array, step: float
