@@ -1,12 +1,13 @@
 """Simulation: how much faster than real time, alone, in a batch, and beside MuJoCo.
 
-The machines have drives with viscous friction, dry friction that sticks, and rotors. Steps are
-Runge and Kutta's of fourth order, 0.1 ms long. MuJoCo simulates the exported MJCF, the same bodies
-with all legs closed by equality constraints, with the same method and step; it is called from C
-once for all steps of a round, as Pteron's steps are, and the two take turns. The controlled
-simulation is `simulate` with computed torque at 1 kHz and encoders of 1 um or 1 urad: by its own
-loop, with the same law as a callback from Python at each sample, and by `simulate_many` for 10 000
-machines that differ in masses, friction and payload, in ns a step of one of them.
+The machines have drives with viscous friction, dry friction that sticks, and rotors; one alone
+slides on at 0.05 m/s and rad/s. Steps are Runge and Kutta's of fourth order, 0.1 ms long. MuJoCo
+simulates the exported MJCF, the same bodies with all legs closed by equality constraints, with the
+same method and step; it is called from C once for all steps of a round, as Pteron's steps are, and
+the two take turns. The controlled simulation is `simulate` with computed torque at 1 kHz and
+encoders of 1 um or 1 urad: by its own loop, with the same law as a callback from Python at each
+sample, and by `simulate_many` for 10 000 machines that differ in masses, friction and payload, in
+ns a step of one of them.
 """
 
 from __future__ import annotations
@@ -76,13 +77,14 @@ def main() -> None:
 def _times(robot: pteron.Manipulator) -> dict[str, Array]:
     """Return the seconds a step in every round: alone, in a batch, and MuJoCo's."""
     home, rest = home_pose(robot), np.zeros(robot.freedom)
-    holding = pteron.drive_forces(robot, home, rest, rest, smooth=True)
+    speed = rest + 0.05
+    holding = pteron.drive_forces(robot, home, speed, rest)
     count, many, batch = (100, 1, 100) if quick() else (2000, 20, BATCH)
     poses = home + 1e-3 * np.random.default_rng(0).normal(size=(batch, robot.freedom))
     speeds = 0.05 * np.random.default_rng(1).normal(size=poses.shape)
     holdings = np.tile(holding, (batch, 1))
     found = [
-        _contestant("alone", lambda: advance(robot, home, rest, holding, STEP, count), count),
+        _contestant("alone", lambda: advance(robot, home, speed, holding, STEP, count), count),
         _contestant(
             "batch", lambda: advance(robot, poses, speeds, holdings, STEP, many), many * batch
         ),
