@@ -2,7 +2,9 @@
 
 A key moves a slider of the page in headless Chromium, whose picture the processor draws. The clock
 runs from the key's event until the number has changed in the page, and until the picture with the
-new pose has been drawn; it also runs on the server alone, from an action to its last message.
+new pose has been drawn; it also runs on the server alone, from an action to its last message, and
+for the time from one picture to the next of a machine that a spring pulls, with rigid drives and
+with drives as they are.
 `--drags` makes the drags with the mouse: each leads somewhere in the window, and after it the
 platform must be where it may be, and must move again when it is dragged home.
 """
@@ -20,10 +22,13 @@ from typing import Any
 
 import numpy as np
 from measuring import quick
+from measuring.as_they_are import as_they_are
 
 import pteron
 from pteron.viewer import Viewer, view
 from pteron.viewer.boundary import allowed
+from pteron.viewer.pushing import DRIVES, Push
+from pteron.workspace import home_pose
 
 _FLAGS = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
 
@@ -32,6 +37,9 @@ DRAGGED = (
     *("orthoglide", "wrist"),
 )
 """Machines of all kinds of platforms and legs that are common."""
+
+_SPAN = 1.0 / 30.0
+"""From one picture to the next, s."""
 
 _CLOCK = """() => {
     window.marks = {start: null, text: [], picture: []};
@@ -71,7 +79,34 @@ def main() -> None:
                     print(f"   text {_told(text)}   picture {_told(picture)}")
                 else:
                     print("   (no Chromium)")
+    _pushes(machines)
     _drags(2 if quick() else 20)
+
+
+def _pushes(machines: tuple[str, ...]) -> None:
+    """Print how long a picture's span of a pushed machine takes, with rigid drives and others."""
+    print(f"a span of {1e3 * _SPAN:.0f} ms of a push, ms: median, 95 %")
+    for name in machines:
+        robot = pteron.load(name)
+        print(f"  {name:<14}", end="")
+        for kind, machine in (("rigid", robot), ("as they are", as_they_are(robot))):
+            times, moved = _pushed(machine)
+            print(f" drives {kind} {_told(times)}, pulled {1e3 * moved:.1f} mm  ", end="")
+        print(flush=True)
+
+
+def _pushed(robot: pteron.Manipulator) -> tuple[list[float], float]:
+    """Return times, ms, of spans under a spring that pulls sideways, and how far it pulled, m."""
+    home = home_pose(robot)
+    push, times = Push(robot, home, next(iter(DRIVES))), []
+    at = robot.platform.at(home)[0]
+    push.pull(at, at + 0.1 * robot.platform.directions[0])
+    for _ in range(6 if quick() else 90):
+        begin = perf_counter()
+        push.go(_SPAN)
+        times.append(1e3 * (perf_counter() - begin))
+        assert np.isfinite(push.pose).all()
+    return times[3:], float(np.linalg.norm(robot.platform.at(push.pose)[0] - at))
 
 
 def _told(times: list[float]) -> str:
