@@ -68,6 +68,11 @@ class Program:
         dense = ca.cse([ca.densify(value).T for value in found.values()])
         return cls.of(name, list(given.values()), inputs, dense, outputs)
 
+    @property
+    def text(self) -> str:
+        """What it is on disk; the same for those that are the same."""
+        return _written(self)
+
     def optimised(self) -> Self:
         """Return the program after the passes that save operations."""
         return replace(self, function=optimised(self.function))
@@ -159,6 +164,7 @@ def _told(value: Any) -> str | None:
 @lru_cache
 def _source(packages: tuple[str, ...]) -> str:
     total = hashlib.sha256()
-    for path in sorted(file for name in packages for file in (_PACKAGE / name).rglob("*.py")):
+    files = (file for name in packages for file in (_PACKAGE / name).rglob("*.*"))
+    for path in sorted(file for file in files if file.suffix in (".py", ".j2")):
         total.update(path.read_bytes())
     return total.hexdigest()
