@@ -262,6 +262,10 @@ def test_mistakes_are_told():
         simulate(slow, start=(rest, rest), duration=0.01, step=5e-5)
     for wrong, message in (
         ({"elastic": "soft", "curve": 5}, "2 faults"),
+        (
+            {"coulomb": -1.0, "curve": ((1.0, -2.0), (0.5, 3.0)), "elastic": Elastic(1e5)},
+            r"(?s)4 faults.*coulomb: -1 given.*elastic: needs rotor.*ascending.*of 0 or more",
+        ),
         ({"curve": ((0.0, np.nan),)}, "curve: .* pairs of numbers, speed and force, expected"),
         ({"ripple": (3,)}, "ripple: .* a list of Wave expected"),
         ({"lugre": {"stiffness": 1.0}}, "lugre: .* a LuGre expected"),
