@@ -1,5 +1,6 @@
 """Drives that bend, have play, lag and ripple: modes, impacts, limits, mistakes."""
 
+import re
 from dataclasses import replace
 
 import mechanisms
@@ -282,6 +283,29 @@ def test_mistakes_are_told():
         pteron.ModelError, match='encoder: \'load\' given, "motor", "joint" or "both"'
     ):
         Elastic(1.0, encoder="load")
+
+
+@pytest.mark.parametrize("stiffness", [1.7e5, 2.3e5, 3.1e6])
+def test_a_step_that_is_told_is_taken(stiffness):
+    given = {"start": (np.zeros(3), np.zeros(3)), "duration": 0.01, "period": 0.01}
+    robot = driven(pteron.load("tripteron"), replace(BENDS, elastic=Elastic(stiffness)))
+    with pytest.raises(pteron.DataError, match="at most") as told:
+        simulate(robot, **given, step=0.009)
+    longest = float(re.search(r"asks for (\S+) s at most", str(told.value))[1])
+    found = simulate(robot, **given, step=longest)
+    assert found.step == longest > 0.9 * longest_step(robot, np.zeros(3))
+
+
+def test_a_winding_at_its_supplys_limit_asks_for_short_steps(mass):
+    """Its force falls by (k ratio)^2 / R for each m/s: a light joint comes to its speed at once."""
+    winding = Winding(resistance=0.1, torque_constant=1.0, voltage=6.0)
+    drive = pteron.legs.Drive(ratio=100.0, rotor_inertia=1e-9, winding=winding)
+    robot, rest = driven(mass, drive), np.zeros(3)
+    found = simulate(robot, start=(rest, rest), forces=[1e4, 0.0, 0.0], duration=0.01)
+    load = pteron.mass_matrix(robot, rest)[0, 0] + drive.inertia
+    assert found.step == pytest.approx(2.0 * load / 1e5, rel=0.2)
+    # What holds as the supply is at its limit: 0.06 m/s, without load, in microseconds.
+    np.testing.assert_allclose(found.velocity[2:, 0], 0.06, rtol=1e-6)
 
 
 def test_a_file_keeps_all_of_a_drive(tmp_path):

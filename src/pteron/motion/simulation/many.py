@@ -21,7 +21,6 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.simulation.loop import Timing, loop_arrays
 from pteron.motion.simulation.machines import Machines
-from pteron.motion.simulation.plant import allowed_step
 from pteron.motion.simulation.sensors import (
     Sensors,
     encoder_memory,
@@ -29,6 +28,7 @@ from pteron.motion.simulation.sensors import (
     expect_sensed,
 )
 from pteron.motion.simulation.simulate import STEP, check_delay, check_positive, reference_of
+from pteron.motion.simulation.stable_steps import allowed_step
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def simulate_many(
     timing = Timing(
         delay,
         "rk4",
-        allowed_step(robot, about, step, usual=step == STEP),
+        allowed_step(robot, about, step, usual=step == STEP, machines=machines),
         1e-10,
         sensors.delay + sensors.samples * controller.period,
     )
