@@ -10,10 +10,19 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, null_space
 
 import pteron
-from pteron.controllers import FeedForwardPD
+from pteron.controllers import ComputedTorque, FeedForwardPD
 from pteron.legs import Elastic, LuGre, Wave, Winding
 from pteron.manipulator import parameters
-from pteron.motion import Sensors, advance, longest_step, modes, pick_and_place, simulate
+from pteron.motion import (
+    Sensors,
+    advance,
+    longest_step,
+    machines_about,
+    modes,
+    pick_and_place,
+    simulate,
+    simulate_many,
+)
 from pteron.workspace import home_pose
 
 BENDS = pteron.legs.Drive(coulomb=2.0, viscous=5.0, rotor_inertia=0.2, elastic=Elastic(2e5, 30.0))
@@ -175,6 +184,34 @@ def test_a_motor_gives_what_its_curve_winding_and_current_allow(mass):
     rate = 16.0 / 2.0 / load
     expected = 1.5 * -np.expm1(-rate * supplied.time)
     np.testing.assert_allclose(supplied.velocity[:, 0], expected, rtol=0.0, atol=1e-9)
+
+
+def test_forces_are_what_motors_give_and_not_what_is_asked_of_them():
+    """Of one motor with a curve, one with a winding, one that bends and one that may do all."""
+    drawn, free = pteron.load("quadrupteron"), pteron.legs.Drive(rotor_inertia=1e-5, ratio=300.0)
+    curve = (0.0, 20.0), (0.1, 20.0), (0.5, 0.0)
+    limited = replace(free, curve=curve)
+    drives = [
+        *(limited, replace(free, winding=Winding(2.0, 0.1, 2.0))),
+        *(replace(limited, elastic=Elastic(3e5, 50.0)), free),
+    ]
+    robot = driven(drawn, *drives)
+    motion = pick_and_place(drawn, home_pose(drawn), least=0.1)
+    given = {"duration": 0.16, "model": drawn}
+    found = simulate(robot, motion, ComputedTorque(), limits=False, **given)
+    most = np.interp(np.abs(found.motor_rates[:, 2]), *np.array(curve).T)
+    assert (np.abs(found.forces[:, 2]) <= most + 1e-12).all()
+    assert (found.saturated[:3] > 0.2).all()
+    assert found.saturated[3] == 0.0
+    stiff = driven(drawn, *drives[:2], limited, free)
+    found = simulate(stiff, motion, ComputedTorque(), limits=False, **given)
+    own = pteron.drive_forces(stiff, found.pose, found.velocity, found.acceleration)
+    np.testing.assert_allclose(found.forces, own, rtol=0.0, atol=1e-8 * np.abs(own).max())
+    assert np.abs(found.asked[:, :3]).max() > 1.5 * np.abs(own[:, :3]).max()
+    many = machines_about(robot, 2)
+    alone = simulate(robot, motion, ComputedTorque(), limits=False, **given)
+    batch = simulate_many(many, motion, ComputedTorque(), **given)
+    np.testing.assert_allclose(batch.force[1], np.abs(alone.forces).max(axis=0), rtol=1e-9)
 
 
 def test_ripple_and_cogging_come_by_the_motors_angle(mass):
