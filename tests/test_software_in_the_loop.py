@@ -121,6 +121,11 @@ def test_mistakes_are_told(tmp_path):
     pteron.export_c(geared, [ComputedTorque()], tmp_path / "motors", output="torque")
     with pytest.raises(pteron.DataError, match="gives commands of the motors; export with output"):
         Exported(tmp_path / "motors", ComputedTorque())
+    for law in (ComputedTorque, FeedForwardPD, Adaptive):
+        pteron.export_c("five-bar", [law(period=1e-3)], tmp_path / law.__name__)
+        assert Exported(tmp_path / law.__name__, law(period=1e-3)).law("five-bar").linked
+        with pytest.raises(pteron.DataError, match=r"_gains is for a period of 0.001 s, the con"):
+            Exported(tmp_path / law.__name__, law(period=4e-3)).law("five-bar")
     pteron.export_c("delta", [ComputedTorque()], tmp_path)
     with pytest.raises(pteron.DataError, match="no C of feed_forward_pd there"):
         Exported(tmp_path, FeedForwardPD())

@@ -13,6 +13,9 @@ from pteron.kernels.loop_code import LinkedLaw
 from pteron.manipulator import RobotLike
 from pteron.manipulator.readings import reading_scales, reading_zeros
 
+_SAME = 1e-9
+"""Relative difference of two periods that is rounding."""
+
 
 @dataclass(frozen=True)
 class ExportedLaw(Law):
@@ -39,7 +42,8 @@ class Exported:
     Raises
     ------
     DataError
-        If the folder has no C of the law, one of single precision, or one that commands motors.
+        If the folder has no C of the law, one of single precision, one that commands motors, or one
+        for another period.
 
     Examples
     --------
@@ -90,9 +94,19 @@ class Exported:
                         "export the controller for this machine"
                     )
                 tables.append((port.name, found[0]))
+                self._expect_period(source, found[0])
         zeros, scales = reading_zeros(own.model).tolist(), reading_scales(own.model).tolist()
         linked = LinkedLaw(header + source, function, tuple(tables), tuple(zeros), tuple(scales))
         return ExportedLaw(own.what, own.model, own.gains, own.base, linked)
+
+    def _expect_period(self, source: str, table: str) -> None:
+        """Refuse gains that are for another period."""
+        told = re.search(rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source)
+        if told and abs(float(told[1]) - self.period) > _SAME * self.period:
+            raise DataError(
+                f"{self.folder}: {table} is for a period of {float(told[1]):g} s, the controller's "
+                f"is {self.period:g} s; export it again, or give the controller that period"
+            )
 
     def _read(self) -> tuple[str, str, str]:
         """Return header and source, without the line that includes it, and the function."""
