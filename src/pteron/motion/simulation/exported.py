@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from pteron.controllers import Controller
+from pteron.controllers import Controller, Custom
+from pteron.controllers.custom import CustomLaw
 from pteron.controllers.law import Law
 from pteron.errors import DataError
 from pteron.kernels.loop_code import LinkedLaw
@@ -24,6 +25,13 @@ class ExportedLaw(Law):
     linked: LinkedLaw | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class ExportedCustomLaw(CustomLaw):
+    """A law of one's own whose forces come from exported C."""
+
+    linked: LinkedLaw | None = None
+
+
 @dataclass(frozen=True)
 class Exported:
     """A controller whose exported C is compiled into the loop of `simulate`, as it is.
@@ -36,7 +44,7 @@ class Exported:
     ----------
     folder : path
         What `pteron.export_c(robot, [controller], folder)` wrote.
-    controller : Controller
+    controller : Controller or Custom
         Whose law it is, with its period.
 
     Raises
@@ -58,10 +66,10 @@ class Exported:
     """
 
     folder: str | Path
-    controller: Controller
+    controller: Controller | Custom
 
     def __post_init__(self) -> None:
-        if not isinstance(self.controller, Controller):
+        if not isinstance(self.controller, Controller | Custom):
             raise DataError(
                 f"controller: {self.controller!r} given, one of pteron.controllers expected"
             )
@@ -72,14 +80,14 @@ class Exported:
         """Time between two samples, s."""
         return self.controller.period
 
-    def law(self, model: RobotLike) -> ExportedLaw:
+    def law(self, model: RobotLike) -> ExportedLaw | ExportedCustomLaw:
         """Return its law, which runs in the loop alone."""
-        own = self.controller.law(model)
+        own, what = self.controller.law(model), self.controller.what
         header, source, function = self._text  # type: ignore[attr-defined]
         tables = []
         for port in own.program.inputs:
             if port.shared:
-                stem = function.removesuffix(own.what)
+                stem = function.removesuffix(what)
                 names = (f"{function}_{port.name}", f"{stem}{port.name}")
                 found = [n for n in names if re.search(rf"extern const double {n}\[", header)]
                 if not found:
@@ -97,6 +105,8 @@ class Exported:
                 self._expect_period(source, found[0])
         zeros, scales = reading_zeros(own.model).tolist(), reading_scales(own.model).tolist()
         linked = LinkedLaw(header + source, function, tuple(tables), tuple(zeros), tuple(scales))
+        if isinstance(own, CustomLaw):
+            return ExportedCustomLaw(own.controller, own.model, linked)
         return ExportedLaw(own.what, own.model, own.gains, own.base, linked)
 
     def _expect_period(self, source: str, table: str) -> None:
