@@ -532,6 +532,31 @@ DRIVE_DOUBTS = {
         CRANKS,
         {"stribeck": pteron.legs.Stribeck(1.0, 10.0), "max_speed": 5.0},
     ),
+    "vibrates at 0.87 Hz while the joint is held: are elastic.stiffness in N m/rad": (
+        CRANKS,
+        {"rotor_inertia": 1.0, "elastic": pteron.legs.Elastic(30.0)},
+    ),
+    "vibrates at 3.6e+04 Hz while the joint is held: are elastic.stiffness in N/m": (
+        SLIDERS,
+        {"rotor_inertia": 4e-7, "ratio": 300.0, "elastic": pteron.legs.Elastic(1.8e9)},
+    ),
+    "elastic.backlash of 0.1 rad is much: is it in rad?": (
+        CRANKS,
+        {"rotor_inertia": 0.1, "elastic": pteron.legs.Elastic(1e4, backlash=0.1)},
+    ),
+    "current_time of 0.2 s: current loops have": (CRANKS, {"current_time": 0.2}),
+    "max_force is 120 N, but the winding gives 0.942 N at most": (
+        SLIDERS,
+        {"max_force": 120.0, "ratio": 392.7, "winding": pteron.legs.Winding(0.5, 1e-4, 12.0)},
+    ),
+    "max_speed is 1.5 m/s, but the winding's supply ends at 0.0012 m/s": (
+        SLIDERS,
+        {"max_speed": 1.5, "ratio": 400.0, "winding": pteron.legs.Winding(0.5, 100.0, 48.0)},
+    ),
+    "ripple of 2 times the torque: is its size a share": (
+        CRANKS,
+        {"ratio": 50.0, "ripple": (pteron.legs.Wave(6, 0.01), pteron.legs.Wave(12, -2.0))},
+    ),
 }
 
 

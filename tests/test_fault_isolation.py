@@ -316,6 +316,22 @@ def test_no_delay_is_taken_out_of_a_log_that_has_none(noise):
     assert not any(said.startswith("Below zero") for said in result.verdict.reasons)
 
 
+@pytest.mark.parametrize("gentle", [True, False])
+def test_play_cannot_be_told_where_no_load_changes_its_direction(gentle):
+    """The arms of a Delta carry its platform all the while, unless it moves fast."""
+    robot = pteron.load("delta")
+    limits = Limits(1.0, 4.0, type_i=0.3) if gentle else Limits(6.0, 80.0)
+    series = random_excitation(robot, limits=limits, period=4.0, seed=3)
+    motion = series.at(np.arange(4001) / 500.0)
+    forces = pteron.inverse_dynamics(robot, motion.pose, motion.velocity, motion.acceleration)
+    forces += 1e-3 * forces.std(axis=0) * np.random.default_rng(0).normal(size=forces.shape)
+    joints = pteron.inverse_kinematics(robot, motion.pose)
+    result = found(robot, Log("log.csv", motion.time, joints, forces))
+    told = any(said.startswith("These logs cannot show play") for said in result.verdict.reasons)
+    assert told == gentle == ("play" in result.fault_isolation.hidden)
+    assert ("play" in result.fault_isolation.tried) != gentle
+
+
 def test_no_play_is_named_where_it_changes_next_to_nothing():
     """What sampling leaves without noise is largest where loads turn: 0.0001 % of the forces."""
     robot = pteron.load("delta")

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from mechanisms import CLIENTS
+from mechanisms import CLIENTS, NIGHTLY
 
 import pteron
 from pteron.controllers import ComputedTorque
-from pteron.equations.drives import Drives
+from pteron.equations.drives import Drives, drive_names
 from pteron.equations.machine import number_places, numbers
 from pteron.equations.variations import variations, varied, varied_numbers
 from pteron.legs import Elastic
@@ -17,6 +17,7 @@ from pteron.motion import (
     Machines,
     Sensors,
     advance,
+    longest_step,
     machines_about,
     pick_and_place,
     simulate,
@@ -168,6 +169,40 @@ def test_a_machine_that_comes_to_nothing_is_told():
     assert np.isnan(found.force[1]).all() or found.samples[1] < found.samples[0]
 
 
+@pytest.mark.parametrize("elastic", [None, pytest.param(Elastic(2e5), marks=NIGHTLY)])
+def test_steps_are_short_enough_for_each_of_many_machines(elastic, monkeypatch):
+    """Lighter machines, and those of more friction, ask for shorter steps than the one as drawn."""
+    monkeypatch.delenv("PTERON_KERNELS")
+    drawn = pteron.load("five-bar")
+    drive = pteron.legs.Drive(
+        viscous=0.1 if elastic else 300.0, rotor_inertia=1e-3, elastic=elastic
+    )
+    robot = replace(drawn, legs=tuple(replace(leg, drive=drive) for leg in drawn.legs))
+    motion, home = pick_and_place(robot), home_pose(robot)
+    many = machines_about(robot, 16, masses=0.9, friction=0.9, rotors=0.9, seed=1)
+    steps = [
+        longest_step(
+            replace(made, legs=tuple(
+                replace(leg, drive=replace(drive, viscous=row.viscous, rotor_inertia=row.inertia))
+                for leg, row in zip(made.legs, (Drives(*one) for one in numbers.T), strict=True)
+            )), home
+        )
+        for made, numbers in (
+            (pteron.with_parameters(robot, own), rows.reshape(len(Drives._fields), -1))
+            for own, rows in zip(many.parameters, many.drives, strict=True)
+        )
+    ]  # fmt: skip
+    assert longest_step(robot, home, many) == pytest.approx(min(steps), rel=1e-9)
+    assert min(steps) < 0.5 * longest_step(robot, home)
+    found = simulate_many(many, motion, ComputedTorque(), model=drawn, duration=0.02)
+    assert not found.stopped.any()
+    assert found.largest.max() < 5e-3
+    if elastic:
+        step = 1.5 * min(steps)
+        with pytest.raises(pteron.DataError, match="the stiffness of its transmission asks for"):
+            simulate_many(many, motion, ComputedTorque(), duration=0.02, step=step)
+
+
 def test_states_go_on_as_their_machines_do(robot):
     machines = machines_about(robot, 3, masses=0.3, friction=0.5, seed=1)
     pose = np.tile(home_pose(robot), (3, 1))
@@ -209,6 +244,24 @@ def test_mistakes_are_told(robot):
         Machines(robot, many.parameters, np.zeros((2, 3)), many.payload)
     with pytest.raises(pteron.DataError, match=r"geometry: shape \(2, 5\) given"):
         replace(many, geometry=np.zeros((2, 5)))
+    for name, column, wrong, message in (
+        ("parameters", "m_u1", -1.0, "parameters: machine 1, m_u1: -1 given, 0 or more expected"),
+        (
+            "parameters",
+            "mgx_u1",
+            np.nan,
+            "parameters: machine 1, mgx_u1: nan given, a finite number",
+        ),
+        ("drives", "coulomb_1", -2.0, "drives: machine 1, coulomb_1: -2 given, 0 or more expected"),
+        ("drives", "offset_1", np.inf, "drives: machine 1, offset_1: inf given, a finite number"),
+        ("payload", None, np.nan, "payload: machine 1: nan given, 0 or more expected"),
+        ("payload", None, -1.0, "payload: machine 1: -1 given, 0 or more expected"),
+    ):
+        bad = getattr(many, name).copy()
+        names = {"parameters": pteron.parameter_names(robot), "drives": drive_names(robot)}
+        bad[(1, names[name].index(column)) if column else 1] = wrong
+        with pytest.raises(pteron.DataError, match=message):
+            replace(many, **{name: bad})
     motion = pick_and_place(robot, home_pose(robot), least=0.1)
     with pytest.raises(pteron.DataError, match="controller"):
         simulate_many(many, motion, "pd")

@@ -6,12 +6,21 @@ import subprocess
 from dataclasses import replace
 from itertools import product
 
+import casadi as ca
 import mechanisms
 import numpy as np
 import pytest
 
 import pteron
-from pteron.controllers import Adaptive, ComputedTorque, FeedForwardPD, PDGravity
+from pteron.controllers import (
+    Adaptive,
+    ComputedTorque,
+    Custom,
+    FeedForwardPD,
+    PDGravity,
+    joint_masses,
+)
+from pteron.legs import Elastic
 from pteron.motion import Exported, Sensors, pick_and_place, simulate
 from pteron.workspace import home_pose
 
@@ -109,6 +118,93 @@ def test_exported_c_in_the_loop_is_what_it_is_by_itself(tmp_path):
         np.testing.assert_array_equal(getattr(linked, part), getattr(alone, part))
 
 
+def own_law(robot, *, motors=False):
+    """Return a law with a memory, tables, comparisons, limits and a sine, as one might write it."""
+    n, m = robot.joint_count, robot.freedom
+    told = ("joints", "joint_rates", *(("motors", "motor_rates") if motors else ()))
+    given = {name: ca.SX.sym(name, n) for name in told}
+    wanted, total = ca.SX.sym("pose", m), ca.SX.sym("memory", n)
+    gains, limit = ca.SX.sym("gains", n, 2), ca.SX.sym("limit")
+    place = pteron.export.casadi_functions(robot)["inverse_kinematics"](wanted)
+    error = ca.reshape(place, n, 1) - given["joints"]
+    kept = ca.fmin(ca.fmax(total + error, -limit), limit)
+    rates = given["motor_rates" if motors else "joint_rates"]
+    forces = gains[:, 0] * error - gains[:, 1] * rates + ca.tanh(kept) + 0.01 * ca.sin(total)
+    forces = ca.if_else(rates > 0.1, 0.9 * forces, forces)
+    if motors:
+        forces += 0.1 * gains[:, 0] * (given["joints"] - given["motors"])
+    inputs = {"gains": gains, "memory": total, **given, "pose": wanted, "limit": limit}
+    function = ca.Function("own_pid", [*inputs.values()], [kept, forces], [*inputs],
+                           ["next_memory", "forces"])  # fmt: skip
+    masses = joint_masses(robot)
+    numbers = {"gains": np.array([3e3 * masses, 90.0 * masses]).T, "limit": 0.02}
+    return Custom(function, parameters=numbers, memory=np.zeros(n))
+
+
+@pytest.mark.parametrize(
+    ("name", "elastic"),
+    [
+        *(("five-bar", None), ("five-bar", Elastic(50.0, 0.1, encoder="both"))),
+        pytest.param("quadrupteron", None, marks=mechanisms.NIGHTLY),
+        pytest.param("sprint-z3", Elastic(5e4, 50.0, encoder="motor"), marks=mechanisms.NIGHTLY),
+    ],
+)
+def test_a_law_of_ones_own_is_exported_and_linked(name, elastic, tmp_path):
+    robot = pteron.load(name)
+    masses = joint_masses(robot)
+    drives = [
+        pteron.legs.Drive(0.1 * mass, mass, rotor_inertia=0.1 * mass, elastic=elastic)
+        for mass in masses
+    ]
+    counts = [pteron.legs.Reading(0.1, 2.0 - 3.0 * (i % 2)) for i in range(len(masses))]
+    legs = zip(robot.legs, drives, counts, strict=True)
+    robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive, _ in legs))
+    controller = own_law(robot, motors=elastic is not None)
+    motion = pick_and_place(robot, home_pose(robot), least=0.05)
+    own = simulate(robot, motion, controller, limits=False, **GIVEN)
+    assert own.velocity.any()
+    files = pteron.export_c(robot, [controller], tmp_path / "c")
+    linked = simulate(robot, motion, Exported(tmp_path / "c", controller), limits=False, **GIVEN)
+    assert linked.stopped is None
+    for part in ("pose", "velocity", "forces", "asked", "memory"):
+        np.testing.assert_array_equal(getattr(linked, part), getattr(own, part))
+    # Its test program compares with the library.
+    sources = [path for path in files if path.suffix == ".c"]
+    program = tmp_path / "tests"
+    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([COMPILER, *flags, "-o", program, *sources, "-lm"], check=True)
+    assert subprocess.run([program], check=False).returncode == 0
+    # What drives count otherwise is undone.
+    pairs = zip(robot.legs, counts, strict=True)
+    other = replace(robot, legs=tuple(replace(leg, reading=count) for leg, count in pairs))
+    pteron.export_c(other, [controller], tmp_path / "other")
+    read = Exported(tmp_path / "other", controller)
+    found = simulate(other, motion, read, limits=False, **GIVEN)
+    assert np.abs(found.asked - own.asked).max() < 1e-7 * np.abs(own.asked).max()
+
+
+def test_mistakes_of_laws_of_ones_own_are_told(tmp_path):
+    joints = ca.SX.sym("joints", 3)
+
+    def named(name, size=3):
+        return Custom(ca.Function(name, [joints[:size]], [-joints[:size]], ["joints"], ["forces"]))
+
+    with pytest.raises(pteron.ModelError, match="'jacobian' is the name of a function of pteron"):
+        pteron.export_c("tripteron", named("jacobian"), tmp_path)
+    with pytest.raises(pteron.DataError, match="joints: 3 numbers, 4 expected"):
+        pteron.export_c("quadrupteron", [named("spring")], tmp_path)
+    with pytest.raises(pteron.ModelError, match="spring, a Custom controller, can be exported as"):
+        pteron.export_st("tripteron", [named("spring")], tmp_path)
+    files = pteron.export_c("tripteron", named("spring"), tmp_path, specialised=True)
+    assert "tripteron_spring(" in files[0].read_text() + files[1].read_text()
+    linked, start = Exported(tmp_path, named("spring")), ([0.0, 0.0, 0.0],) * 2
+    own = simulate("tripteron", None, named("spring"), start=start, duration=0.01)
+    found = simulate("tripteron", None, linked, start=start, duration=0.01)
+    np.testing.assert_array_equal(found.pose, own.pose)
+    with pytest.raises(pteron.DataError, match="no C of damper there"):
+        Exported(tmp_path, named("damper"))
+
+
 def test_mistakes_are_told(tmp_path):
     with pytest.raises(pteron.DataError, match=r"no C of computed_torque there; write it with"):
         Exported(tmp_path, ComputedTorque())
@@ -121,6 +217,11 @@ def test_mistakes_are_told(tmp_path):
     pteron.export_c(geared, [ComputedTorque()], tmp_path / "motors", output="torque")
     with pytest.raises(pteron.DataError, match="gives commands of the motors; export with output"):
         Exported(tmp_path / "motors", ComputedTorque())
+    for law in (ComputedTorque, FeedForwardPD, Adaptive):
+        pteron.export_c("five-bar", [law(period=1e-3)], tmp_path / law.__name__)
+        assert Exported(tmp_path / law.__name__, law(period=1e-3)).law("five-bar").linked
+        with pytest.raises(pteron.DataError, match=r"_gains is for a period of 0.001 s, the con"):
+            Exported(tmp_path / law.__name__, law(period=4e-3)).law("five-bar")
     pteron.export_c("delta", [ComputedTorque()], tmp_path)
     with pytest.raises(pteron.DataError, match="no C of feed_forward_pd there"):
         Exported(tmp_path, FeedForwardPD())

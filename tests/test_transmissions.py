@@ -1,5 +1,6 @@
 """Drives that bend, have play, lag and ripple: modes, impacts, limits, mistakes."""
 
+import re
 from dataclasses import replace
 
 import mechanisms
@@ -9,10 +10,19 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, null_space
 
 import pteron
-from pteron.controllers import FeedForwardPD
+from pteron.controllers import ComputedTorque, FeedForwardPD
 from pteron.legs import Elastic, LuGre, Wave, Winding
 from pteron.manipulator import parameters
-from pteron.motion import Sensors, advance, longest_step, modes, pick_and_place, simulate
+from pteron.motion import (
+    Sensors,
+    advance,
+    longest_step,
+    machines_about,
+    modes,
+    pick_and_place,
+    simulate,
+    simulate_many,
+)
 from pteron.workspace import home_pose
 
 BENDS = pteron.legs.Drive(coulomb=2.0, viscous=5.0, rotor_inertia=0.2, elastic=Elastic(2e5, 30.0))
@@ -176,6 +186,34 @@ def test_a_motor_gives_what_its_curve_winding_and_current_allow(mass):
     np.testing.assert_allclose(supplied.velocity[:, 0], expected, rtol=0.0, atol=1e-9)
 
 
+def test_forces_are_what_motors_give_and_not_what_is_asked_of_them():
+    """Of one motor with a curve, one with a winding, one that bends and one that may do all."""
+    drawn, free = pteron.load("quadrupteron"), pteron.legs.Drive(rotor_inertia=1e-5, ratio=300.0)
+    curve = (0.0, 20.0), (0.1, 20.0), (0.5, 0.0)
+    limited = replace(free, curve=curve)
+    drives = [
+        *(limited, replace(free, winding=Winding(2.0, 0.1, 2.0))),
+        *(replace(limited, elastic=Elastic(3e5, 50.0)), free),
+    ]
+    robot = driven(drawn, *drives)
+    motion = pick_and_place(drawn, home_pose(drawn), least=0.1)
+    given = {"duration": 0.16, "model": drawn}
+    found = simulate(robot, motion, ComputedTorque(), limits=False, **given)
+    most = np.interp(np.abs(found.motor_rates[:, 2]), *np.array(curve).T)
+    assert (np.abs(found.forces[:, 2]) <= most + 1e-12).all()
+    assert (found.saturated[:3] > 0.2).all()
+    assert found.saturated[3] == 0.0
+    stiff = driven(drawn, *drives[:2], limited, free)
+    found = simulate(stiff, motion, ComputedTorque(), limits=False, **given)
+    own = pteron.drive_forces(stiff, found.pose, found.velocity, found.acceleration)
+    np.testing.assert_allclose(found.forces, own, rtol=0.0, atol=1e-8 * np.abs(own).max())
+    assert np.abs(found.asked[:, :3]).max() > 1.5 * np.abs(own[:, :3]).max()
+    many = machines_about(robot, 2)
+    alone = simulate(robot, motion, ComputedTorque(), limits=False, **given)
+    batch = simulate_many(many, motion, ComputedTorque(), **given)
+    np.testing.assert_allclose(batch.force[1], np.abs(alone.forces).max(axis=0), rtol=1e-9)
+
+
 def test_ripple_and_cogging_come_by_the_motors_angle(mass):
     drive = pteron.legs.Drive(
         rotor_inertia=1e-6, ratio=200.0, ripple=(Wave(6, 0.05, 0.3),), cogging=(Wave(4, 0.02),)
@@ -262,6 +300,10 @@ def test_mistakes_are_told():
         simulate(slow, start=(rest, rest), duration=0.01, step=5e-5)
     for wrong, message in (
         ({"elastic": "soft", "curve": 5}, "2 faults"),
+        (
+            {"coulomb": -1.0, "curve": ((1.0, -2.0), (0.5, 3.0)), "elastic": Elastic(1e5)},
+            r"(?s)4 faults.*coulomb: -1 given.*elastic: needs rotor.*ascending.*of 0 or more",
+        ),
         ({"curve": ((0.0, np.nan),)}, "curve: .* pairs of numbers, speed and force, expected"),
         ({"ripple": (3,)}, "ripple: .* a list of Wave expected"),
         ({"lugre": {"stiffness": 1.0}}, "lugre: .* a LuGre expected"),
@@ -278,6 +320,29 @@ def test_mistakes_are_told():
         pteron.ModelError, match='encoder: \'load\' given, "motor", "joint" or "both"'
     ):
         Elastic(1.0, encoder="load")
+
+
+@pytest.mark.parametrize("stiffness", [1.7e5, 2.3e5, 3.1e6])
+def test_a_step_that_is_told_is_taken(stiffness):
+    given = {"start": (np.zeros(3), np.zeros(3)), "duration": 0.01, "period": 0.01}
+    robot = driven(pteron.load("tripteron"), replace(BENDS, elastic=Elastic(stiffness)))
+    with pytest.raises(pteron.DataError, match="at most") as told:
+        simulate(robot, **given, step=0.009)
+    longest = float(re.search(r"asks for (\S+) s at most", str(told.value))[1])
+    found = simulate(robot, **given, step=longest)
+    assert found.step == longest > 0.9 * longest_step(robot, np.zeros(3))
+
+
+def test_a_winding_at_its_supplys_limit_asks_for_short_steps(mass):
+    """Its force falls by (k ratio)^2 / R for each m/s: a light joint comes to its speed at once."""
+    winding = Winding(resistance=0.1, torque_constant=1.0, voltage=6.0)
+    drive = pteron.legs.Drive(ratio=100.0, rotor_inertia=1e-9, winding=winding)
+    robot, rest = driven(mass, drive), np.zeros(3)
+    found = simulate(robot, start=(rest, rest), forces=[1e4, 0.0, 0.0], duration=0.01)
+    load = pteron.mass_matrix(robot, rest)[0, 0] + drive.inertia
+    assert found.step == pytest.approx(2.0 * load / 1e5, rel=0.2)
+    # What holds as the supply is at its limit: 0.06 m/s, without load, in microseconds.
+    np.testing.assert_allclose(found.velocity[2:, 0], 0.06, rtol=1e-6)
 
 
 def test_a_file_keeps_all_of_a_drive(tmp_path):

@@ -30,6 +30,7 @@ from pteron.kinematics import jacobian
 from pteron.legs import Drive, Elastic
 from pteron.manipulator import Manipulator
 from pteron.motion import (
+    Margins,
     Required,
     Sensors,
     linearised,
@@ -149,6 +150,39 @@ def test_predicted_margins_are_those_of_simulation(name: str) -> None:
         own = np.ones(robot.joint_count)
         own[0] = share * found.gain[0]
         assert sign * grows(robot, scaled(own), home, delay=3e-4) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("encoder", "sensors"),
+    [
+        ("rigid", Sensors(noise=1e-30, cutoff=100.0)),
+        pytest.param("rigid", Sensors(encoder=(1e-13, 0.0), cutoff=100.0), marks=NIGHTLY),
+        ("motor", Sensors(motor_encoder=1e-13, cutoff=100.0)),
+        pytest.param("joint", Sensors(motor_encoder=1e-13), marks=NIGHTLY),
+        pytest.param("both", Sensors(noise=1e-30, cutoff=100.0, delay=2e-4), marks=NIGHTLY),
+    ],
+)
+def test_each_rate_lags_as_its_own_encoder_has_it(encoder: str, sensors: Sensors) -> None:
+    """Rates are differences where their encoder, of the joint or the motor, rounds or is noisy."""
+    robot = driven("five-bar")
+    if encoder != "rigid":
+        robot = bending(robot)
+        # A loop around a joint's own encoder is fast where its resonance, which it excites, is.
+        stiff = {"stiffness": 300.0, "damping": 0.02} if encoder == "joint" else {}
+        stiff |= {"encoder": encoder}
+        pairs = ((leg, replace(leg.drive.elastic, **stiff)) for leg in robot.legs)
+        legs = (replace(leg, drive=replace(leg.drive, elastic=bends)) for leg, bends in pairs)
+        robot = replace(robot, legs=tuple(legs))
+    home = home_pose(robot)
+    given = {"delay": 3e-4, "sensors": sensors}
+    tuned = tune(robot, controller=FeedForwardPD(), poses=home[None], **given)
+    late = tuned.margins[0].common_delay
+    loop = replace(tuned.loops[0], share=None)
+    assert encoder == "joint" or Margins(loop).common_delay > 1.1 * late
+    duration = 0.6 if encoder == "rigid" else 3.0
+    for share, sign in ((0.95, -1.0), (1.05, 1.0)):
+        given["delay"] = 3e-4 + share * late
+        assert sign * grows(robot, tuned.controller, home, duration, **given) > 0.0
 
 
 @pytest.mark.parametrize("name", MACHINES)

@@ -567,7 +567,7 @@ def table(said: dict[Key, Said], machines: Sequence[str]) -> str:
     return "\n".join([*lines, "", *(f"- {line}" for line in misjudged(said))])
 
 
-_HEAD = """# What identify says of logs with a fault
+_HEAD = """# Verdicts on logs with a fault
 
 `python benchmarks/identification/faults.py`, {} log a cell, twice as many without a fault. A
 machine 20 % off its drawing moves along random Fourier series, 10 s (Par4, five-bar: 8 s) at

@@ -94,6 +94,11 @@ class Custom:
             raise DataError(f"controller: {told(faults)}")
         _ = self._program
 
+    @property
+    def what(self) -> str:
+        """The function's name."""
+        return str(self.function.name())
+
     def law(self, model: RobotLike) -> CustomLaw:
         """Return its law for a machine.
 
@@ -127,10 +132,15 @@ class Custom:
                 "controller: its function is not one of plain operations alone (expand() fails); "
                 "leave out what iterates or calls other programs"
             ) from None
+        # Each input and output is a column, and forces come first.
+        given = [ca.SX.sym(name, function.numel_in(k)) for k, name in enumerate(function.name_in())]
+        symbols = zip(given, function.sx_in(), strict=True)
+        found = function.call([ca.reshape(one, *like.shape) for one, like in symbols])
+        results = dict(zip(function.name_out(), found, strict=True))
+        names = sorted(results)
         function = ca.Function(
-            function.name(), function.sx_in(),
-            [ca.densify(part) for part in function.call(function.sx_in())],
-            function.name_in(), function.name_out(),
+            function.name(), given, [ca.vec(ca.densify(results[name])) for name in names],
+            function.name_in(), names,
         )  # fmt: skip
         function = straight(function)
         graph = graph_of(function)

@@ -12,7 +12,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion import Motion, limits_of, longest_step
+from pteron.motion import Machines, Motion, limits_of, longest_step
 from pteron.workspace import home_pose, pose_margins
 
 _STEP = 5e-4
@@ -35,8 +35,9 @@ def world_of(
     period: float = 0.01,
     spread: float | None = None,
     tolerance: float = 0.005,
+    machines: Machines | None = None,
 ) -> World:
-    """Return the world of a machine, after checks."""
+    """Return the world of a machine, or of several about it, after checks."""
     machine = as_manipulator(robot)
     sizes = {"period": period, "tolerance": tolerance, "spread": spread}
     for name, value in sizes.items():
@@ -46,10 +47,10 @@ def world_of(
         spread = _SPREAD * max(leg.size for leg in machine.legs)
     home = _home(machine)
     least = min(_LEAST, float(pose_margins(machine, home).least) / 2.0)
-    step = min(_STEP, longest_step(machine, home[None]) / 2.0, period)
+    step = min(_STEP, longest_step(machine, home[None], machines) / 2.0, period)
     count = int(np.ceil(period / step - 1e-9))
     given = (home, _forces(machine, home), period, period / count, count)
-    world = World(machine, *given, spread, tolerance, least, motion)
+    world = World(machine, *given, spread, tolerance, least, motion, machines)
     if motion is not None:
         if not isinstance(motion, Motion):
             raise DataError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from pteron.environments.environment import Numbers, checked_mode, spaces
 from pteron.environments.picture import EnvironmentPicture
 from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
-from pteron.manipulator import RobotLike
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion import Machines, Motion
 
 
@@ -78,16 +77,20 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         for name, value in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
             if value is not None and value < 1:
                 raise DataError(f"{name}: {value} given, 1 or more expected")
+        machine = as_manipulator(robot)
+        if machines is not None and (len(machines) != num_envs or machines.robot != machine):
+            raise DataError(
+                f"machines: {len(machines)} of {machines.robot.name} given, {num_envs} of "
+                f"{machine.name} expected, one for each environment"
+            )
         self.world = world_of(
-            robot, motion=motion, period=period, spread=spread, tolerance=tolerance
+            machine,
+            motion=motion,
+            period=period,
+            spread=spread,
+            tolerance=tolerance,
+            machines=machines,
         )
-        if machines is not None:
-            if len(machines) != num_envs or machines.robot != self.world.robot:
-                raise DataError(
-                    f"machines: {len(machines)} of {machines.robot.name} given, {num_envs} of "
-                    f"{self.world.robot.name} expected, one for each environment"
-                )
-            self.world = replace(self.world, machines=machines)
         self.num_envs = num_envs
         pair = spaces(self.world.bounds, len(self.world.forces))
         self.single_observation_space, self.single_action_space = pair

@@ -73,7 +73,8 @@ def export_c(
         `"set_payload"`, whose parameters the others take while something is carried; of a machine
         with drives `"feed_forward"` and `"joint_feed_forward"` too. Where direct kinematics have no
         closed form, `"direct_step"` comes in their place. A controller stands for its law, with a
-        table of its gains; a law's name has those that it has by default.
+        table of its gains; a law's name has those that it has by default. A `Custom` controller is
+        called as its function is, with tables of its parameters.
     folder : path
         Where; made if it is missing.
     real : {"double", "float"}
@@ -218,7 +219,8 @@ class CPrinter:
             form = f"const {self.real} {{0}} = {{1}};"
             lines += statements(graph, [k], names, plain if by_number else guarded, form)
             of_number = nodes[node.arguments[0]].operation == CONSTANT
-            if node.operation in ("sqrt", "less") and not (node.shared or of_number):
+            tests = ("sqrt",) if item.compares else ("sqrt", "less")
+            if node.operation in tests and not (node.shared or of_number):
                 radicands.append(names[node.arguments[0]])
         finite = []
         for port, places in zip(item.outputs, graph.outputs, strict=True):

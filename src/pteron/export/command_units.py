@@ -76,6 +76,7 @@ def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
 
 _PER_READING = {
     **dict.fromkeys(("joint_rates", "joint_accelerations", "actuated", "jacobian"), -1),
+    "motor_rates": -1,
     **dict.fromkeys(("forces", "regressor"), 1),
 }
 """Outputs and inputs that the scale of a joint's reading multiplies, with its power."""
@@ -95,8 +96,9 @@ def at_readings(given: Program, robot: Manipulator) -> Program:
 
     symbols, taken, results = given.function.sx_in(), [], []
     for port, symbol in zip(given.inputs, symbols, strict=True):
-        power = 1 if port.name == "joints" else -_PER_READING.get(port.name, 0)
-        zero = ca.reshape(zeros, *symbol.shape) if port.name == "joints" else 0.0
+        place = port.name in ("joints", "motors")
+        power = 1 if place else -_PER_READING.get(port.name, 0)
+        zero = ca.reshape(zeros, *symbol.shape) if place else 0.0
         taken.append(zero + per_joint(symbol, power) if power else symbol)
     for port, result in zip(given.outputs, given.function.call(taken), strict=True):
         if port.name == "joints":

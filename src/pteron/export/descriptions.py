@@ -75,7 +75,8 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
 
 def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
     """Return the meanings of a control law's inputs and outputs, from those elsewhere."""
-    remembered = ", ".join(TEXTS["memory"][name] for name in MEMORY[what])
+    kept = MEMORY.get(what)
+    remembered = ", ".join(TEXTS["memory"][name] for name in kept) if kept else "what it keeps"
     words = {**meanings, "what": what, "remembered": remembered}
     return {name: text.format(**words) for name, text in TEXTS["law"].items()}
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pteron.controllers import CONTROLLERS, Controller
+from pteron.controllers import CONTROLLERS, Controller, Custom
 from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
@@ -56,7 +56,7 @@ kinematics has no closed form, `direct_step` takes its place."""
 FEED = ("feed_forward", "joint_feed_forward")
 """Feed-forward for a controller, from the platform's motion or from the joints'."""
 
-Asked = str | Controller | Sequence[str | Controller]
+Asked = str | Controller | Custom | Sequence[str | Controller | Custom]
 """A choice of functions, by name, and of controllers, whose laws they are."""
 
 _PAYLOAD = "set_payload"
@@ -104,6 +104,8 @@ class Exported:
     """Meanings of inputs and outputs, with their units."""
     tables: tuple[NumberTable, ...]
     examples: tuple[Example, ...]
+    compares: bool = False
+    """Whether it compares for its own ends, not to tell whether a leg reaches."""
 
     @property
     def several(self) -> bool:
@@ -121,9 +123,10 @@ def has_drives(robot: Manipulator) -> bool:
     return any(leg.drive is not None for leg in robot.legs)
 
 
-def listed(functions: Asked) -> list[str | Controller]:
+def listed(functions: Asked) -> list[str | Controller | Custom]:
     """Return a choice of functions as a list."""
-    return [functions] if isinstance(functions, str | Controller) else list(functions)
+    single = isinstance(functions, str | Controller | Custom)
+    return [functions] if single else list(functions)  # type: ignore[arg-type, list-item]
 
 
 def chosen(
@@ -154,8 +157,9 @@ def chosen(
     identified = None if base is None else read_identified(robot, base)
     robot = identified.robot if identified else robot
     asked = [] if functions is None else listed(functions)
-    given = {one.what: one for one in asked if isinstance(one, Controller)}
-    names = [one.what if isinstance(one, Controller) else one for one in asked]
+    given = {one.what: one for one in asked if not isinstance(one, str)}
+    names = [one if isinstance(one, str) else one.what for one in asked]
+    own = {name for name, one in given.items() if isinstance(one, Custom)}
     if functions is None:
         closed = closure_of(robot).closed_form
         step = {"direct_kinematics": "direct_step"}
@@ -174,7 +178,12 @@ def chosen(
     allowed = sorted({*COMPILED, *based} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
     for name in names:
-        if name not in allowed:
+        if name in own and name in allowed:
+            raise ModelError(
+                f"functions: {name!r} is the name of a function of pteron; give the controller's "
+                "casadi.Function another one"
+            )
+        if name not in allowed and name not in own:
             raise ModelError(f"functions: {name!r} cannot be exported; {valid}")
         if specialised and name.removesuffix(_BASE) == _PAYLOAD:
             raise ModelError(
@@ -184,12 +193,12 @@ def chosen(
     if not names:
         raise ModelError(f"functions: none given; {valid}")
     factors(robot, output)
-    if output != "force" and not {name.removesuffix(_BASE) for name in names} & set(DRIVEN):
+    if output != "force" and not {name.removesuffix(_BASE) for name in names} & {*DRIVEN, *own}:
         raise ModelError(
             f'output: "{output}" is what drives are told, but none of {", ".join(DRIVEN)} is '
             "written; name one of them"
         )
-    controllers = CONTROLLERS | given
+    controllers: dict[str, Controller | Custom] = {**CONTROLLERS, **given}
     return tuple(
         _exported(
             robot,
@@ -200,7 +209,9 @@ def chosen(
             output,
             controllers.get(what),
         )
-        for name, what in ((name, name.removesuffix(_BASE)) for name in names)
+        for name, what in (
+            (name, name if name in own else name.removesuffix(_BASE)) for name in names
+        )
     )
 
 
@@ -211,18 +222,22 @@ def _exported(
     specialised: bool,
     wrench: bool,
     output: Output,
-    controller: Controller | None,
+    controller: Controller | Custom | None,
 ) -> Exported:
-    what = name.removesuffix(_BASE)
+    custom = isinstance(controller, Custom)
+    what = name if custom else name.removesuffix(_BASE)
     loaded = wrench and what in LOADED
-    base = (identified or Identified.of(robot)) if name.endswith(_BASE) else None
-    if base:
+    base = (identified or Identified.of(robot)) if name != what else None
+    if isinstance(controller, Custom):
+        given = controller.law(robot).program
+    elif base:
         given = base_program(what, base, wrench=loaded, folded=specialised)
     elif controller:
         given = _without_status(controller.law(robot).program)
     else:
         given = program(robot, what, wrench=loaded, named=True)
-    bodies = "parameters" in {port.name for port in given.inputs} or name in SELECTED
+    taken = {port.name for port in given.inputs}
+    bodies = not custom and ("parameters" in taken or name in SELECTED)
     if identified and bodies:
         other = f"ask for {what + _BASE}" if what in (*REDUCIBLE, _PAYLOAD) else "leave it out"
         raise ModelError(
@@ -230,7 +245,7 @@ def _exported(
             f"do not tell; {other}, or export the model file that pteron identify wrote"
         )
     given = at_readings(given, robot)
-    if what in DRIVEN:
+    if custom or what in DRIVEN:
         given = in_units(given, robot, output)
     shared = [port.name for port in given.inputs if port.shared]
     tables = tuple(_table(robot, port, base, controller) for port in shared)
@@ -243,7 +258,6 @@ def _exported(
     machine = Machine.of(robot)
     states = _states(robot, given.inputs, fixed, controller)
     # Argument names must differ from those of the results.
-    taken = {port.name for port in given.inputs}
     outputs = tuple(
         replace(port, name=f"{port.name}_out") if port.name in taken else port
         for port in given.outputs
@@ -256,9 +270,17 @@ def _exported(
     if name in ("direct_kinematics", "closure_poses"):
         summary += TEXTS["notes"]["modes"]
         summary += "" if machine.closure.keeps_modes else TEXTS["notes"]["branches"]
-    elif "pose" in taken and not {"sqrt", "less"} & {node.operation for node in graph.nodes}:
+    elif (
+        not custom
+        and "pose" in taken
+        and not {"sqrt", "less"} & {node.operation for node in graph.nodes}
+    ):
         summary += " It does not ask whether the legs reach."
     meanings = {port.name: meaning(robot, port, output) for port in (*given.inputs, *outputs)}
+    if custom:
+        summary = f"{what}, a control law of one's own."
+        known = {port: meaning(robot, Port(port, (1,)), output) for port in TEXTS["law"]}
+        meanings = {**known, **meanings} | {one: f"see the table {what}_{one}" for one in shared}
     if controller:
         meanings |= law_meanings(controller.what, meanings)
     elif {"pose", "joints"} <= taken:
@@ -273,6 +295,7 @@ def _exported(
         meanings,
         tables,
         tuple(_evaluated(given, graph, state) for state in states[1:]),
+        compares=custom,
     )
 
 
@@ -284,9 +307,13 @@ def _without_status(given: Program) -> Program:
 
 
 def _table(
-    robot: Manipulator, name: str, base: Identified | None, controller: Controller | None
+    robot: Manipulator, name: str, base: Identified | None, controller: Controller | Custom | None
 ) -> NumberTable:
-    """Return the machine's own numbers for a shared input."""
+    """Return the machine's own numbers for a shared input, or a controller's parameters."""
+    if isinstance(controller, Custom):
+        values = controller.law(robot).numbers[f"law_{name}"].ravel()
+        names = tuple(f"{name}_{k}" for k in range(1, len(values) + 1))
+        return NumberTable(f"{controller.what}_{name}", TEXTS["tables"]["own"], names, values)
     comment = TEXTS["tables"][name]
     if name == "gains":
         assert controller is not None
@@ -304,7 +331,7 @@ def _states(
     robot: Manipulator,
     ports: Sequence[Port],
     fixed: dict[str, Array],
-    controller: Controller | None,
+    controller: Controller | Custom | None,
 ) -> list[list[Array]]:
     """Return inputs at three random poses in reach, and far out of it."""
     rng = np.random.default_rng(1)
@@ -314,7 +341,7 @@ def _states(
     apart = 1e-3 if "joints" in {port.name for port in ports} else 0.0
     for pose in random_poses(robot, 3, seed=rng):
         at_drives = to_readings(robot, inverse_kinematics(robot, pose))
-        known = {"pose": pose + apart, "joints": at_drives, **fixed}
+        known = {"pose": pose + apart, "joints": at_drives, "motors": at_drives, **fixed}
         if law:
             start = law.memory(pose, np.zeros_like(pose))
             known["memory"] = start + 1e-3 * rng.normal(size=start.shape)

@@ -11,7 +11,9 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from pteron.atomic import write_texts
+from pteron.controllers import Custom
 from pteron.equations.machine import closure_of
+from pteron.errors import ModelError
 from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
 from pteron.export.functions import Asked, Exported, chosen, listed
@@ -101,6 +103,11 @@ def export_st(
     direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
     names = None if functions is None else listed(functions)
     if names is not None:
+        own = [one.what for one in names if isinstance(one, Custom)]
+        if own:
+            raise ModelError(
+                f"functions: {own[0]}, a Custom controller, can be exported as C alone: export_c"
+            )
         names = [direct if name == "direct_kinematics" else name for name in names]
     if specialised is None:
         specialised = not {"set_payload", "set_payload_base"}.intersection(map(str, names or ()))

@@ -60,6 +60,11 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "grow with it, and what it shares with other forces is small beside the noise.",
         "Check each drive's gain by itself, or move more coordinates at once, and faster.",
     ),
+    "play": (
+        "These logs cannot show play in the drives: the load of none changes its direction often "
+        "enough, four times while the joint moves. While loads stay on one side it does no harm.",
+        "To see play, record a motion whose accelerations load the drives both ways.",
+    ),
 }
 """Faults that a log may hide: the reason, and a remedy."""
 

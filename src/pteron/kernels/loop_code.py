@@ -96,16 +96,19 @@ class LinkedLaw:
     scales: tuple[float, ...]
 
     def arguments(self, block: Block) -> list[str]:
-        """Return the arguments of its call that go in."""
+        """Return the arguments of its call: those that go in, and those that come out."""
         tables = dict(self.tables)
-        return [
+        taken = [
             tables[port.name] if port.shared else f"given + {block.at[port.name]}"
             for port in block.program.inputs
         ]
+        return taken + [name for name in ("forces", "next_memory") if name in block.out]
 
     def readings(self, block: Block) -> list[tuple[int, float, float]]:
         """Return the places of joints and rates among its inputs, with zeros and scales."""
-        zeros = {"joints": self.zeros, "joint_rates": (0.0,) * len(self.zeros)}
+        rest = (0.0,) * len(self.zeros)
+        zeros = dict.fromkeys(("joints", "motors"), self.zeros)
+        zeros |= dict.fromkeys(("joint_rates", "motor_rates"), rest)
         return [
             (block.at[name] + i, zero, scale)
             for name, own in zeros.items()

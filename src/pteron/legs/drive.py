@@ -187,27 +187,33 @@ class Drive:
     lugre: LuGre | None = None
 
     def __post_init__(self) -> None:
-        self._expect_parts()
-        _check(
-            self,
-            free=("offset",),
-            least=("coulomb", "viscous", "rotor_inertia"),
-            above=(
-                *("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn"),
-                "current_time",
-            ),
-            nonzero=("ratio",),
-        )
-        self._expect_sense()
+        faults = self._wrong_parts()
+        try:
+            _check(
+                self,
+                free=("offset",),
+                least=("coulomb", "viscous", "rotor_inertia"),
+                above=(
+                    *("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn"),
+                    "current_time",
+                ),
+                nonzero=("ratio",),
+            )
+        except ModelError as error:
+            faults += error.faults
+        faults += self._contradictions({fault.split(":")[0] for fault in faults})
+        if faults:
+            raise ModelError(told(faults), faults=faults)
 
-    def _expect_parts(self) -> None:
-        """Refuse what is none of the parts of a drive, and make its lists tuples."""
+    def _wrong_parts(self) -> list[str]:
+        """Return what is said of what is none of the parts of a drive; its lists become tuples."""
         faults = []
         parts = {"stribeck": Stribeck, "lugre": LuGre, "elastic": Elastic, "winding": Winding}
         for name, kind in parts.items():
             given = getattr(self, name)
             if given is not None and not isinstance(given, kind):
-                faults.append(f"{name}: {shown(given)} given, a {kind.__name__} expected")
+                article = "an" if name == "elastic" else "a"
+                faults.append(f"{name}: {shown(given)} given, {article} {kind.__name__} expected")
         for name in ("curve", "ripple", "cogging"):
             given = getattr(self, name)
             try:
@@ -226,34 +232,33 @@ class Drive:
                     "pairs of numbers, speed and force," if name == "curve" else "a list of Wave"
                 )
                 faults.append(f"{name}: {shown(given)} given, {wanted} expected")
-        if faults:
-            raise ModelError(told(faults), faults=faults)
+        return faults
 
-    def _expect_sense(self) -> None:
-        """Refuse what contradicts itself."""
+    def _contradictions(self, wrong: set[str]) -> list[str]:
+        """Return how the drive contradicts itself, what is `wrong` by itself left out."""
         faults = []
-        if self.elastic and not self.rotor_inertia:
+        if "elastic" not in wrong and self.elastic and not self.rotor_inertia:
             faults.append(
                 "elastic: needs rotor_inertia, since the motor moves by itself; give it, kg m^2"
             )
-        if self.lugre and not self.coulomb:
+        if "lugre" not in wrong and self.lugre and not self.coulomb:
             faults.append("lugre: needs coulomb, the friction at which its bristles slide; give it")
-        for name in ("winding", "ripple", "cogging"):
+        for name in sorted({"winding", "ripple", "cogging"} - wrong):
             if getattr(self, name) and self.ratio is None:
                 faults.append(f"{name}: needs ratio, of the motor's angle; give it, 1 for none")
-        speeds = [speed for speed, _ in self.curve]
-        if self.curve and (speeds[0] < 0.0 or sorted({*speeds}) != speeds):
+        curve = () if "curve" in wrong else self.curve
+        speeds = [speed for speed, _ in curve]
+        if curve and (speeds[0] < 0.0 or sorted({*speeds}) != speeds):
             faults.append("curve: speeds from 0 up expected, in ascending order")
-        if any(force < 0.0 for _, force in self.curve):
+        if any(force < 0.0 for _, force in curve):
             faults.append("curve: forces of 0 or more expected")
-        most = max((force for _, force in self.curve), default=0.0)
-        if self.curve and self.max_force is not None and self.max_force > most:
+        most = max((force for _, force in curve), default=0.0)
+        if curve and "max_force" not in wrong and (self.max_force or 0.0) > most:
             faults.append(
                 f"max_force: {self.max_force:g} given, but the curve has {most:g} at most; leave "
                 "one of them out, or make them agree"
             )
-        if faults:
-            raise ModelError(told(faults), faults=faults)
+        return faults
 
     @property
     def gear(self) -> float:

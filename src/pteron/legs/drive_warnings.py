@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import pi, sqrt
 
+from pteron.legs.drive import Drive, Elastic, Winding
 from pteron.legs.kind import LegKind
 
 _SLOW = 5.0
@@ -16,6 +18,18 @@ share of the drive's greatest speed."""
 
 _PEAK = 20.0
 """Greatest ratio of a drive's peak to its rated force, or the inverse: servo drives have 2 to 5."""
+
+_SLOWEST, _FASTEST = 1.0, 1e4
+"""Frequencies, Hz, between which a motor on its transmission vibrates while the joint is held."""
+
+_PLAY = {"m": 2e-3, "rad": 0.05}
+"""Greatest usual play of a transmission, by the joint's unit."""
+
+_LAG = 0.02
+"""Greatest usual time constant of a current loop, s: they have 0.1 to 3 ms."""
+
+_WAVE = 0.5
+"""Greatest usual ripple, as a share of a motor's torque."""
 
 
 def drive_warnings(leg: LegKind) -> Iterator[str]:
@@ -59,4 +73,45 @@ def drive_warnings(leg: LegKind) -> Iterator[str]:
         yield (
             f"drive: stribeck.speed of {drive.stribeck.speed:g} {rate} is beyond max_speed, "
             f"{fastest:g} {rate}"
+        )
+    if drive.elastic:
+        yield from _elastic(drive, drive.elastic, leg.joint.unit)
+    if drive.current_time and drive.current_time > _LAG:
+        yield (
+            f"drive: current_time of {drive.current_time:g} s: current loops have 0.1 to 3 ms; is "
+            "it in s?"
+        )
+    if drive.winding:
+        yield from _winding(drive, drive.winding, unit, rate)
+    high = max((abs(wave.size) for wave in drive.ripple), default=0.0)
+    if high > _WAVE:
+        yield f"drive: ripple of {high:g} times the torque: is its size a share, not per cent?"
+
+
+def _elastic(drive: Drive, bends: Elastic, unit: str) -> Iterator[str]:
+    """Yield warnings about a transmission that bends."""
+    stiffness = "N/m" if unit == "m" else "N m/rad"
+    frequency = sqrt(bends.stiffness / drive.inertia) / (2.0 * pi)
+    if not _SLOWEST <= frequency <= _FASTEST:
+        yield (
+            f"drive: its motor vibrates at {frequency:.2g} Hz while the joint is held: are "
+            f"elastic.stiffness in {stiffness} and rotor_inertia in kg m^2, at the motor?"
+        )
+    if bends.backlash > _PLAY[unit]:
+        yield f"drive: elastic.backlash of {bends.backlash:g} {unit} is much: is it in {unit}?"
+
+
+def _winding(drive: Drive, winding: Winding, unit: str, rate: str) -> Iterator[str]:
+    """Yield warnings about a winding that does not go with the drive's other numbers."""
+    constant = abs(drive.gear) * winding.torque_constant
+    stall, fastest = constant * winding.voltage / winding.resistance, winding.voltage / constant
+    if drive.max_force is not None and drive.max_force > stall:
+        yield (
+            f"drive: max_force is {drive.max_force:g} {unit}, but the winding gives {stall:.3g} "
+            f"{unit} at most: is torque_constant in N m/A?"
+        )
+    if drive.max_speed is not None and drive.max_speed > fastest:
+        yield (
+            f"drive: max_speed is {drive.max_speed:g} {rate}, but the winding's supply ends at "
+            f"{fastest:.3g} {rate}: is torque_constant in N m/A?"
         )

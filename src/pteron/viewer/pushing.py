@@ -8,7 +8,8 @@ from pteron.controllers import ComputedTorque, Law, PDGravity
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator
-from pteron.motion.simulation.plant import advance, allowed_step, drive_states
+from pteron.motion.simulation.plant import advance, drive_states
+from pteron.motion.simulation.stable_steps import allowed_step
 from pteron.viewer.boundary import allowed, what_stops
 from pteron.viewer.sliding import nearest
 

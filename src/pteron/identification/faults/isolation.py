@@ -72,9 +72,10 @@ class FaultIsolation:
         Error that all faults together make in it, likewise.
     why_not : str
         Why nothing was tried, where that is so.
-    hidden : tuple of {"gain", "clock", "scale"}
+    hidden : tuple of {"gain", "clock", "scale", "play"}
         Faults that these logs cannot tell by the rank of their equations: a factor that all forces
-        have, a clock at another rate, one force out of scale beside the others.
+        have, a clock at another rate, one force out of scale beside the others; and play, where no
+        drive's load changes direction often enough.
     held : bool
         Whether forces are seen to be half a sample early or late, as where they are held from
         sample to sample: named or not, it moves values of a log without noise.
@@ -221,13 +222,15 @@ def _isolated(
             faults.append(IsolatedFault(family.name, labels, *seen, speeds, step))
 
     # Play, which no column has
-    play = _play(parts, estimate.values, step)
+    play, looked = _play(parts, estimate.values, step)
     if play is not None and not (play.cycle < _NAMED).all():
         faults.insert(0, play)
         spoiled = np.hypot(spoiled, play.cycle)
 
     # The scales of all forces and of time, which the residuals cannot show
-    tried = (*dict.fromkeys(family.name for family in columns.families), "play")
+    tried = (*dict.fromkeys(family.name for family in columns.families), *["play"] * looked)
+    if not looked:
+        left_open.append("play")
     factor = factor_of_forces(model, fits[-1], known)
     if factor is not None:
         tried = (*tried, "gain")
@@ -248,8 +251,11 @@ def _isolated(
     return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, held=half)
 
 
-def _play(parts: Sequence[_Part], values: Array, step: float) -> IsolatedFault | None:
-    """Return that drives have play, where residuals are large as their loads change direction."""
+def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:
+    """Return that drives have play, and whether the load of any changes direction to tell.
+
+    It shows where residuals are large as loads change direction.
+    """
     records, band = [], max(part.how.band for part in parts)
     for part in parts:
         model, how = part.model.model, part.how
@@ -261,17 +267,19 @@ def _play(parts: Sequence[_Part], values: Array, step: float) -> IsolatedFault |
             load = matrix @ np.where(carried, values, 0.0)
             records.append(Record(block.states.time, load, residual, moving))
     found = knocks(records, band)
-    if found is None:
-        return None
+    looked = bool(found.looked.any())
+    if np.isnan(found.times).all():
+        return None, looked
     named = np.flatnonzero(~np.isnan(found.times)).tolist()
     labels = tuple(parts[0].model.model.robot.force_names[joint] for joint in named)
     # Knocks come on a cycle as they do in the logs, as far as can be said.
     forces = np.concatenate([part.log.forces for part in parts])
     cycle = 100.0 * np.sqrt(found.power) / forces.std(axis=0)
     unknown = np.full(len(named), np.nan)
-    return IsolatedFault(
+    fault = IsolatedFault(
         "play", labels, found.times[named], unknown, found.chance, 0.0, cycle, step=step
     )
+    return fault, looked
 
 
 def delay_of(

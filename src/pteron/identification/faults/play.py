@@ -46,6 +46,8 @@ class Record(NamedTuple):
 class Knocks(NamedTuple):
     """How much larger the residuals of joints are where their loads change direction."""
 
+    looked: NDArray[np.bool_]
+    """(n,); False where the load changes direction too seldom to tell."""
     times: Array
     """(n,); NaN where too little is seen, or nothing."""
     chance: float
@@ -53,8 +55,8 @@ class Knocks(NamedTuple):
     """Mean square (n,) that this adds to the residuals, over all samples."""
 
 
-def knocks(records: Sequence[Record], band: float) -> Knocks | None:
-    """Return what shows play in joints' drives; None where nothing does, or too little is seen.
+def knocks(records: Sequence[Record], band: float) -> Knocks:
+    """Return what shows play in joints' drives, and of which of them enough is seen to tell.
 
     Windows' mean squares are ranked (Mann and Whitney's test, over all joints, each in units of its
     usual one), and medians compared, so that single outliers, or a few of these changes that
@@ -73,14 +75,12 @@ def knocks(records: Sequence[Record], band: float) -> Knocks | None:
         power[joint] = max(float(np.mean(near)) - usual, 0.0) * share
         every[0].append(near / usual)
         every[1].append(far / usual)
-    shows = times >= _TIMES
-    if not shows.any():
-        return None
-    both = (np.concatenate(part) for part in every)
-    chance = float(scipy.stats.mannwhitneyu(*both, alternative="greater").pvalue)
-    if chance > _CHANCE:
-        return None
-    return Knocks(np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0))
+    looked, shows, chance = ~np.isnan(times), times >= _TIMES, 1.0
+    if shows.any():
+        both = (np.concatenate(part) for part in every)
+        chance = float(scipy.stats.mannwhitneyu(*both, alternative="greater").pvalue)
+    shows &= chance <= _CHANCE
+    return Knocks(looked, np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0))
 
 
 def _windows(records: Sequence[Record], band: float, joint: int) -> tuple[Array, Array, float]:

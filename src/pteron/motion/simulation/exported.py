@@ -6,17 +6,28 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from pteron.controllers import Controller
+from pteron.controllers import Controller, Custom
+from pteron.controllers.custom import CustomLaw
 from pteron.controllers.law import Law
 from pteron.errors import DataError
 from pteron.kernels.loop_code import LinkedLaw
 from pteron.manipulator import RobotLike
 from pteron.manipulator.readings import reading_scales, reading_zeros
 
+_SAME = 1e-9
+"""Relative difference of two periods that is rounding."""
+
 
 @dataclass(frozen=True)
 class ExportedLaw(Law):
     """A law whose forces come from exported C."""
+
+    linked: LinkedLaw | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedCustomLaw(CustomLaw):
+    """A law of one's own whose forces come from exported C."""
 
     linked: LinkedLaw | None = None
 
@@ -33,13 +44,14 @@ class Exported:
     ----------
     folder : path
         What `pteron.export_c(robot, [controller], folder)` wrote.
-    controller : Controller
+    controller : Controller or Custom
         Whose law it is, with its period.
 
     Raises
     ------
     DataError
-        If the folder has no C of the law, one of single precision, or one that commands motors.
+        If the folder has no C of the law, one of single precision, one that commands motors, or one
+        for another period.
 
     Examples
     --------
@@ -54,10 +66,10 @@ class Exported:
     """
 
     folder: str | Path
-    controller: Controller
+    controller: Controller | Custom
 
     def __post_init__(self) -> None:
-        if not isinstance(self.controller, Controller):
+        if not isinstance(self.controller, Controller | Custom):
             raise DataError(
                 f"controller: {self.controller!r} given, one of pteron.controllers expected"
             )
@@ -68,14 +80,14 @@ class Exported:
         """Time between two samples, s."""
         return self.controller.period
 
-    def law(self, model: RobotLike) -> ExportedLaw:
+    def law(self, model: RobotLike) -> ExportedLaw | ExportedCustomLaw:
         """Return its law, which runs in the loop alone."""
-        own = self.controller.law(model)
+        own, what = self.controller.law(model), self.controller.what
         header, source, function = self._text  # type: ignore[attr-defined]
         tables = []
         for port in own.program.inputs:
             if port.shared:
-                stem = function.removesuffix(own.what)
+                stem = function.removesuffix(what)
                 names = (f"{function}_{port.name}", f"{stem}{port.name}")
                 found = [n for n in names if re.search(rf"extern const double {n}\[", header)]
                 if not found:
@@ -90,9 +102,21 @@ class Exported:
                         "export the controller for this machine"
                     )
                 tables.append((port.name, found[0]))
+                self._expect_period(source, found[0])
         zeros, scales = reading_zeros(own.model).tolist(), reading_scales(own.model).tolist()
         linked = LinkedLaw(header + source, function, tuple(tables), tuple(zeros), tuple(scales))
+        if isinstance(own, CustomLaw):
+            return ExportedCustomLaw(own.controller, own.model, linked)
         return ExportedLaw(own.what, own.model, own.gains, own.base, linked)
+
+    def _expect_period(self, source: str, table: str) -> None:
+        """Refuse gains that are for another period."""
+        told = re.search(rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source)
+        if told and abs(float(told[1]) - self.period) > _SAME * self.period:
+            raise DataError(
+                f"{self.folder}: {table} is for a period of {float(told[1]):g} s, the controller's "
+                f"is {self.period:g} s; export it again, or give the controller that period"
+            )
 
     def _read(self) -> tuple[str, str, str]:
         """Return header and source, without the line that includes it, and the function."""

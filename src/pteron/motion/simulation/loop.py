@@ -16,7 +16,8 @@ from pteron.kernels import Array, Program
 from pteron.kernels.loops import Loop, loop, machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion, told_pose
-from pteron.motion.simulation.exported import ExportedLaw
+from pteron.motion.simulation.exported import ExportedCustomLaw, ExportedLaw
+from pteron.motion.simulation.given import within_motors
 from pteron.motion.simulation.plant import Adaptive, Method, motor_states
 from pteron.motion.simulation.sensors import (
     Sensors,
@@ -137,7 +138,7 @@ def run(
     time, m, n = reference.time, robot.freedom, robot.joint_count
     count, period = len(time), float(time[1] - time[0])
     times, counts = timing.parts(period, count)
-    linked = source.linked if isinstance(source, ExportedLaw) else None
+    linked = source.linked if isinstance(source, ExportedLaw | ExportedCustomLaw) else None
     law = source if isinstance(source, ProgramLaw) else None
     if law is not None:
         expect_sensed(robot, law.program)
@@ -181,6 +182,7 @@ def run(
     for k, name in enumerate(("joints", "joint_rates")):
         motor = name.replace("joint", "motor")
         columns[motor] = np.where(bends, more[k], columns[name]) if any(bends) else columns[name]
+    columns["forces"] = within_motors(robot, columns["forces"], columns["motor_rates"])
     why = None
     if fault == _ASKED:
         why = (

@@ -7,17 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.arguments import expect
-from pteron.equations.drives import Drives, drive_numbers
+from pteron.equations.drives import Drives, drive_names, drive_numbers
 from pteron.equations.machine import numbers
 from pteron.equations.variations import variations, varied_numbers
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
-from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data, parameters
+from pteron.manipulator import (
+    Manipulator,
+    RobotLike,
+    as_manipulator,
+    parameter_data,
+    parameter_names,
+    parameters,
+)
 from pteron.motion.payload import with_payload
 from pteron.shapes import Seed
 
 _MOST = 10_000_000
 """Most machines at once."""
+
+_POSITIVE = ("m", "I", "Ixx", "Iyy", "Izz")
+"""Kinds of inertial parameters that no body has below 0."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +66,31 @@ class Machines:
             sizes["geometry"] = count, len(numbers(self.robot))
         for name, shape in sizes.items():
             given = as_array(getattr(self, name), name, ())
-            if given.shape != shape or not np.isfinite(given).all():
-                raise DataError(
-                    f"{name}: shape {given.shape} given, finite numbers of shape {shape} expected"
-                )
+            if given.shape != shape:
+                raise DataError(f"{name}: shape {given.shape} given, shape {shape} expected")
             object.__setattr__(self, name, given)
-        if (self.payload < 0.0).any():
-            raise DataError(f"payload: {self.payload.min():g} given, 0 kg or more expected")
+        for name in sizes:
+            self._expect_numbers(name)
+
+    def _expect_numbers(self, name: str) -> None:
+        """Refuse numbers that no machine has, and say whose the first of them is."""
+        given, columns = getattr(self, name), tuple[str, ...]()
+        least = np.full(given.shape[-1], 0.0 if name == "payload" else -np.inf)
+        if name == "parameters":
+            columns = parameter_names(self.robot)
+            positive = [data.kind in _POSITIVE for data in parameter_data(self.robot)]
+            least[positive] = 0.0
+        elif name == "drives":
+            columns = drive_names(self.robot)
+            least[[not column.startswith("offset_") for column in columns]] = 0.0
+        wrong = ~(np.isfinite(given) & (given >= least))
+        if wrong.any():
+            at = tuple(np.argwhere(wrong)[0].tolist())
+            which = f", {columns[at[1]]}" if columns else ""
+            wanted = "0 or more" if least[at[-1]] == 0.0 else "a finite number"
+            raise DataError(
+                f"{name}: machine {at[0]}{which}: {given[at]:g} given, {wanted} expected"
+            )
 
     def __len__(self) -> int:
         return len(self.payload)

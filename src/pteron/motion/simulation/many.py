@@ -19,9 +19,9 @@ from pteron.kernels.samples import Evaluated
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
+from pteron.motion.simulation.given import within_motors
 from pteron.motion.simulation.loop import Timing, loop_arrays
 from pteron.motion.simulation.machines import Machines
-from pteron.motion.simulation.plant import allowed_step
 from pteron.motion.simulation.sensors import (
     Sensors,
     encoder_memory,
@@ -29,6 +29,7 @@ from pteron.motion.simulation.sensors import (
     expect_sensed,
 )
 from pteron.motion.simulation.simulate import STEP, check_delay, check_positive, reference_of
+from pteron.motion.simulation.stable_steps import allowed_step
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -155,7 +156,7 @@ def simulate_many(
     timing = Timing(
         delay,
         "rk4",
-        allowed_step(robot, about, step, usual=step == STEP),
+        allowed_step(robot, about, step, usual=step == STEP, machines=machines),
         1e-10,
         sensors.delay + sensors.samples * controller.period,
     )
@@ -175,7 +176,7 @@ def simulate_many(
         arrays |= {name: np.repeat(alone[name], len(part), axis=0) for name in STATE}
         if part.geometry is not None:
             arrays |= _begun(made, part, arrays, controller.period)
-        sizes = {"states": alone["state"].shape[2], "joints": n, "forces": n}
+        sizes = {"states": alone["state"].shape[2], "joints": n, "rates": n, "forces": n}
         samples = {name: np.full((len(part), count, k), np.nan) for name, k in sizes.items()}
         made.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
         done = arrays["done"][:, 0]
@@ -186,6 +187,11 @@ def simulate_many(
         came = np.where(done[:, 0] > 0.0, done[:, 0], np.nan)
         found["rms"].append(np.sqrt(np.nansum(error**2, axis=1) / came[:, None]))
         found["most"].append(np.fmax.reduce(np.abs(error), axis=1))
+        rates = samples["rates"]
+        if made.kind.bends:
+            moving = samples["states"][..., 2 * m + n : 2 * m + 2 * n]
+            rates = np.where(made.kind.elastic, moving, rates)
+        samples["forces"] = within_motors(robot, samples["forces"], rates)
         force = np.abs(samples["forces"])
         force[gone] = np.nan
         found["force"].append(np.fmax.reduce(force, axis=1))

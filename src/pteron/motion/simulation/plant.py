@@ -1,4 +1,4 @@
-"""The plant: the motion of machines under their drives' forces, and how long steps may be."""
+"""The plant: the motion of machines under their drives' forces."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
 from pteron.arguments import expect
-from pteron.dynamics import inverse_dynamics, mass_matrix
-from pteron.equations.drives import drives_of
+from pteron.dynamics import inverse_dynamics
 from pteron.equations.transmissions import DriveKind
-from pteron.errors import DataError, PteronError, shown
+from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.kernel import broadcast_lead
 from pteron.kernels.loops import loop
-from pteron.kinematics import inverse_kinematics, jacobian, joint_rates
+from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.simulation.machines import Machines
 from pteron.shapes import PoseLike
@@ -28,15 +27,6 @@ Method = Literal["rk4", "dop853"]
 
 Loads = Mapping[str, Array]
 """Forces of the drives and wrench on the platform by name, of B machines: (B, size)."""
-
-_STABLE = 2.0
-"""Greatest product of a step and the fastest decay rate, 1/s.
-
-Runge and Kutta's method of fourth order is stable to 2.78.
-"""
-
-_SHORTEST = 1e-8
-"""A step that must be shorter than this, s, points to a mistake in the drives' numbers."""
 
 
 def advance(
@@ -178,118 +168,6 @@ def motor_states(
     return {name: found[name] for name, _ in kind.more}
 
 
-def longest_step(robot: RobotLike, poses: PoseLike) -> float:
-    """Return the longest stable step, s: infinite for a machine whose drives have no such rates.
-
-    Viscous friction makes rates decay, transmissions that bend make motors and joints vibrate,
-    and currents lag behind: steps must follow the fastest of these. Dry friction asks for no short
-    steps. The poses, (..., m), are those where the machine may be.
-    """
-    return _fastest(as_manipulator(robot), poses)[0]
-
-
-def _fastest(robot: Manipulator, poses: PoseLike) -> tuple[float, str]:
-    """Return the longest stable step, and what asks for it, as the beginning of a sentence."""
-    own, kind = drives_of(robot), DriveKind.of(robot)
-    found = float("inf"), ""
-    if own.viscous.any() or kind.bends:
-        rates, vectors = modes(robot, poses)
-        fastest = int(np.abs(rates).argmax())
-        rate = float(np.abs(rates.flat[fastest]))
-        if rate > 0.0:
-            found = _STABLE / rate, "viscous friction"
-            if kind.bends:
-                shapes = np.moveaxis(vectors, -1, -2).reshape(-1, robot.joint_count)
-                at = int(np.abs(shapes[fastest]).argmax())
-                found = found[0], f"leg {at + 1}: the stiffness of its transmission"
-    if any(kind.lugre):
-        rows, rotors = jacobian(robot, poses), np.diag(np.where(kind.elastic, 0.0, own.inertia))
-        mass = mass_matrix(robot, poses) + rows.mT @ rotors @ rows
-        moved = np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT))
-        for i, leg in enumerate(robot.legs):
-            if leg.drive and leg.drive.lugre:
-                ease = float(1.0 / own.inertia[i] if kind.elastic[i] else moved[..., i].max())
-                # A bound on the eigenvalue of a spring with a damper.
-                bristle = leg.drive.lugre
-                rate = np.sqrt(bristle.stiffness * ease) + bristle.damping * ease
-                if _STABLE / rate < found[0]:
-                    found = float(_STABLE / rate), f"leg {i + 1}: the stiffness of its bristles"
-    for i, leg in enumerate(robot.legs, start=1):
-        lag = leg.drive and leg.drive.current_time
-        if lag and _STABLE * lag < found[0]:
-            found = _STABLE * lag, f"leg {i}: the current's time constant"
-    return found
-
-
-def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
-    """Return the eigenvalues of a machine with its drives, linear about rest at poses.
-
-    The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d what each
-    transmission is bent; play, dry friction and gravity's change with the pose are left out.
-
-    Parameters
-    ----------
-    robot : Manipulator, name or path
-        The machine.
-    poses : array, shape (..., m)
-        m and rad.
-
-    Returns
-    -------
-    eigenvalues : array of complex, shape (..., K)
-        1/s, K twice the number of coordinates and of motors that move by themselves.
-    bent : array of complex, shape (..., n, K)
-        What each transmission is bent in each mode.
-
-    Raises
-    ------
-    UnreachablePose, SingularPose
-        If a leg does not reach a pose, or is singular there.
-
-    Examples
-    --------
-    >>> import numpy as np, pteron
-    >>> from dataclasses import replace
-    >>> from pteron.motion import modes
-    >>> robot = pteron.load("tripteron")
-    >>> bends = pteron.legs.Drive(rotor_inertia=0.5, elastic=pteron.legs.Elastic(stiffness=2e5))
-    >>> robot = replace(robot, legs=tuple(replace(leg, drive=bends) for leg in robot.legs))
-    >>> np.sort(modes(robot, np.zeros(3))[0].imag)[-3:].round()  # rad/s
-    array([686., 686., 699.])
-    """
-    robot = as_manipulator(robot)
-    own = drives_of(robot)
-    bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
-    stiffness, damping = (
-        np.array([getattr(one, name) if one else 0.0 for one in bends])
-        for name in ("stiffness", "damping")
-    )
-    soft = np.array([one is not None for one in bends])
-    rows = jacobian(robot, poses)
-    m, n = robot.freedom, robot.joint_count
-    every = np.eye(n)[soft]
-    bent = np.concatenate([-rows, np.broadcast_to(every.T, (*rows.shape[:-2], n, len(every)))], -1)
-    rigid = np.where(soft, 0.0, 1.0)
-
-    def whole(joints: Array, motors: Array, springs: Array) -> Array:
-        found: Array = bent.mT @ (springs[:, None] * bent)
-        found[..., :m, :m] += rows.mT @ (joints[:, None] * rows)
-        found[..., m:, m:] += np.diag(motors[soft])
-        return found
-
-    mass = whole(rigid * own.inertia, own.inertia, np.zeros(n))
-    mass[..., :m, :m] += mass_matrix(robot, poses)
-    drag = whole(rigid * own.viscous, own.viscous, damping)
-    pull = whole(np.zeros(n), np.zeros(n), stiffness)
-    size = m + len(every)
-    system = np.zeros((*rows.shape[:-2], 2 * size, 2 * size))
-    system[..., :size, size:] = np.eye(size)
-    system[..., size:, :size] = -np.linalg.solve(mass, pull)
-    system[..., size:, size:] = -np.linalg.solve(mass, drag)
-    rates, vectors = np.linalg.eig(system)
-    return rates, np.where(soft[:, None], bent @ vectors[..., :size, :], 0.0)
-
-
 _FINEST = 100.0 * float(np.finfo(float).eps)
 """The smallest relative error of a step that SciPy serves."""
 
@@ -335,25 +213,3 @@ class Adaptive:
         clock += solver.t
         state[:] = solver.y
         alive[:] = solver.status == "finished"
-
-
-def allowed_step(robot: Manipulator, poses: Array, step: float, *, usual: bool = True) -> float:
-    """Return the given step, or the longest that is stable, or refuse it.
-
-    The `usual` step, and any that only viscous friction forbids, is made shorter.
-    """
-    try:
-        longest, why = _fastest(robot, poses)
-    except PteronError:
-        return step  # the first sample says what is wrong with the pose
-    if longest < _SHORTEST:
-        raise DataError(
-            f"drives: {why} asks for steps below {_SHORTEST:g} s; make "
-            + ("viscous smaller" if why.startswith("viscous") else "it softer, or slower")
-        )
-    if step > longest and why.startswith("leg") and not usual:
-        raise DataError(
-            f"step: {step:g} s given, but {why} asks for {longest:.2g} s at most; give a shorter "
-            "one, or none"
-        )
-    return min(step, longest)

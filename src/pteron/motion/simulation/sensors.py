@@ -87,16 +87,13 @@ def encoder_arrays(
         rates = np.concatenate([rates, np.where(soft, state["motor_rate"], rates)])
         steps, noises = np.concatenate([steps, fine]), np.tile(noises, 2)
         round_ = np.concatenate([round_, np.where(soft, 0.0, round_)])
-    share = 1.0
-    if sensors.cutoff is not None:
-        share = -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
     at = [encoder_of(leg.drive) for leg in robot.legs]
     found = {
         "encoders": encoder_memory(joints, rates, steps, period),
         "steps": steps,
         "noises": noises,
         "round": round_,
-        "share": np.array([share]),
+        "share": np.array([_share(sensors, period)]),
         "at_motor": np.array(
             [*(float(e == "motor") for e in at), *(float(e in ("motor", "both")) for e in at)]
         ),
@@ -130,6 +127,28 @@ def encoder_noise(
 def encoder_of(drive: Drive | None) -> str:
     """Return where a drive's encoder is: "motor", "joint" or "both"; a rigid one has both."""
     return drive.elastic.encoder if drive and drive.elastic else "rigid"
+
+
+def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
+    """Return what a sample's difference counts in each rate that is told (n,), NaN: it is exact.
+
+    A rate is that of the differences of its encoder where this rounds or is noisy, and it is the
+    motor's where the drive tells the motor's.
+    """
+    count = robot.joint_count
+    at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
+    given = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
+    steps, noises, fine = (_per_joint(value, key, count) for key, value in given.items())
+    motors = [encoder_of(leg.drive) in ("motor", "both") for leg in robot.legs]
+    rough = np.where(motors, fine, steps) + noises > 0.0
+    return np.where(rough, _share(sensors, period), np.nan)
+
+
+def _share(sensors: Sensors, period: float) -> float:
+    """Return what a sample's difference counts in a rate, by the filter's cut-off."""
+    if sensors.cutoff is None:
+        return 1.0
+    return -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
 
 
 def expect_sensed(robot: Manipulator, law: Program) -> None:

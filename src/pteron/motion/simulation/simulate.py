@@ -18,9 +18,10 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
 from pteron.motion.simulation.loop import ControlLaw, Loads, Timing, run
-from pteron.motion.simulation.plant import Method, allowed_step
+from pteron.motion.simulation.plant import Method
 from pteron.motion.simulation.sensors import Sensors
 from pteron.motion.simulation.simulation import Simulation
+from pteron.motion.simulation.stable_steps import allowed_step
 from pteron.shapes import JointsLike, PoseLike
 
 STEP = 1e-4

@@ -12,6 +12,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import reading_scales, to_readings
 from pteron.motion.motion import Motion
+from pteron.motion.simulation.given import within_motors
 from pteron.motion.trajectories.limits import limits_of
 
 if TYPE_CHECKING:
@@ -35,7 +36,8 @@ class Simulation:
     motors, motor_rates : array, shape (T, n)
         Those of the motors, counted at the joints, which differ where transmissions bend.
     forces : array, shape (T, n)
-        Forces of the drives from this sample on, limits and delay included; N, N m at cranks.
+        Forces of the drives from this sample on, limits and delay included, those of motors' curves
+        and windings too; N, N m at cranks. Currents that lag come to them; ripple is beside them.
     asked : array, shape (T, n)
         Forces that the controller asked for at this sample.
     reference : Motion
@@ -116,6 +118,7 @@ class Simulation:
     def saturated(self) -> Array:
         """Share of the samples, (n,), in which a drive could not give what was asked for."""
         beyond = np.abs(self.asked) > limits_of(self.robot).force
+        beyond |= np.abs(within_motors(self.robot, self.asked, self.motor_rates) - self.asked) > 0.0
         return np.asarray(beyond.mean(axis=0))
 
     def table(self) -> pl.DataFrame:

@@ -31,16 +31,16 @@ class SampledLoop:
         s.
     delay : float
         From a sample to the drives' force, s.
-    share : float, optional
+    share : float or array, shape (n,), optional
         What a sample's difference counts in a rate, by the filter's cut-off, 1 without a filter;
-        None where rates are exact.
+        NaN where a rate is exact, as all are by default.
     """
 
     plant: LinearPlant
     law: LinearLaw
     period: float
     delay: float = 0.0
-    share: float | None = None
+    share: float | Array | None = None
 
     def opened(self, more: float = 0.0) -> tuple[Array, Array, Array]:
         """Return (F, G, H) of s' = F s + G u, asked = H s: the loop opened at all drives.
@@ -53,7 +53,9 @@ class SampledLoop:
         moved, after = self.plant.held(period - late)
         early, before = self.plant.held(late)
         free, before = moved @ early, moved @ before
-        told = self.share is not None
+        shares = np.broadcast_to(np.nan if self.share is None else self.share, n)
+        rough = np.isfinite(shares)
+        told = bool(rough.any())
         sizes = [len(free), 2 * n * told, len(law.matrix), *[n] * (whole + 1)]
         places = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
         state, last, memory, *waiting = places
@@ -62,10 +64,12 @@ class SampledLoop:
         measured = np.zeros((2 * n, size))
         measured[:, state] = self.plant.outputs
         if told:
-            share = float(self.share or 1.0)
-            measured[n:] = 0.0
-            measured[n:, state] = share / period * self.plant.differenced
-            measured[n:, last] = np.hstack([-share / period * np.eye(n), (1 - share) * np.eye(n)])
+            share = np.diag(np.where(rough, shares, 1.0))
+            measured[n:][rough] = 0.0
+            differences = np.zeros((n, size))
+            differences[:, state] = share @ self.plant.differenced / period
+            differences[:, last] = np.hstack([-share / period, np.eye(n) - share])
+            measured[n:][rough] = differences[rough]
         asked = law.feedthrough @ measured
         asked[:, memory] += law.outputs
         matrix, inputs = np.zeros((size, size)), np.zeros((size, n))

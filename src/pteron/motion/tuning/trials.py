@@ -99,7 +99,7 @@ def trial(
     errors = np.linalg.norm(off, axis=-1)
     most = limits_of(robot).force
     shares = found.forces / np.where(np.isfinite(most), most, 1.0)
-    power = np.maximum(found.forces * found.joint_rates, 0.0).sum(axis=-1)
+    power = np.maximum(found.forces * found.motor_rates, 0.0).sum(axis=-1)
     return Trial(
         float(errors[moving].max()),
         float(np.sqrt((errors[moving] ** 2).mean())),

@@ -20,6 +20,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, told_pose
 from pteron.motion.payload import with_payload
 from pteron.motion.simulation import Sensors
+from pteron.motion.simulation.sensors import rate_shares
 from pteron.motion.tuning.linear_law import linearised_law
 from pteron.motion.tuning.linear_plant import linearised
 from pteron.motion.tuning.margins import Margins
@@ -219,22 +220,13 @@ def tune(
         required,
         states,
         [linearised(robot, *state) for state in states],
-        {"delay": late, "share": _share(sensors, controller.period)},
+        {"delay": late, "share": rate_shares(sensors, robot, controller.period)},
     )
     chosen = search.chosen()
     every = range(len(states))
     loops = tuple(search.loop(chosen, i) for i in every)
     found = tuple(Margins(loop) for loop in loops)
     return Tuning(robot, chosen, required, states, moments, loops, found)
-
-
-def _share(sensors: Sensors, period: float) -> float | None:
-    """Return what a difference counts in a rate; None where rates are exact."""
-    if not np.any(sensors.encoder):
-        return None
-    if sensors.cutoff is None:
-        return 1.0
-    return -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
 
 
 def _states(robot: Manipulator, motion: Motion | None, poses: Array | None) -> tuple[Array, Array]:

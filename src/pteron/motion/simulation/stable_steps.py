@@ -1,0 +1,218 @@
+"""How long steps may be: the linear machine's modes, and the step that all its rates bear."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pteron.dynamics import mass_matrix
+from pteron.equations.drives import Drives, drives_of
+from pteron.equations.transmissions import DriveKind
+from pteron.errors import DataError, PteronError
+from pteron.kernels import Array, as_array, program
+from pteron.kernels.samples import Evaluated
+from pteron.kinematics import jacobian
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.simulation.machines import Machines
+from pteron.shapes import PoseLike
+
+_STABLE = 2.0
+"""Greatest product of a step and the fastest decay rate, 1/s.
+
+Runge and Kutta's method of fourth order is stable to 2.78.
+"""
+
+_SHORTEST = 1e-8
+"""A step that must be shorter than this, s, points to a mistake in the drives' numbers."""
+
+
+def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = None) -> float:
+    """Return the longest stable step, s: infinite for a machine whose drives have no such rates.
+
+    Viscous friction makes rates decay, as a winding's supply does at its limit, transmissions that
+    bend make motors and joints vibrate, and currents lag behind: steps must follow the fastest of
+    these. Dry friction asks for no short steps. The poses, (..., m), are those where the machine
+    may be. Of several machines it is the step that all bear, at the pose where joints are lightest.
+    """
+    return _fastest(as_manipulator(robot), poses, machines)[0]
+
+
+def _fastest(
+    robot: Manipulator, poses: PoseLike, machines: Machines | None = None
+) -> tuple[float, str]:
+    """Return the longest stable step, and what asks for it, as the beginning of a sentence."""
+    kind, own = DriveKind.of(robot), drives_of(robot)
+    if machines is not None:
+        parts = machines.drives.reshape(len(machines), len(own), -1)
+        own = Drives(*np.moveaxis(parts, 1, 0))
+    own = own._replace(viscous=own.viscous + _braking(robot))
+    found = float("inf"), ""
+    if own.viscous.any() or kind.bends or any(kind.lugre):
+        rows, mass = jacobian(robot, poses), mass_matrix(robot, poses)
+        if machines is not None:
+            at = np.einsum("...ij,...ji->...", rows, np.linalg.solve(mass, rows.mT)).argmax()
+            rows = rows.reshape(-1, *rows.shape[-2:])[at]
+            places = as_array(poses, "poses", (robot.freedom,)).reshape(-1, robot.freedom)
+            each = Evaluated("mass", program(robot, "mass_matrix"))(
+                {"pose": np.tile(places[at], (len(machines), 1))},
+                {"mass_parameters": machines.loaded[:, None]},
+            )
+            mass = next(iter(each.values())).reshape(-1, *mass.shape[-2:])
+        found = _longest(robot, rows, mass, own)
+    for i, leg in enumerate(robot.legs, start=1):
+        lag = leg.drive and leg.drive.current_time
+        if lag and _STABLE * lag < found[0]:
+            found = _STABLE * lag, f"leg {i}: the current's time constant"
+    return found
+
+
+def _braking(robot: Manipulator) -> Array:
+    """Return by how much the windings' force falls with the rate at their supply's limit, (n,)."""
+    found = np.zeros(robot.joint_count)
+    for i, leg in enumerate(robot.legs):
+        if leg.drive and leg.drive.winding:
+            winding = leg.drive.winding
+            found[i] = (leg.drive.gear * winding.torque_constant) ** 2 / winding.resistance
+    return found
+
+
+def _longest(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple[float, str]:
+    """Return the longest step and why, of J, M and drives at some poses or of some machines."""
+    kind, found = DriveKind.of(robot), (float("inf"), "")
+    if own.viscous.any() or kind.bends:
+        system, bent = _linear(robot, rows, mass, own)
+        rates, vectors = np.linalg.eig(system)
+        fastest = int(np.abs(rates).argmax())
+        rate = float(np.abs(rates.flat[fastest]))
+        if rate > 0.0:
+            found = _STABLE / rate, "viscous friction"
+            if kind.bends:
+                shapes = np.moveaxis(bent @ vectors[..., : bent.shape[-1], :], -1, -2)
+                soft = np.abs(shapes.reshape(-1, robot.joint_count)[fastest]) * kind.elastic
+                found = found[0], f"leg {soft.argmax() + 1}: the stiffness of its transmission"
+    if any(kind.lugre):
+        rotors = np.where(kind.elastic, 0.0, own.inertia)
+        mass = mass + rows.mT @ (rotors[..., None] * rows)
+        moved = np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT))
+        for i, leg in enumerate(robot.legs):
+            if leg.drive and leg.drive.lugre:
+                ease = 1.0 / own.inertia[..., i] if kind.elastic[i] else moved[..., i]
+                # A bound on the eigenvalue of a spring with a damper.
+                bristle = leg.drive.lugre
+                rate = float(np.max(np.sqrt(bristle.stiffness * ease) + bristle.damping * ease))
+                if _STABLE / rate < found[0]:
+                    found = _STABLE / rate, f"leg {i + 1}: the stiffness of its bristles"
+    return found
+
+
+def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
+    """Return the eigenvalues of a machine with its drives, linear about rest at poses.
+
+    The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d what each
+    transmission is bent; play, dry friction and gravity's change with the pose are left out.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    poses : array, shape (..., m)
+        m and rad.
+
+    Returns
+    -------
+    eigenvalues : array of complex, shape (..., K)
+        1/s, K twice the number of coordinates and of motors that move by themselves.
+    bent : array of complex, shape (..., n, K)
+        What each transmission is bent in each mode.
+
+    Raises
+    ------
+    UnreachablePose, SingularPose
+        If a leg does not reach a pose, or is singular there.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from dataclasses import replace
+    >>> from pteron.motion import modes
+    >>> robot = pteron.load("tripteron")
+    >>> bends = pteron.legs.Drive(rotor_inertia=0.5, elastic=pteron.legs.Elastic(stiffness=2e5))
+    >>> robot = replace(robot, legs=tuple(replace(leg, drive=bends) for leg in robot.legs))
+    >>> np.sort(modes(robot, np.zeros(3))[0].imag)[-3:].round()  # rad/s
+    array([686., 686., 699.])
+    """
+    robot = as_manipulator(robot)
+    rows, mass = jacobian(robot, poses), mass_matrix(robot, poses)
+    system, bent = _linear(robot, rows, mass, drives_of(robot))
+    rates, vectors = np.linalg.eig(system)
+    soft = np.array(DriveKind.of(robot).elastic)
+    return rates, np.where(soft[:, None], bent @ vectors[..., : bent.shape[-1], :], 0.0)
+
+
+def _linear(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple[Array, Array]:
+    """Return the linear machine's matrix (..., 2 K, 2 K), and what bends of its K coordinates."""
+    bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
+    stiffness, damping = (
+        np.array([getattr(one, name) if one else 0.0 for one in bends])
+        for name in ("stiffness", "damping")
+    )
+    soft = np.array([one is not None for one in bends])
+    m, n = robot.freedom, robot.joint_count
+    every = np.eye(n)[soft]
+    bent = np.concatenate([-rows, np.broadcast_to(every.T, (*rows.shape[:-2], n, len(every)))], -1)
+    rigid = np.where(soft, 0.0, 1.0)
+
+    def whole(joints: Array, motors: Array, springs: Array) -> Array:
+        moved = rows.mT @ (joints[..., None] * rows)
+        pulled = bent.mT @ (springs[:, None] * bent)
+        found = np.zeros(
+            np.broadcast_shapes(moved.shape[:-2], pulled.shape[:-2]) + pulled.shape[-2:]
+        )
+        found += pulled
+        found[..., :m, :m] += moved
+        found[..., m:, m:] += motors[..., soft, None] * np.eye(len(every))
+        return found
+
+    inertia = whole(rigid * own.inertia, own.inertia, np.zeros(n))
+    inertia = np.broadcast_to(inertia, (*mass.shape[:-2], *inertia.shape[-2:])).copy()
+    inertia[..., :m, :m] += mass
+    drag = whole(rigid * own.viscous, own.viscous, damping)
+    pull = whole(np.zeros(n), np.zeros(n), stiffness)
+    size = m + len(every)
+    system = np.zeros((*inertia.shape[:-2], 2 * size, 2 * size))
+    system[..., :size, size:] = np.eye(size)
+    system[..., size:, :size] = -np.linalg.solve(inertia, pull)
+    system[..., size:, size:] = -np.linalg.solve(inertia, drag)
+    return system, bent
+
+
+def allowed_step(
+    robot: Manipulator,
+    poses: Array,
+    step: float,
+    *,
+    usual: bool = True,
+    machines: Machines | None = None,
+) -> float:
+    """Return the given step, or the longest that is stable for a machine or many, or refuse it.
+
+    The `usual` step, and any that only viscous friction forbids, is made shorter.
+    """
+    try:
+        longest, why = _fastest(robot, poses, machines)
+    except PteronError:
+        return step  # the first sample says what is wrong with the pose
+    if longest < _SHORTEST:
+        raise DataError(
+            f"drives: {why} asks for steps below {_SHORTEST:g} s; make "
+            + ("viscous smaller" if why.startswith("viscous") else "it softer, or slower")
+        )
+    if step > longest and why.startswith("leg") and not usual:
+        digit = 10.0 ** (math.floor(math.log10(longest)) - 1)
+        longest = digit * math.floor(longest / digit)  # what is told is not refused
+        raise DataError(
+            f"step: {step:g} s given, but {why} asks for {longest:.2g} s at most; give a shorter "
+            "one, or none"
+        )
+    return min(step, longest)
