@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from pteron.errors import PteronError, shown
+from pteron.errors import ModelError, PteronError, shown
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -153,6 +153,33 @@ def told(lines: Sequence[str]) -> str:
         return lines[0]
     more = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
     return "\n  ".join([f"{len(lines)} faults", *lines[:_MANY], *more])
+
+
+def refuse(faults: Sequence[str]) -> None:
+    """Raise one `ModelError` of all faults, if there are any."""
+    if faults:
+        raise ModelError(told(faults), faults=faults)
+
+
+def keep_checked(
+    part: object, checks: Mapping[str, Callable[[Any, str], object]], faults: Iterable[str] = ()
+) -> None:
+    """Check the fields of a frozen dataclass, and keep them as the checks return them.
+
+    A check takes a field's value and name. `faults` are told with those that the checks find.
+
+    Raises
+    ------
+    ModelError
+        If there are faults: it lists all of them.
+    """
+    found = [*faults]
+    for name, check in checks.items():
+        try:
+            object.__setattr__(part, name, check(getattr(part, name), name))
+        except ModelError as error:
+            found += error.faults
+    refuse(found)
 
 
 def fault_lines(

@@ -50,6 +50,14 @@ def positive(value: object, key: str, unit: str) -> float:
     return result
 
 
+def not_negative(value: object, key: str, unit: str) -> float:
+    """Return `value` as a float of zero or more."""
+    result = number(value, key)
+    if result < 0.0:
+        raise ModelError(f"{key}: {result:g} {unit} is negative; give 0 or more")
+    return result
+
+
 def numbers(values: Sequence[object], key: str, count: int) -> tuple[float, ...]:
     """Return `values` as a tuple of `count` finite floats."""
     try:

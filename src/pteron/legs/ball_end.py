@@ -1,4 +1,4 @@
-"""Keys, cone, hinges and plane of legs that end in a ball joint at a tilting platform."""
+"""Cone, hinges and plane of legs that end in a ball joint at a tilting platform."""
 
 from __future__ import annotations
 
@@ -9,23 +9,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression, HeldPlane, RotationMotion
 from pteron.bodies.vectors import Vector
 from pteron.legs.cones import Cone, within_cone
-from pteron.legs.keys import Key
 from pteron.legs.leg import Joint, LegMotion, Passive
-
-UPRIGHT = Key(
-    "direction",
-    "d, of the revolute axes: the normal, across the platform's axis, of the plane that the leg "
-    "keeps its point in",
-)
-
-BALL_KEYS: dict[str, Key] = {
-    "platform_cone": Key(
-        "cone",
-        "how far the last link may lean at the platform; axis in the platform frame",
-        default=None,
-        example={"axis": [0.0, 0.0, -1.0], "angle": 0.8},
-    ),
-}
 
 
 def every_axis() -> tuple[Vector, ...]:

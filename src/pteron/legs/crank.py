@@ -27,7 +27,6 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector, cross, moved, scaled, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
 from pteron.legs.drive import Drive
-from pteron.legs.keys import Key
 from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
 from pteron.legs.reading import Reading
@@ -42,32 +41,6 @@ ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
 }
 """A transfer of mass between the links at the joint that both carry: for each parameter its sign
 and the lengths that multiply it (`Transfer.entries`)."""
-
-
-CRANK_KEYS: dict[str, Key] = {
-    "guide_point": Key("point", "r, the centre of the crank's circle, m"),
-    "direction": Key("direction", "d, the crank's axis: its angle counts by the right hand"),
-    "zero_direction": Key(
-        "direction",
-        "a, where the crank points at angle 0: perpendicular to direction",
-        across="direction",
-    ),
-    "upper_length": Key("length", "lu, of the crank, m"),
-    "elbow": Key(
-        "sign",
-        "sigma: 1 where the crank is turned by the right hand about direction from the line to "
-        "the platform point, -1 where by the left",
-        default=1,
-    ),
-    "limits": Key(
-        "limits",
-        "least and greatest crank angle, rad",
-        default=None,
-        example=[-1.0, 1.0],
-    ),
-    "upper": Key("planar", "the crank: origin on its axis, x along it to the elbow", "u"),
-}
-"""The keys that legs with a crank share."""
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import Literal
 
 from pteron.bodies.vectors import number
 from pteron.errors import ModelError, shown
-from pteron.toml import told
+from pteron.toml import keep_checked, refuse
+
+
+def _expected(
+    holds: Callable[[float], bool], wanted: str, optional: bool = True
+) -> Callable[[object, str], float | None]:
+    """Return the check of a number: None is one that is left out."""
+
+    def check(value: object, key: str) -> float | None:
+        if value is None and optional:
+            return None
+        found = number(value, key)
+        if not holds(found):
+            raise ModelError(f"{key}: {found:g} given, {wanted} expected")
+        return found
+
+    return check
+
+
+_least = _expected(lambda value: value >= 0.0, "0 or more", optional=False)
+_above = _expected(lambda value: value > 0.0, "a number above 0")
+_nonzero = _expected(lambda value: value != 0.0, "another number than 0")
 
 
 @dataclass(frozen=True)
@@ -27,7 +49,7 @@ class Stribeck:
     speed: float
 
     def __post_init__(self) -> None:
-        _check(self, least=("force",), above=("speed",))
+        keep_checked(self, {"force": _least, "speed": _above})
 
 
 @dataclass(frozen=True)
@@ -49,7 +71,7 @@ class LuGre:
     damping: float = 0.0
 
     def __post_init__(self) -> None:
-        _check(self, least=("damping",), above=("stiffness",))
+        keep_checked(self, {"damping": _least, "stiffness": _above})
 
 
 @dataclass(frozen=True)
@@ -71,13 +93,14 @@ class Elastic:
     stiffness: float
     damping: float = 0.0
     backlash: float = 0.0
-    encoder: str = "motor"
+    encoder: Literal["motor", "joint", "both"] = "motor"
 
     def __post_init__(self) -> None:
-        _check(self, least=("damping", "backlash"), above=("stiffness",))
+        keep_checked(self, {"damping": _least, "backlash": _least, "stiffness": _above})
         if self.encoder not in ("motor", "joint", "both"):
-            text = f'encoder: {self.encoder!r} given, "motor", "joint" or "both" expected'
-            raise ModelError(text, faults=[text])
+            raise ModelError(
+                f'encoder: {self.encoder!r} given, "motor", "joint" or "both" expected'
+            )
 
 
 @dataclass(frozen=True)
@@ -99,7 +122,7 @@ class Winding:
     voltage: float
 
     def __post_init__(self) -> None:
-        _check(self, above=("resistance", "torque_constant", "voltage"))
+        keep_checked(self, dict.fromkeys(("resistance", "torque_constant", "voltage"), _above))
 
 
 @dataclass(frozen=True)
@@ -121,7 +144,7 @@ class Wave:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        _check(self, free=("size", "phase"), above=("order",))
+        keep_checked(self, {"size": number, "phase": number, "order": _above})
 
 
 @dataclass(frozen=True)
@@ -188,22 +211,19 @@ class Drive:
 
     def __post_init__(self) -> None:
         faults = self._wrong_parts()
+        above = ("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn")
+        checks = {
+            "offset": number,
+            **dict.fromkeys(("coulomb", "viscous", "rotor_inertia"), _least),
+            **dict.fromkeys((*above, "current_time"), _above),
+            "ratio": _nonzero,
+        }
         try:
-            _check(
-                self,
-                free=("offset",),
-                least=("coulomb", "viscous", "rotor_inertia"),
-                above=(
-                    *("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn"),
-                    "current_time",
-                ),
-                nonzero=("ratio",),
-            )
+            keep_checked(self, checks)
         except ModelError as error:
             faults += error.faults
         faults += self._contradictions({fault.split(":")[0] for fault in faults})
-        if faults:
-            raise ModelError(told(faults), faults=faults)
+        refuse(faults)
 
     def _wrong_parts(self) -> list[str]:
         """Return what is said of what is none of the parts of a drive; its lists become tuples."""
@@ -274,31 +294,3 @@ class Drive:
     def rated_force(self) -> float | None:
         """The motor's rated torque at the joint, N or N m."""
         return None if self.rated_torque is None else abs(self.gear) * self.rated_torque
-
-
-def _check(
-    part: Any,
-    free: tuple[str, ...] = (),
-    least: tuple[str, ...] = (),
-    above: tuple[str, ...] = (),
-    nonzero: tuple[str, ...] = (),
-) -> None:
-    """Make a dataclass' fields floats: any, at least zero, above zero or None, not zero or None."""
-    faults: list[str] = []
-    for name in (*free, *least, *above, *nonzero):
-        given = getattr(part, name)
-        if given is None and name in (*above, *nonzero):
-            continue
-        try:
-            value = number(given, name)
-        except ModelError as error:
-            faults += error.faults
-            continue
-        object.__setattr__(part, name, value)
-        if name in least and value < 0.0:
-            faults.append(f"{name}: {value:g} given, 0 or more expected")
-        elif (name in above and value <= 0.0) or (name in nonzero and value == 0.0):
-            wanted = "another number than 0" if name in nonzero else "a number above 0"
-            faults.append(f"{name}: {value:g} given, {wanted} expected")
-    if faults:
-        raise ModelError(told(faults), faults=faults)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from importlib.resources import files
 from textwrap import fill
+from tomllib import loads
 from typing import Any, Literal, NamedTuple
 
 from pteron.bodies.vectors import interval, number, perpendicular, positive, unit_vector, vector
@@ -70,29 +72,25 @@ class Key(NamedTuple):
     """Its value where a file of a platform that tilts does not give it; None: as of any other."""
 
 
-COMMON: dict[str, Key] = {
-    "guide_point": Key("point", "r, where the leg is fixed in the base frame, m"),
-    "platform_point": Key("point", "s0, from P to the platform point, in the platform frame, m"),
-    "fixed_offset": Key(
-        "point",
-        "t0, added to it in the base frame: the part that does not turn with phi, m",
-        default=(0.0, 0.0, 0.0),
-    ),
-    "elbow": Key("sign", "sigma, 1 or -1: the side of the elbow", default=1),
-    "limits": Key("limits", "least and greatest joint coordinate, m or rad", default=None),
-    "drive": Key(
-        "drive",
-        "what drives the joint: friction, motor, limits",
-        default=None,
-        example={"coulomb": 3.0, "viscous": 12.0},
-    ),
-    "reading": Key(
-        "reading",
-        "how the drive counts: coordinate = zero + scale reading, as calibration finds it",
-        default=None,
-        example={"zero": 0.0012, "scale": 1.0005},
-    ),
-}
+_GROUPS: dict[str, dict[str, Any]] = loads(
+    (files("pteron.legs") / "keys.toml").read_text(encoding="utf-8")
+)
+
+ACCOUNTS: dict[str, str] = _GROUPS.pop("accounts")
+"""The construction of each kind in a few sentences, see `LegKind.account`."""
+
+
+def keys_of(*groups: str) -> dict[str, Key]:
+    """Return the keys of groups of `keys.toml`; a later group may say more closely what one is."""
+    return {name: _key(**about) for group in groups for name, about in _GROUPS[group].items()}
+
+
+def _key(*, default: Any = ..., optional: bool = False, **about: Any) -> Key:
+    given = tuple(default) if isinstance(default, list) else default
+    return Key(**about, default=None if optional else given)
+
+
+COMMON = keys_of("common")
 """The keys that every kind of leg has; a kind may say more closely what they are."""
 
 
@@ -173,14 +171,6 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
     if role == "reading" and not isinstance(value, Reading):
         raise ModelError(f"{name}: {type(value).__name__} given, a Reading expected")
     return value
-
-
-ELBOW_LIMITS = Key(
-    "limits",
-    "least and greatest angle between the links, rad: 0 where stretched, pi where folded",
-    default=None,
-    example=[0.3, 2.8],
-)
 
 
 def check_elbow(

@@ -16,12 +16,11 @@ from pteron.bodies.inertia import Inertia, PointMass
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
 from pteron.bodies.vectors import Vector, complement
-from pteron.errors import ModelError
 from pteron.legs.drive import Drive
 from pteron.legs.keys import COMMON, Condition, Key, KeyRole, parameters_section, sound_fields
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.legs.reading import Reading
-from pteron.toml import told
+from pteron.toml import refuse
 
 
 @dataclass(frozen=True)
@@ -139,8 +138,7 @@ class LegKind(ABC):
 
     def __post_init__(self) -> None:
         sound, faults = self.checked({name: getattr(self, name) for name in self.every_key()})
-        if faults:
-            raise ModelError(told(faults), faults=faults)
+        refuse(faults)
         for name, value in sound.items():
             object.__setattr__(self, name, value)
 

@@ -23,11 +23,11 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector, cross, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
 from pteron.legs.cones import within
-from pteron.legs.keys import Condition, Key, check_elbow
+from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
 from pteron.legs.kind import Quantity
 from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
-from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
+from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
 
 
 def _check_elbow(limits: tuple[float, float] | None) -> None:
@@ -48,35 +48,9 @@ class PRR(SlideLeg):
     type = "PRR"
     names: ClassVar = {"p": "slider", "l": "link"}
     measure_text = "the cosine of the angle between link and guide"
-    account = (
-        "A slider moves along e through the guide point r; its coordinate rho is zero there. A "
-        "link leads from it to the platform point s0, with revolute joints along d, the normal of "
-        "the plane, at both ends."
-    )
+    account = ACCOUNTS["PRR"]
 
-    keys: ClassVar = {
-        **SLIDER_KEYS,
-        "slider_direction": Key(
-            "direction", "e, of the guide, in the platform's plane", across="direction"
-        ),
-        "direction": Key(
-            "direction",
-            "d, of the revolute axes: along the platform's axis, and this where left out",
-            default=None,
-            example=[0.0, 0.0, 1.0],
-        ),
-        "lower_length": Key("length", "ll, of the link, m"),
-        "elbow_limits": Key(
-            "limits",
-            "least and greatest angle of the link against the guide, rad, within -pi/2 and pi/2: "
-            "0 where it is along the guide, by the right hand about direction",
-            default=None,
-            example=[-1.2, 1.2],
-        ),
-        "lower": Key(
-            "planar", "the link: origin at the platform point, x from the slider to there", "l"
-        ),
-    }
+    keys: ClassVar = keys_of("slider", "PRR")
 
     conditions = (Condition(("elbow_limits",), _check_elbow),)
 

@@ -37,7 +37,7 @@ from pteron.legs.circles import (
 from pteron.legs.cones import between, within
 from pteron.legs.crank import ELBOW
 from pteron.legs.drive import Drive
-from pteron.legs.keys import ELBOW_LIMITS, Condition, Key, check_elbow
+from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
 from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import (
     Joint,
@@ -51,7 +51,6 @@ from pteron.legs.leg import (
 )
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
 from pteron.legs.reading import Reading
-from pteron.legs.slide import SLIDER_KEYS
 from pteron.legs.two_bar import two_bar_needs
 
 _LEAST_SLIDE = 1e-6
@@ -93,36 +92,9 @@ class PRRR(LegKind):
     type = "PRRR"
     joint = SLIDER
     measure_text = "the sine of the angle between its links, seen along d"
-    account = (
-        "A slider moves along e through the guide point r. Three revolute joints R1, R2, R3 with "
-        "axes along d follow: between slider and upper link, upper and lower link, and at the "
-        "platform point s0; where the platform turns, a fourth one about k lets it turn against "
-        "the leg (PRRU), unless d is parallel to k and R3 does so itself. The slider coordinate "
-        "is rho = d . (p + s - r), Eq. (4), divided by d . e where the slider is tilted."
-    )
+    account = ACCOUNTS["PRRR"]
 
-    keys: ClassVar = {
-        **SLIDER_KEYS,
-        "direction": Key("direction", "d, of the revolute axes R1, R2 and R3"),
-        "slider_direction": Key(
-            "direction",
-            "e, of the guide; direction where left out",
-            default=None,
-            example=[1.0, 0.0, 0.0],
-            like="direction",
-        ),
-        "upper_length": Key("length", "lu, of the upper link, R1 to R2, m"),
-        "lower_length": Key("length", "ll, of the lower link, R2 to R3, m"),
-        "elbow": Key(
-            "sign",
-            "sigma: 1 where the upper link is turned by the right hand about direction from the "
-            "line between R1 and R3, -1 where by the left",
-            default=1,
-        ),
-        "elbow_limits": ELBOW_LIMITS,
-        "upper": Key("planar", "the upper link: origin on R1, x along it to R2", "u"),
-        "lower": Key("planar", "the lower link: origin on R3, x along it from R2 to R3", "l"),
-    }
+    keys: ClassVar = keys_of("slider", "elbow_limits", "PRRR")
 
     conditions = (
         Condition(("elbow_limits",), check_elbow),

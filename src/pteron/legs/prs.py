@@ -10,8 +10,9 @@ from typing import ClassVar
 
 from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector
-from pteron.legs.ball_end import BALL_KEYS, UPRIGHT, ball_cone, every_axis, held_plane
+from pteron.legs.ball_end import ball_cone, every_axis, held_plane
 from pteron.legs.cones import Cone
+from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.leg import LegMotion, Passive
 from pteron.legs.prr import PRR, PRREquations
 
@@ -27,12 +28,8 @@ class PRS(PRR):
     platform_cone: Cone | None = None
 
     type = "PRS"
-    account = (
-        "A slider moves along e through the guide point r; its coordinate rho is zero there. A "
-        "link leads from a revolute joint about d on the slider to a ball joint at the platform "
-        "point s0, which it keeps in the plane across d."
-    )
-    keys: ClassVar = {**PRR.keys, "direction": UPRIGHT, **BALL_KEYS}
+    account = ACCOUNTS["PRS"]
+    keys: ClassVar = {**PRR.keys, **keys_of("ball")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return every_axis()

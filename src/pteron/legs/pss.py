@@ -6,7 +6,7 @@ joints of a rod are counted as universal ones: a rod's spin about itself moves n
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from random import Random
@@ -18,61 +18,28 @@ from pteron.bodies.inertia import PointMass, RodInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_vector
-from pteron.legs.cones import Cone
-from pteron.legs.keys import Key
+from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.kind import Quantity
-from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
+from pteron.legs.leg import Joint, LegMotion, Sphere
 from pteron.legs.rods import (
-    ROD_KEYS,
-    cones,
-    couples,
-    free_axes,
-    hinge_doubts,
+    RodLeg,
     rod_body,
-    rod_couple,
     universal_joints,
 )
-from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
+from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
 
 
 @dataclass(frozen=True)
-class PSS(SlideLeg):
+class PSS(RodLeg, SlideLeg):
     """A P-S-S leg that carries one point of the platform."""
-
-    lower: RodInertia
-    rods: int = 2
-    bar_direction: Vector | None = None
-    tip_cone: Cone | None = None
-    platform_cone: Cone | None = None
-    bar_length: float | None = None
 
     type = "PSS"
     names: ClassVar = {"p": "slider", "l": "rod"}
     base_cones: ClassVar = ("tip_cone",)
     measure_text = "the cosine of the angle between rod and guide"
-    account = (
-        "A slider moves along e through the guide point r; its coordinate rho is zero there. A rod "
-        "between two ball joints leads from it to the platform point s0; parallel rods, which keep "
-        "the platform from tilting, count as one with the sum of both."
-    )
+    account = ACCOUNTS["PSS"]
 
-    keys: ClassVar = {
-        **SLIDER_KEYS,
-        **ROD_KEYS,
-        "bar_direction": Key(
-            "direction",
-            "of the bars at the ends of parallel rods; where given, the bars are checked to keep "
-            "the platform from tilting",
-            default=None,
-            example=[0.0, 1.0, 0.0],
-        ),
-        "tip_cone": Key(
-            "cone",
-            "how far the rod may lean at the slider; axis in the base frame",
-            default=None,
-            example={"axis": [0.0, 0.0, -1.0], "angle": 0.8},
-        ),
-    }
+    keys: ClassVar = keys_of("slider", "rod", "PSS")
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -88,20 +55,8 @@ class PSS(SlideLeg):
     def bar(self) -> Vector | None:
         return self.bar_direction if self.rods > 1 else None
 
-    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        return free_axes(self.rods, self.bar_direction, axis)
-
-    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
-        return couples(self, motion)
-
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
-        return cones(self, motion, ca.SX.eye(3), still, turned)
-
-    def rod_couple(self, motion: LegMotion) -> Expression:
-        return rod_couple(self, motion)
-
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
-        return hinge_doubts(self, axis)
+    def tip_axes(self, motion: LegMotion) -> Expression:
+        return ca.SX.eye(3)
 
     @classmethod
     def random_link(cls, values: Mapping[str, Sequence[Fraction]], rng: Random) -> list[Fraction]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
+from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
-from pteron.legs.keys import Condition, Key
+from pteron.legs.drive import Drive
+from pteron.legs.keys import Condition
 from pteron.legs.kind import ActuatedJoint, LegKind, ReachBound
+from pteron.legs.reading import Reading
 
 _CYLINDER = 0.9
 """Length of a cylinder in pictures, as a share of the shortest ram's."""
@@ -17,17 +21,20 @@ def _check_limits(limits: tuple[float, float]) -> None:
         raise ModelError(f"limits: least length {limits[0]:g} m given; a ram is longer than 0")
 
 
-RAM_KEYS: dict[str, Key] = {
-    "elbow": Key("sign", "1: a ram has but one branch", default=1),
-    "limits": Key("limits", "least and greatest length, m, above 0"),
-}
-"""The keys that all rams have alike."""
-
-
+@dataclass(frozen=True)
 class RamLeg(LegKind):
     """The data of a ram; its coordinate is its length, from `guide_point` to the platform point."""
 
+    guide_point: Vector
+    platform_point: Vector
+    upper: Any
+    lower: Any
     limits: tuple[float, float]
+    elbow: int = 1
+    fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
+    direction: Vector | None = None
 
     joint = ActuatedJoint("ram", "rho", "m", "force", "N", "counts its length from end to end")
     branches = (1,)

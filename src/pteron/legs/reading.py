@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pteron.bodies.vectors import number
 from pteron.errors import ModelError
-from pteron.toml import told
+from pteron.toml import keep_checked
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,11 @@ class Reading:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        faults: list[str] = []
-        for name in ("zero", "scale"):
-            try:
-                object.__setattr__(self, name, number(getattr(self, name), name))
-            except ModelError as error:
-                faults += error.faults
-        if self.scale == 0.0:
-            faults.append("scale: 0 given, another number expected")
-        if faults:
-            raise ModelError(told(faults), faults=faults)
+        keep_checked(self, {"zero": number, "scale": _not_zero})
+
+
+def _not_zero(value: object, key: str) -> float:
+    found = number(value, key)
+    if found == 0.0:
+        raise ModelError(f"{key}: 0 given, another number expected")
+    return found

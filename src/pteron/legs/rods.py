@@ -1,113 +1,97 @@
-"""A rod between two ball joints, or parallel rods: keys, motion, joints and couples for any leg."""
+"""A rod between two ball joints, or parallel rods: data, motion, joints and couples of any leg."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import dataclass
 
 import casadi as ca
 
+from pteron.bodies.inertia import RodInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector, parallel
 from pteron.legs.ball_end import ball_joint
-from pteron.legs.cones import within_cone
-from pteron.legs.keys import Key
+from pteron.legs.cones import Cone, within_cone
+from pteron.legs.kind import LegKind
 from pteron.legs.leg import Joint, LegMotion, Passive
 
-ROD_KEYS: dict[str, Key] = {
-    "lower_length": Key("length", "ll, of the rod, m"),
-    "rods": Key(
-        "count",
-        "parallel rods, which keep their bars parallel; lower is their sum; 1 under a platform "
-        "that tilts",
-        default=2,
-        tilting=1,
-    ),
-    "bar_length": Key(
-        "length",
-        "how far parallel rods are apart, m: clearances then take them for two",
-        default=None,
-        example=0.08,
-    ),
-    "platform_cone": Key(
-        "cone",
-        "how far the rod may lean at the platform; axis in the platform frame, at phi = 0 for "
-        "parallel rods",
-        default=None,
-        example={"axis": [0.0, 0.0, 1.0], "angle": 0.8},
-    ),
-    "lower": Key("rod", "the rods: origin at the platform point, x along them to there", "l"),
-}
-"""The keys that legs with a rod share."""
 
+@dataclass(frozen=True)
+class RodLeg(LegKind):
+    """The data of a leg that ends in a rod, or in parallel rods."""
 
-def free_axes(rods: int, bar: Vector | None, axis: Vector | None) -> tuple[Vector, ...]:
-    """Return axes about which rods let the platform turn; `axis` is the platform's, if it turns.
+    lower_length: float
+    lower: RodInertia
+    rods: int = 2
+    bar_direction: Vector | None = None
+    tip_cone: Cone | None = None
+    platform_cone: Cone | None = None
+    bar_length: float | None = None
 
-    Parallel rods keep the bar at their ends, on a hinge where the platform turns; one alone keeps
-    nothing. Where the bar is not told, nothing is held against the machine.
-    """
-    if rods == 1:
-        return (1, 0, 0), (0, 1, 0), (0, 0, 1)
-    return tuple(v for v in (bar, axis) if v is not None)
+    @abstractmethod
+    def tip_axes(self, motion: LegMotion) -> Expression:
+        """Return the axes of the body that carries the rod, by columns (3, 3)."""
 
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return the axes about which rods let the platform turn; `axis` is its own, if it turns.
 
-def couples(leg: Any, motion: LegMotion) -> list[Expression] | None:
-    """Return the couple about bar x rod that parallel rods hold: both push along themselves.
+        Parallel rods keep the bar at their ends, on a hinge where the platform turns; one alone
+        keeps nothing. Where the bar is not told, nothing is held against the machine.
+        """
+        if self.rods == 1:
+            return (1, 0, 0), (0, 1, 0), (0, 0, 1)
+        return tuple(v for v in (self.bar, axis) if v is not None)
 
-    Its length is the sine between bar and rod: it is lost where the parallelogram is flat. What
-    turns the bar about the rods they do not hold. None where the bar is not told.
-    """
-    if leg.rods == 1:
-        return []
-    if leg.bar is None:
-        return None
-    return [rod_couple(leg, motion) / leg.lower_length]
+    def couples(self, motion: LegMotion, axis: Vector | None) -> list[Expression] | None:
+        """Return the couple about bar x rod that parallel rods hold: both push along themselves.
 
+        Its length is the sine between bar and rod: it is lost where the parallelogram is flat. What
+        turns the bar about the rods they do not hold. None where the bar is not told.
+        """
+        if self.rods == 1:
+            return []
+        return None if self.bar is None else [self.rod_couple(motion) / self.lower_length]
 
-def cones(
-    leg: Any, motion: LegMotion, tip: Expression, still: Expression, turned: Expression
-) -> list[Passive]:
-    """Return the ball joints at the ends of a leg's rod that have cones.
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        """Return the ball joints at the ends of the rod that have cones.
 
-    The columns of `tip` are the axes of the body that carries the rod, those of `still` and
-    `turned` the platform's. The bars of parallel rods do not turn, nor does what has a fixed
-    offset.
-    """
-    rod, length = motion.links[1], leg.lower_length
-    assert rod is not None
-    socket = turned if leg.rods == 1 and not any(leg.fixed_offset) else still
-    return [
-        *within_cone("rod at its tip", leg.tip_cone, tip, rod, length),
-        *within_cone("rod at the platform", leg.platform_cone, socket, -rod, length),
-    ]
+        The columns of `still` and `turned` are the platform's axes. The bars of parallel rods do
+        not turn, nor does what has a fixed offset.
+        """
+        rod, length = motion.links[1], self.lower_length
+        assert rod is not None
+        socket = turned if self.rods == 1 and not any(self.fixed_offset) else still
+        tip = self.tip_axes(motion)
+        return [
+            *within_cone("rod at its tip", self.tip_cone, tip, rod, length),
+            *within_cone("rod at the platform", self.platform_cone, socket, -rod, length),
+        ]
 
+    def rod_couple(self, motion: LegMotion) -> Expression:
+        """Return the couple of parallel rods, across their plane; zero for one.
 
-def rod_couple(leg: Any, motion: LegMotion) -> Expression:
-    """Return the couple of parallel rods, across their plane; zero for one.
+        Where the bar is not told it is taken along the leg's first passive joint.
+        """
+        if self.rods == 1:
+            return ca.SX(3, 1)
+        bar = motion.chain[1].axis if self.bar is None else ca.SX(list(self.bar))
+        return ca.cross(bar, motion.links[1])
 
-    Where the bar is not told it is taken along the leg's first passive joint.
-    """
-    if leg.rods == 1:
-        return ca.SX(3, 1)
-    bar = motion.chain[1].axis if leg.bar is None else ca.SX(list(leg.bar))
-    return ca.cross(bar, motion.links[1])
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        """Yield it where parallel rods would keep their end of the platform from turning.
 
-
-def hinge_doubts(leg: Any, axis: Vector | None) -> Iterator[str]:
-    """Yield it where parallel rods would keep their end of the platform from turning about an axis.
-
-    The file does not tell whether their bar is on a hinge at the platform point; of an articulated
-    platform it is where the fixed offset begins.
-    """
-    x, y, _ = leg.platform_point
-    alone = leg.rods == 1 or any(leg.fixed_offset) or x == y == 0.0
-    if axis is None or alone or (leg.bar_direction and parallel(leg.bar_direction, axis)):
-        return
-    yield (
-        "platform_point: turns with phi, but parallel rods keep their bar from turning: is the bar "
-        "on a hinge there? What does not turn belongs in fixed_offset"
-    )
+        The file does not tell whether their bar is on a hinge at the platform point; of an
+        articulated platform it is where the fixed offset begins.
+        """
+        x, y, _ = self.platform_point
+        alone = self.rods == 1 or any(self.fixed_offset) or x == y == 0.0
+        if axis is None or alone or (self.bar_direction and parallel(self.bar_direction, axis)):
+            return
+        yield (
+            "platform_point: turns with phi, but parallel rods keep their bar from turning: is the "
+            "bar on a hinge there? What does not turn belongs in fixed_offset"
+        )
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:

@@ -6,7 +6,7 @@ The cylinder swings about the base joint, the piston ends at the platform point;
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from random import Random
 from typing import ClassVar, NamedTuple, Self
@@ -24,13 +24,11 @@ from pteron.legs.circles import (
     random_fraction,
     random_vector,
 )
-from pteron.legs.drive import Drive
-from pteron.legs.keys import Key
+from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.kind import Quantity, Transfer
 from pteron.legs.leg import Circle, Joint, LegEquations, LegMotion, Needs, Reach, on_point
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
-from pteron.legs.ram import RAM_KEYS, RamLeg
-from pteron.legs.reading import Reading
+from pteron.legs.ram import RamLeg
 
 
 @dataclass(frozen=True)
@@ -41,39 +39,13 @@ class RPR(RamLeg):
     along `direction` do not count: the leg moves in a plane of its own.
     """
 
-    guide_point: Vector
-    platform_point: Vector
     upper: PlanarInertia
     lower: PlanarInertia
-    limits: tuple[float, float]
-    elbow: int = 1
-    fixed_offset: Vector = (0.0, 0.0, 0.0)
-    drive: Drive | None = None
-    reading: Reading | None = field(default=None, kw_only=True)
-    direction: Vector | None = None
 
     type = "RPR"
-    account = (
-        "A ram leads from a revolute joint at the guide point r to one at the platform point s0, "
-        "both with axes along d, the normal of the plane. Its coordinate rho is its length."
-    )
+    account = ACCOUNTS["RPR"]
 
-    keys: ClassVar = {
-        **RAM_KEYS,
-        "guide_point": Key("point", "r, the revolute joint on the base, m"),
-        "direction": Key(
-            "direction",
-            "d, of the revolute axes: along the platform's axis, and this where left out",
-            default=None,
-            example=[0.0, 0.0, 1.0],
-        ),
-        "upper": Key(
-            "planar", "the cylinder: origin at guide_point, x along it to the platform", "u"
-        ),
-        "lower": Key(
-            "planar", "the piston: origin at the platform point, x from the base to there", "l"
-        ),
-    }
+    keys: ClassVar = keys_of("ram", "RPR")
 
     def under(self, frame: Sequence[Vector]) -> Self:
         return self if self.direction is not None else replace(self, direction=frame[2])

@@ -10,8 +10,9 @@ from typing import ClassVar
 
 from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector
-from pteron.legs.ball_end import BALL_KEYS, UPRIGHT, ball_cone, every_axis, held_plane
+from pteron.legs.ball_end import ball_cone, every_axis, held_plane
 from pteron.legs.cones import Cone
+from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.leg import LegMotion, Passive
 from pteron.legs.rpr import RPR, RPREquations
 
@@ -26,11 +27,8 @@ class RPS(RPR):
     platform_cone: Cone | None = None
 
     type = "RPS"
-    account = (
-        "A ram leads from a revolute joint about d at the guide point r to a ball joint at the "
-        "platform point s0, which it keeps in the plane across d. Its coordinate rho is its length."
-    )
-    keys: ClassVar = {**RPR.keys, "direction": UPRIGHT, **BALL_KEYS}
+    account = ACCOUNTS["RPS"]
+    keys: ClassVar = {**RPR.keys, **keys_of("ball")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return every_axis()

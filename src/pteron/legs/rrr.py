@@ -15,8 +15,8 @@ from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMo
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_triangle
 from pteron.legs.cones import between, within
-from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
-from pteron.legs.keys import ELBOW_LIMITS, Condition, Key, check_elbow
+from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
+from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
 from pteron.legs.leg import Circle, Joint, LegMotion, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
 
@@ -36,25 +36,9 @@ class RRR(CrankLeg):
     type = "RRR"
     names: ClassVar = {"u": "crank", "l": "lower link"}
     measure_text = "the sine of the angle between crank and lower link"
-    account = (
-        "A crank turns about d, the normal of the plane, through the guide point r; its angle "
-        "theta is zero where it points along the zero direction, and counts by the right hand. A "
-        "lower link leads from the elbow to the platform point s0, with revolute joints at both "
-        "ends."
-    )
+    account = ACCOUNTS["RRR"]
 
-    keys: ClassVar = {
-        **CRANK_KEYS,
-        "direction": Key(
-            "direction",
-            "d, the crank's axis: along the platform's axis; angles count by the right hand",
-        ),
-        "lower_length": Key("length", "ll, of the lower link, m"),
-        "elbow_limits": ELBOW_LIMITS,
-        "lower": Key(
-            "planar", "the lower link: origin at the platform point, x from the elbow to there", "l"
-        ),
-    }
+    keys: ClassVar = keys_of("crank", "elbow_limits", "RRR")
 
     conditions = (Condition(("elbow_limits",), check_elbow),)
 

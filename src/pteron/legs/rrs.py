@@ -10,8 +10,9 @@ from typing import ClassVar
 
 from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector
-from pteron.legs.ball_end import BALL_KEYS, UPRIGHT, ball_cone, every_axis, held_plane
+from pteron.legs.ball_end import ball_cone, every_axis, held_plane
 from pteron.legs.cones import Cone
+from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.leg import LegMotion, Passive
 from pteron.legs.rrr import RRR, RRREquations
 
@@ -26,13 +27,8 @@ class RRS(RRR):
     platform_cone: Cone | None = None
 
     type = "RRS"
-    account = (
-        "A crank turns about d through the guide point r; its angle theta is zero where it points "
-        "along the zero direction, and counts by the right hand. A link leads from the elbow, with "
-        "an axis along d too, to a ball joint at the platform point s0, which it keeps in the "
-        "plane across d."
-    )
-    keys: ClassVar = {**RRR.keys, "direction": UPRIGHT, **BALL_KEYS}
+    account = ACCOUNTS["RRS"]
+    keys: ClassVar = {**RRR.keys, **keys_of("ball")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return every_axis()

@@ -6,7 +6,7 @@ joints of a rod are counted as universal ones (R-U-U): a rod's spin about itself
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from random import Random
@@ -19,18 +19,12 @@ from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMo
 from pteron.bodies.vectors import Vector, cross, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import random_vector
-from pteron.legs.cones import Cone
-from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
-from pteron.legs.keys import Condition, Key
-from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
+from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
+from pteron.legs.keys import ACCOUNTS, Condition, keys_of
+from pteron.legs.leg import Joint, LegMotion, Sphere
 from pteron.legs.rods import (
-    ROD_KEYS,
-    cones,
-    couples,
-    free_axes,
-    hinge_doubts,
+    RodLeg,
     rod_body,
-    rod_couple,
     universal_joints,
 )
 
@@ -44,47 +38,19 @@ def _check_bar(bar: Vector | None, direction: Vector) -> None:
 
 
 @dataclass(frozen=True)
-class RSS(CrankLeg):
+class RSS(RodLeg, CrankLeg):
     """An R-S-S leg that carries one point of the platform.
 
     The crank turns about `direction` through `guide_point`; its angle is zero where it points along
     `zero_direction`, and positive by the right hand about `direction`.
     """
 
-    lower: RodInertia
-    rods: int = 2
-    bar_direction: Vector | None = None
-    tip_cone: Cone | None = None
-    platform_cone: Cone | None = None
-    bar_length: float | None = None
-
     type = "RSS"
     names: ClassVar = {"u": "crank", "l": "rod"}
     measure_text = "the sine of the angle between crank and rod, seen along d"
-    account = (
-        "A crank turns about d through the guide point r; its angle theta is zero where it points "
-        "along the zero direction, and counts by the right hand. A rod between two ball joints "
-        "leads from its end to the platform point s0; parallel rods, which keep the platform from "
-        "tilting, count as one with the sum of both."
-    )
+    account = ACCOUNTS["RSS"]
 
-    keys: ClassVar = {
-        **CRANK_KEYS,
-        **ROD_KEYS,
-        "bar_direction": Key(
-            "direction",
-            "of the bars at the ends of parallel rods: along direction",
-            default=None,
-            example=[0.0, 1.0, 0.0],
-            like="direction",
-        ),
-        "tip_cone": Key(
-            "cone",
-            "how far the rod may lean at the crank's end; axis in the crank's frame",
-            default=None,
-            example={"axis": [1.0, 0.0, 0.0], "angle": 2.6},
-        ),
-    }
+    keys: ClassVar = keys_of("crank", "rod", "RSS")
 
     conditions = (Condition(("bar_direction", "direction"), _check_bar),)
 
@@ -92,21 +58,9 @@ class RSS(CrankLeg):
     def bar(self) -> Vector | None:
         return self.direction if self.rods > 1 else None
 
-    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        return free_axes(self.rods, self.direction, axis)
-
-    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
-        return couples(self, motion)
-
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def tip_axes(self, motion: LegMotion) -> Expression:
         crank = motion.bodies["u"]
-        return cones(self, motion, ca.horzcat(crank.x, crank.y, crank.axes), still, turned)
-
-    def rod_couple(self, motion: LegMotion) -> Expression:
-        return rod_couple(self, motion)
-
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
-        return hinge_doubts(self, axis)
+        return ca.horzcat(crank.x, crank.y, crank.axes)
 
     @property
     def reach_text(self) -> str:

@@ -22,7 +22,7 @@ from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
 from pteron.legs.cones import within
 from pteron.legs.drive import Drive
-from pteron.legs.keys import Condition, Key
+from pteron.legs.keys import ACCOUNTS, Condition, keys_of
 from pteron.legs.kind import SHAFT, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned, on_point
 from pteron.legs.reading import Reading
@@ -65,48 +65,9 @@ class RUPU(LegKind):
     follows_angle = True
     names: ClassVar = {"u": "upper part of the shaft", "l": "lower part of the shaft"}
     measure_text = "1 everywhere, as a shaft turns the platform in every pose"
-    account = (
-        "A telescopic shaft leads from the guide point r, between two universal joints, to the "
-        "platform point s0 and turns the platform: its joint angle theta is the ratio times phi. "
-        "The spin of its parts about their axis counts as the platform's; their universal joints "
-        "are taken to turn alike."
-    )
+    account = ACCOUNTS["RUPU"]
 
-    keys: ClassVar = {
-        "guide_point": Key("point", "r, the shaft's universal joint on the base, m"),
-        "direction": Key(
-            "direction",
-            "of the actuated joint's axis: the platform's axis, and this where left out",
-            default=None,
-            example=[0.0, 0.0, 1.0],
-        ),
-        "ratio": Key(
-            "number",
-            "the joint's angle over phi; negative where it counts the other way",
-            default=1.0,
-        ),
-        "elbow": Key("sign", "1: a shaft has but one branch", default=1),
-        "limits": Key(
-            "limits",
-            "least and greatest angle of the joint, rad",
-            default=None,
-            example=[-3.0, 3.0],
-        ),
-        "travel": Key(
-            "limits",
-            "least and greatest length of the shaft between its universal joints, m",
-            default=None,
-            example=[0.3, 0.6],
-        ),
-        "upper": Key(
-            "rod", "the part at the base: origin at guide_point, x along it to the platform", "u"
-        ),
-        "lower": Key(
-            "rod",
-            "the part at the platform: origin at the platform point, x as upper's",
-            "l",
-        ),
-    }
+    keys: ClassVar = keys_of("RUPU")
 
     conditions = (
         Condition(("ratio",), _check_ratio),

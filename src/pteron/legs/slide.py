@@ -26,29 +26,9 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector, moved
 from pteron.legs.circles import random_fraction
 from pteron.legs.drive import Drive
-from pteron.legs.keys import Key
 from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
 from pteron.legs.reading import Reading
-
-SLIDER_KEYS: dict[str, Key] = {
-    "guide_point": Key("point", "r, the point of the guide where its coordinate is 0, m"),
-    "slider_direction": Key("direction", "e, of the guide"),
-    "elbow": Key(
-        "sign",
-        "sigma: 1 where the platform point is ahead of the slider along slider_direction, -1 "
-        "where it is behind",
-        default=1,
-    ),
-    "limits": Key(
-        "limits",
-        "least and greatest coordinate of the slider, m",
-        default=None,
-        example=[-0.3, 0.3],
-    ),
-    "slider_mass": Key("slider", "the slider's mass, kg", "p"),
-}
-"""The keys that legs with a slider share."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ which the spin about their axis has no inertia.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from random import Random
 from typing import ClassVar, NamedTuple, Self
@@ -26,12 +26,10 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector, dot
 from pteron.legs.circles import random_fraction, random_vector
 from pteron.legs.cones import Cone, within_cone
-from pteron.legs.drive import Drive
-from pteron.legs.keys import Key
+from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.kind import Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Sphere, on_point
-from pteron.legs.ram import RAM_KEYS, RamLeg
-from pteron.legs.reading import Reading
+from pteron.legs.ram import RamLeg
 from pteron.legs.rods import rod_body, universal_joints
 
 
@@ -42,60 +40,17 @@ class UPS(RamLeg):
     Its joint coordinate is the length of the ram, from `guide_point` to the platform point.
     """
 
-    guide_point: Vector
-    platform_point: Vector
     upper: RodInertia
     lower: RodInertia
-    limits: tuple[float, float]
-    elbow: int = 1
-    fixed_offset: Vector = (0.0, 0.0, 0.0)
-    drive: Drive | None = None
-    reading: Reading | None = field(default=None, kw_only=True)
-    direction: Vector | None = None
     base_cone: Cone | None = None
     platform_cone: Cone | None = None
     screw_lead: float | None = None
 
     type = "UPS"
     base_cones: ClassVar = ("base_cone",)
-    account = (
-        "A ram leads from a universal joint at the guide point r to a ball joint at the platform "
-        "point s0. Its coordinate rho is its length."
-    )
+    account = ACCOUNTS["UPS"]
 
-    keys: ClassVar = {
-        **RAM_KEYS,
-        "guide_point": Key("point", "r, the universal joint on the base, m"),
-        "direction": Key(
-            "direction",
-            "of the base joint's first axis, for reactions and drawings: forces do not depend on "
-            "it; where left out, that of the base plate across which the leg leans more",
-            default=None,
-            example=[1.0, 0.0, 0.0],
-        ),
-        "base_cone": Key(
-            "cone",
-            "how far it may lean at the base; axis in the base frame",
-            default=None,
-            example={"axis": [0.0, 0.0, 1.0], "angle": 0.8},
-        ),
-        "platform_cone": Key(
-            "cone",
-            "how far it may lean at the platform; axis in the platform frame",
-            default=None,
-            example={"axis": [0.0, 0.0, -1.0], "angle": 0.8},
-        ),
-        "screw_lead": Key(
-            "length",
-            "m a turn, of a screw that turns where the piston spins; what that would add is told",
-            default=None,
-            example=0.005,
-        ),
-        "upper": Key("rod", "the cylinder: origin at guide_point, x to the platform point", "u"),
-        "lower": Key(
-            "rod", "the piston: origin at the platform point, x from the base to there", "l"
-        ),
-    }
+    keys: ClassVar = keys_of("ram", "UPS")
 
     def under(self, frame: Sequence[Vector]) -> Self:
         if self.direction is not None:

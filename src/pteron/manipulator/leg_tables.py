@@ -16,21 +16,9 @@ from pteron.bodies.inertia import PlanarInertia, RodInertia
 from pteron.bodies.tables import Count, Number, PlanarBody, RodBody, Slider, Table, Three, Two
 from pteron.errors import ModelError
 from pteron.legs import LegKind
-from pteron.legs.cones import Cone
-from pteron.legs.drive import Drive, Elastic, LuGre, Stribeck, Wave, Winding
 from pteron.legs.keys import Key, KeyRole
-from pteron.legs.reading import Reading
-from pteron.manipulator.tables import (
-    ConeTable,
-    DriveTable,
-    ElasticTable,
-    LuGreTable,
-    ReadingTable,
-    StribeckTable,
-    WaveTable,
-    WindingTable,
-)
-from pteron.toml import told
+from pteron.manipulator.tables import PARTS, ConeTable, DriveTable, ReadingTable
+from pteron.toml import refuse
 
 
 def _no_truth(given: Any) -> Any:
@@ -153,20 +141,7 @@ def _held(given: Any, name: str, key: Key) -> Any:
         return given.mass
     if key.body:
         return given.inertia_of(name)
-    return _built(_PARTS[type(given)], given, name) if type(given) in _PARTS else given
-
-
-_PARTS: dict[Any, Any] = {
-    ConeTable: Cone,
-    DriveTable: Drive,
-    ElasticTable: Elastic,
-    LuGreTable: LuGre,
-    WaveTable: Wave,
-    WindingTable: Winding,
-    ReadingTable: Reading,
-    StribeckTable: Stribeck,
-}
-"""Parts of a leg by their tables."""
+    return _built(PARTS[type(given)], given, name) if type(given) in PARTS else given
 
 
 def _built(kind: Any, table: Table, key: str) -> Any:
@@ -176,22 +151,21 @@ def _built(kind: Any, table: Table, key: str) -> Any:
         try:
             if isinstance(value, list):
                 given[name] = tuple(
-                    _built(_PARTS[type(one)], one, f"{key}.{name}[{k}]")
-                    if type(one) in _PARTS
+                    _built(PARTS[type(one)], one, f"{key}.{name}[{k}]")
+                    if type(one) in PARTS
                     else one
                     for k, one in enumerate(value, start=1)
                 )
-            elif type(value) in _PARTS:
+            elif type(value) in PARTS:
                 given[name] = None
-                given[name] = _built(_PARTS[type(value)], value, f"{key}.{name}")
+                given[name] = _built(PARTS[type(value)], value, f"{key}.{name}")
         except ModelError as error:
             faults += error.faults
     try:
         made = kind(**given)
     except ModelError as error:
         faults += [f"{key}.{fault}" for fault in error.faults]
-    if faults:
-        raise ModelError(told(faults), faults=faults)
+    refuse(faults)
     return made
 
 

@@ -24,7 +24,7 @@ from pteron.manipulator.tool import Tool, tool_faults
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import Unit
 from pteron.platforms.parts import HeldPoint
-from pteron.toml import told
+from pteron.toml import refuse
 
 _COINCIDENT = 1e-9
 """Distance, m, below which points are taken for one."""
@@ -86,8 +86,7 @@ class Manipulator:
 
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
-        if faults := faults_of(self.name, self.platform, legs, self.tools):
-            raise ModelError(told(faults), faults=faults)
+        refuse(faults_of(self.name, self.platform, legs, self.tools))
         legs = tuple(leg.under(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))

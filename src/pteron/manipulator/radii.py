@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import partial
 
-from pteron.bodies.vectors import number
-from pteron.errors import ModelError
-from pteron.toml import told
+from pteron.bodies.vectors import not_negative
+from pteron.toml import keep_checked
 
 
 @dataclass(frozen=True)
@@ -36,18 +36,8 @@ class Radii:
     platform: float = 0.0
 
     def __post_init__(self) -> None:
-        faults: list[str] = []
-        for field in fields(self):
-            try:
-                value = number(getattr(self, field.name), field.name)
-                if value < 0.0:
-                    raise ModelError(f"{field.name}: {value:g} m is negative; give 0 or more")
-            except ModelError as error:
-                faults += error.faults
-            else:
-                object.__setattr__(self, field.name, value)
-        if faults:
-            raise ModelError(told(faults), faults=faults)
+        check = partial(not_negative, unit="m")
+        keep_checked(self, {field.name: check for field in fields(self)})
 
     @property
     def leg(self) -> float:

@@ -5,7 +5,15 @@ Imported only where a file is read or written, since pydantic slows the start.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from dataclasses import MISSING, fields
+from functools import reduce
+from importlib.resources import files
+from operator import or_
+from tomllib import loads
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
+
+from pydantic import create_model
 
 from pteron.bodies.tables import (
     Bar,
@@ -19,113 +27,52 @@ from pteron.bodies.tables import (
     Two,
     key,
 )
+from pteron.legs.cones import Cone
+from pteron.legs.drive import Drive, Elastic, LuGre, Stribeck, Wave, Winding
+from pteron.legs.reading import Reading
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
+from pteron.manipulator.radii import Radii
 from pteron.platforms.kinds import TILTING, AngleOrder, Motion
 
+_TOLD: dict[str, dict[str, Any]] = loads(
+    (files("pteron.manipulator") / "parts.toml").read_text(encoding="utf-8")
+)
 
-class ConeTable(Table):
-    """`{ axis, angle }`: the cone in which a ball joint holds its rod."""
-
-    axis: Three = key("from the joint along the rod, in the frame of what holds it")
-    angle: Number = key("the greatest angle between axis and rod, rad")
-
-
-class StribeckTable(Table):
-    """`{ force, speed }` of what dry friction has more at rest."""
-
-    force: Number = key("what is added at rest, N or N m")
-    speed: Number = key("by which most of it is gone, m/s or rad/s")
+PARTS: dict[type[Table], Any] = {}
+"""The dataclasses that tables of a file become."""
 
 
-class LuGreTable(Table):
-    """`{ stiffness, damping }` of the bristles of dry friction."""
-
-    stiffness: Number = key("at the joint, N/m or N m/rad")
-    damping: Number = key("at the joint, N s/m or N m s/rad", 0.0)
-
-
-class ElasticTable(Table):
-    """`{ stiffness, damping, backlash, encoder }` of a transmission that bends."""
-
-    stiffness: Number = key("at the joint, N/m or N m/rad")
-    damping: Number = key("at the joint, N s/m or N m s/rad", 0.0)
-    backlash: Number = key("play in all, at the joint, m or rad", 0.0)
-    encoder: Literal["motor", "joint", "both"] = key(
-        'where it is: "motor", "joint", or "both", which tell a controller the joint\'s coordinate '
-        "and the motor's rate",
-        "motor",
-    )
+def _table_of(part: Any) -> type[Table]:
+    """Return the table of a dataclass: its fields, in the order in which files give them."""
+    hints, defaults = get_type_hints(part), {field.name: field.default for field in fields(part)}
+    made: dict[str, Any] = {}
+    for name, told in _TOLD[part.__name__].items():
+        about, *example = [told] if isinstance(told, str) else told
+        default = {MISSING: ..., (): []}.get(defaults[name], defaults[name])
+        made[name] = _held(hints[name]), key(about, default, *example)
+    about = _TOLD["about"][part.__name__]
+    table = create_model(f"{part.__name__}Table", __base__=Table, __doc__=about, **made)
+    PARTS[table] = part
+    return table
 
 
-class WindingTable(Table):
-    """`{ resistance, torque_constant, voltage }` of the motor's winding and its supply."""
-
-    resistance: Number = key("ohm")
-    torque_constant: Number = key("N m/A, which is V s/rad")
-    voltage: Number = key("of the supply, V")
-
-
-class WaveTable(Table):
-    """`{ order, size, phase }` of a wave of the motor's torque."""
-
-    order: Number = key("waves in a turn of the motor")
-    size: Number = key("share of the torque (ripple), or N m at the motor (cogging)")
-    phase: Number = key("rad", 0.0)
+def _held(hint: Any) -> Any:
+    """Return what a table has of a field with a type hint: parts as tables, and lists of them."""
+    tables = {part: table for table, part in PARTS.items()}
+    if hint in (float, *tables):
+        return tables.get(hint, Number)
+    args = get_args(hint)
+    if get_origin(hint) is UnionType:
+        return reduce(or_, map(_held, args))
+    if get_origin(hint) is tuple:
+        held = tuple(_held(one) for one in args if one is not ...)
+        return list.__class_getitem__(held) if ... in args else tuple.__class_getitem__(held)
+    return hint
 
 
-class DriveTable(Table):
-    """The drive of a joint: at the joint, but for what is said to be the motor's."""
-
-    coulomb: Number = key("dry friction, N or N m", 0.0)
-    viscous: Number = key("N s/m or N m s", 0.0)
-    offset: Number = key("a constant force, N or N m", 0.0)
-    rotor_inertia: Number = key("of the motor and what turns with it, kg m^2", 0.0, 3e-5)
-    ratio: Number | None = key(
-        "motor angle over the joint's coordinate, rad/m or rad/rad; 1 if left out", None, 392.7
-    )
-    rest_speed: Number = key(
-        "within which dry friction changes its sign smoothly, m/s or rad/s", 1e-3
-    )
-    stribeck: StribeckTable | None = key(
-        "what dry friction has more at rest", None, {"force": 1.2, "speed": 0.01}
-    )
-    lugre: LuGreTable | None = key(
-        "bristles by which dry friction acts in simulation, in place of sticking fast",
-        None,
-        {"stiffness": 1e6, "damping": 200.0},
-    )
-    rated_torque: Number | None = key(
-        "of the motor, N m: what commands in per cent are of", None, 0.64
-    )
-    max_force: Number | None = key("what the drive can do, N or N m", None, 120.0)
-    max_speed: Number | None = key("m/s or rad/s", None, 1.5)
-    counts_per_turn: Number | None = key(
-        "of the motor's encoder in a turn of the motor: what logs in counts are in", None, 131072.0
-    )
-    elastic: ElasticTable | None = key(
-        "a transmission that bends; friction is then the motor's, before it",
-        None,
-        {"stiffness": 2e6, "damping": 300.0, "backlash": 1e-5},
-    )
-    current_time: Number | None = key("time constant of the current loop, s", None, 2e-4)
-    curve: list[Two] = key(
-        "greatest force by speed, at the joint: pairs of speed and force",
-        [],
-        [[0.0, 120.0], [1.0, 120.0], [1.5, 40.0]],
-    )
-    winding: WindingTable | None = key(
-        "the motor's winding, whose supply limits what it gives at speed",
-        None,
-        {"resistance": 0.5, "torque_constant": 0.1, "voltage": 48.0},
-    )
-    ripple: list[WaveTable] = key(
-        "waves of the motor's torque, as shares of it", [], [{"order": 6.0, "size": 0.02}]
-    )
-    cogging: list[WaveTable] = key(
-        "waves of the motor's torque without current, N m at the motor",
-        [],
-        [{"order": 42.0, "size": 0.005}],
-    )
+ConeTable, StribeckTable, LuGreTable = map(_table_of, (Cone, Stribeck, LuGre))
+ElasticTable, WindingTable, WaveTable = map(_table_of, (Elastic, Winding, Wave))
+DriveTable, ReadingTable, RadiiTable = map(_table_of, (Drive, Reading, Radii))
 
 
 class _Motion(Table):
@@ -188,25 +135,9 @@ class TiltingTable(SpatialBody, _Motion):
     tool: Three = key("the tool's centre point in the platform frame, m", (0.0, 0.0, 0.0))
 
 
-class ReadingTable(Table):
-    """`reading`: how a drive counts its joint: coordinate = zero + scale reading."""
-
-    zero: Number = key("the coordinate where it reads 0, m or rad", 0.0)
-    scale: Number = key("coordinate per unit of the reading", 1.0)
-
-
 def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
     """Return what a platform of a motion holds; one that is not known as if it did not tilt."""
     return TiltingTable if motion in TILTING else PlatformTable
-
-
-class RadiiTable(Table):
-    """`radii`: how thick the bodies are, as capsules round their centre lines."""
-
-    guide: Number = key("of a slider's guide, m", 0.0)
-    upper: Number = key("of an upper link or a crank, m", 0.0)
-    lower: Number = key("of a last link or each rod, m", 0.0)
-    platform: Number = key("of the platform's arms, m", 0.0)
 
 
 class ToolTable(Table):
@@ -230,7 +161,7 @@ class MachineTable(Table):
 
     name: str = key("what the machine is called")
     gravity: Three = key("acceleration of gravity in the base frame, m/s^2", STANDARD_GRAVITY)
-    radii: RadiiTable | None = key(
+    radii: RadiiTable | None = key(  # type: ignore[valid-type]
         "how thick the bodies are round their centre lines, m: for clearances",
         None,
         {"guide": 0.01, "upper": 0.01, "lower": 0.008, "platform": 0.01},

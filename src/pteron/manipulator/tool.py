@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 from pteron.arguments import checked_arguments
 from pteron.bodies.inertia import inertia_count
-from pteron.bodies.vectors import Vector, number, numbers, vector
-from pteron.errors import ModelError
+from pteron.bodies.vectors import Vector, not_negative, number, numbers, vector
 from pteron.manipulator.names import name_faults
 from pteron.platforms import Platform
-from pteron.toml import told
+from pteron.toml import keep_checked
 
 _SPATIAL = 6
 """Numbers of a tensor: Ixx, Ixy, Ixz, Iyy, Iyz, Izz."""
@@ -51,28 +52,14 @@ class Tool:
     central_inertia: float | tuple[float, ...] = 0.0
 
     def __post_init__(self) -> None:
-        faults, given = list(name_faults(self.name)), self.central_inertia
-        sound: dict[str, Callable[[], object]] = {
-            "point": lambda: vector(self.point, "point"),
-            "mass": lambda: _not_negative(self.mass),
-            "center_of_mass": lambda: (
-                None
-                if self.center_of_mass is None
-                else vector(self.center_of_mass, "center_of_mass")
-            ),
-            "central_inertia": lambda: (
-                numbers(given, "central_inertia", _SPATIAL)
-                if isinstance(given, Sequence)
-                else number(given, "central_inertia")
-            ),
+        checks: dict[str, Callable[[Any, str], object]] = {
+            "point": vector,
+            "mass": partial(not_negative, unit="kg"),
+            "central_inertia": _inertia,
         }
-        for key, value in sound.items():
-            try:
-                object.__setattr__(self, key, value())
-            except ModelError as error:
-                faults += error.faults
-        if faults:
-            raise ModelError(told(faults), faults=faults)
+        if self.center_of_mass is not None:
+            checks["center_of_mass"] = vector
+        keep_checked(self, checks, name_faults(self.name))
 
     @property
     def center(self) -> Vector:
@@ -95,8 +82,5 @@ def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
             )
 
 
-def _not_negative(value: object) -> float:
-    mass = number(value, "mass")
-    if mass < 0.0:
-        raise ModelError(f"mass: {mass:g} kg is negative; give 0 or more")
-    return mass
+def _inertia(given: Any, key: str) -> float | tuple[float, ...]:
+    return numbers(given, key, _SPATIAL) if isinstance(given, Sequence) else number(given, key)

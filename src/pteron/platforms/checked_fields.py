@@ -8,7 +8,7 @@ from pteron.bodies.inertia import PlanarInertia, SpatialInertia
 from pteron.bodies.vectors import Vector, interval, parallel, perpendicular, unit_vector, vector
 from pteron.errors import ModelError
 from pteron.platforms.kinds import XYZ, AngleOrder
-from pteron.toml import told
+from pteron.toml import refuse
 
 BASE_Z: Vector = (0.0, 0.0, 1.0)
 
@@ -101,6 +101,5 @@ def _joint(given: Any) -> dict[str, Any]:
     second = found.get("second_axis")
     if second and parallel(unit_vector(given.axis, "axis"), second):
         faults.append("second_axis: along axis, so that both angles turn alike; turn one")
-    if faults:
-        raise ModelError(told(faults), faults=faults)
+    refuse(faults)
     return found
