@@ -38,6 +38,11 @@ def pytest_collect_file() -> Generator[None, list[Any], list[Any]]:
     return [one for one in found if type(one) is pytest.Module]
 
 
+def pytest_collection_finish() -> None:
+    """Leave modules and tests out of the search for cycles, which pytest makes at its end too."""
+    gc.freeze()
+
+
 _FLAGS = (
     *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),

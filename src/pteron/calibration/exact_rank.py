@@ -19,7 +19,8 @@ from pteron.calibration.guess import Block, Guess
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.residuals import MachineSlopes
 from pteron.equations.variations import slope_matrix
-from pteron.kernels import NoSquareRoot, PrimeField, evaluate, general_program
+from pteron.kernels import NoSquareRoot, PrimeField, general_program
+from pteron.kernels.fields import Evaluation
 from pteron.kernels.geometry_slopes import slopes_program
 from pteron.kernels.programs import bare
 from pteron.reduction.elimination import dependencies
@@ -117,7 +118,8 @@ class _ModularSlopes(MachineSlopes):
         self.prime, self.rng, self.field = prime, rng, PrimeField(prime)
         geometry = exact_geometry(robot)
         self.own, self.vector = geometry.frame, geometry.within(self.field)
-        self.deltas = general_program(bare(robot), "discriminants").function
+        deltas = general_program(bare(robot), "discriminants").function
+        self.deltas = Evaluation(deltas, self.field, [self.vector])
         self.turning_joints = [leg.joint.unit == "rad" for leg in robot.legs]
         whole = slopes_program(robot).function
         symbols = whole.sx_in()
@@ -126,7 +128,8 @@ class _ModularSlopes(MachineSlopes):
             ca.SX(0) if turns else q
             for q, turns in zip(ca.horzsplit(outputs[0]), self.turning_joints, strict=True)
         ]
-        self.program = ca.Function("slopes", symbols, [ca.horzcat(*joints), *outputs[1:]])
+        program = ca.Function("slopes", symbols, [ca.horzcat(*joints), *outputs[1:]])
+        self.program = Evaluation(program, self.field, [self.vector])
         vector = np.array(self.vector, dtype=object)
         radial = [self._radial(np.array(leg.guide_point)) for leg in robot.legs]
         steps = slope_matrix(robot, self._changes, self._terms, vector, radial) % prime
@@ -155,8 +158,7 @@ class _ModularSlopes(MachineSlopes):
             try:
                 if level is not None:
                     pose = self._levelled(pose, i, level)
-                squares = evaluate(self.deltas, self.field, [self.vector, pose])[0]
-                if all(is_square(delta, p) for delta in squares):
+                if all(is_square(delta, p) for delta in self.deltas.elements(pose)):
                     self.known[tuple(pose)] = self._values(pose)
                     return pose
             except (NoSquareRoot, ZeroDivisionError):
@@ -166,7 +168,7 @@ class _ModularSlopes(MachineSlopes):
     def _values(self, pose: list[int]) -> list[Residues]:
         """Return the program's outputs at a pose."""
         robot = self.start.robot
-        values = evaluate(self.program, self.field, [self.vector, pose])
+        values = self.program(pose)
         n, m = len(robot.legs), robot.freedom
         shapes = [(n,), (n, m), (n, -1), (6, m), (3,), (3, 3), (6, -1)]
         both = zip(values, shapes, strict=False)

@@ -1,14 +1,16 @@
 """Exact arithmetic for CasADi graphs, in the rationals and prime fields; target `exact`.
 
-`evaluate` walks the instructions of an SX function with numbers of a field instead of floats. An
-angle is given by the tangent t of its half, so that its sine and cosine are rational. A square
-root must exist in the field, or `NoSquareRoot` is raised.
+`evaluate` walks the instructions of an SX function with numbers of a field instead of floats;
+`Evaluation` does so at many states, and works out once what does not depend on them. An angle is
+given by the tangent t of its half, so that its sine and cosine are rational. A square root must
+exist in the field, or `NoSquareRoot` is raised.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from math import isnan, isqrt
 from typing import Any, Generic, Protocol, TypeVar
@@ -18,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, PteronError
-from pteron.kernels.graph import CONSTANT, Node, graph_of
+from pteron.kernels.graph import CONSTANT, INPUT, graph_of
 from pteron.kernels.kernel import Kernel, unmasked
 
 Element = TypeVar("Element")
@@ -107,18 +109,115 @@ class PrimeField:
         return root
 
 
-def evaluate(
-    function: ca.Function, field: Field[Element], inputs: Sequence[Sequence[Element]]
-) -> list[list[Element]]:
-    """Return the outputs of an SX function, evaluated in a field; nonzeros by columns.
+class Evaluation(Generic[Element]):
+    """A function in a field, ready for many states: what its first inputs decide is known.
 
-    Raises
-    ------
-    NoSquareRoot
-        If a radicand is no square in the field.
-    ZeroDivisionError
-        If a denominator vanishes.
+    Parameters
+    ----------
+    function : casadi.Function
+        An SX function.
+    field : Field
+        The arithmetic.
+    fixed : sequence of sequence
+        The function's first inputs, the same for every state.
     """
+
+    def __init__(
+        self,
+        function: ca.Function,
+        field: Field[Element],
+        fixed: Sequence[Sequence[Element]] = (),
+    ) -> None:
+        graph = graph_of(function)
+        self._outputs = graph.outputs
+        self._known: list[Any] = [None] * len(graph.nodes)
+        self._inputs: list[tuple[int, int, int]] = []
+        self._steps: dict[int, tuple[Callable[..., Element], tuple[int, ...]]] = {}
+        operations = _operations(field)
+        moving: set[int] = set()
+        for k, node in enumerate(graph.nodes):
+            if node.operation == CONSTANT:
+                value = Fraction(0 if isnan(node.value) else node.value)
+                self._known[k] = field.number(value)
+            elif node.operation == INPUT:
+                port, element = node.arguments
+                if port < len(fixed):
+                    self._known[k] = fixed[port][element]
+                else:
+                    self._inputs.append((k, port - len(fixed), element))
+                    moving.add(k)
+            elif node.operation not in operations:
+                raise ValueError(
+                    f"operation {node.operation} of {function.name()} is not exact in a field"
+                )
+            else:
+                step = operations[node.operation], node.arguments
+                if moving.isdisjoint(node.arguments):
+                    # What does not exist is told when a state asks for it.
+                    with suppress(NoSquareRoot, ZeroDivisionError):
+                        self._known[k] = step[0](*[self._known[j] for j in step[1]])
+                        continue
+                moving.add(k)
+                self._steps[k] = step
+        self._each: list[list[int]] | None = None
+
+    def __call__(self, *inputs: Sequence[Element]) -> list[list[Element]]:
+        """Return the outputs at a state, the other inputs given; nonzeros by columns.
+
+        Raises
+        ------
+        NoSquareRoot
+            If a radicand is no square in the field.
+        ZeroDivisionError
+            If a denominator vanishes.
+        """
+        values = self._started(inputs)
+        self._worked_out(values, self._steps)
+        return [[values[k] for k in nodes] for nodes in self._outputs]
+
+    def elements(self, *inputs: Sequence[Element]) -> Iterator[Element]:
+        """Yield the same, one element after another, each worked out when it is asked for."""
+        if self._each is None:
+            self._each = self._apart()
+        values = self._started(inputs)
+        wanted = (k for nodes in self._outputs for k in nodes)
+        for k, steps in zip(wanted, self._each, strict=True):
+            self._worked_out(values, steps)
+            yield values[k]
+
+    def _started(self, inputs: Sequence[Sequence[Element]]) -> list[Element]:
+        values = self._known.copy()
+        for k, port, element in self._inputs:
+            values[k] = inputs[port][element]
+        return values
+
+    def _worked_out(self, values: list[Element], steps: Iterable[int]) -> None:
+        for k in steps:
+            operation, arguments = self._steps[k]
+            if len(arguments) == 2:
+                i, j = arguments
+                values[k] = operation(values[i], values[j])
+            else:
+                values[k] = operation(values[arguments[0]])
+
+    def _apart(self) -> list[list[int]]:
+        """Return the steps to each element of the outputs beyond those to the elements before."""
+        done: set[int] = set()
+        found = []
+        for root in (k for nodes in self._outputs for k in nodes):
+            more, waiting = set(), [root]
+            while waiting:
+                k = waiting.pop()
+                if k in self._steps and k not in done and k not in more:
+                    more.add(k)
+                    waiting += self._steps[k][1]
+            done |= more
+            found.append(sorted(more))
+        return found
+
+
+def _operations(field: Field[Element]) -> dict[str, Callable[..., Element]]:
+    """Return the operations of a graph that are exact in a field."""
     zero, one = field.number(0), field.number(1)
 
     def sine(t: Element) -> Element:
@@ -147,18 +246,22 @@ def evaluate(
     }
     if isinstance(field, RationalField):
         operations["less"] = lambda a, b: one if a < b else zero
+    return operations
 
-    def rule(node: Node, arguments: list[Element]) -> Element:
-        if node.operation == CONSTANT:
-            return field.number(Fraction(0 if isnan(node.value) else node.value))
-        if node.operation not in operations:
-            raise ValueError(
-                f"operation {node.operation} of {function.name()} is not exact in a field"
-            )
-        return operations[node.operation](*arguments)
 
-    graph = graph_of(function)
-    return graph.results(graph.values(lambda i, j: inputs[i][j], rule))
+def evaluate(
+    function: ca.Function, field: Field[Element], inputs: Sequence[Sequence[Element]]
+) -> list[list[Element]]:
+    """Return the outputs of an SX function, evaluated in a field; nonzeros by columns.
+
+    Raises
+    ------
+    NoSquareRoot
+        If a radicand is no square in the field.
+    ZeroDivisionError
+        If a denominator vanishes.
+    """
+    return Evaluation(function, field)(*inputs)
 
 
 class Exact(Kernel):

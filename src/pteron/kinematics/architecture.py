@@ -16,7 +16,8 @@ import numpy as np
 
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError, SingularPose
-from pteron.kernels import Array, NoSquareRoot, PrimeField, evaluate, general_program, numeric
+from pteron.kernels import Array, NoSquareRoot, PrimeField, general_program, numeric
+from pteron.kernels.fields import Evaluation
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
@@ -203,10 +204,11 @@ def _vanishes_exactly(robot: Manipulator) -> bool:
             continue
         if vector is None:
             return False
+        at = Evaluation(measure, field, [vector])
         for _ in range(_ATTEMPTS):
             pose = [rng.randrange(prime) for _ in range(robot.freedom)]
             try:
-                value = evaluate(measure, field, [vector, pose])[0][0]
+                value = at(pose)[0][0]
             except (NoSquareRoot, ZeroDivisionError):
                 continue
             if value:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from pteron.equations.machine import number_places
 from pteron.kernels import NoSquareRoot, PrimeField, RationalField, evaluate, general_program
+from pteron.kernels.fields import Evaluation
 from pteron.kernels.graph import graph_of
 from pteron.legs.circles import random_fraction
 from pteron.manipulator import Manipulator, parameter_data
@@ -40,17 +41,16 @@ def modular_rows(
     """
     field = PrimeField(prime)
     vector = geometry.within(field)
-    deltas = general_program(topology, "discriminants").function
-    program = general_program(topology, "regressor").function
+    deltas = Evaluation(general_program(topology, "discriminants").function, field, [vector])
+    program = Evaluation(general_program(topology, "regressor").function, field, [vector])
     rows: list[list[int]] = []
     for _ in range(_ATTEMPTS):
         pose = _draw(topology.freedom, prime, rng)
         try:
-            squares = evaluate(deltas, field, [vector, pose])[0]
-            if not all(is_square(delta, prime) for delta in squares):
+            if not all(is_square(delta, prime) for delta in deltas.elements(pose)):
                 continue
             motion = _draw(topology.freedom, prime, rng), _draw(topology.freedom, prime, rng)
-            values = evaluate(program, field, [vector, pose, *motion])[0]
+            values = program(pose, *motion)[0]
         except (NoSquareRoot, ZeroDivisionError):
             continue
         rows += _split(values, topology)
@@ -71,13 +71,13 @@ def rational_rows(
         return []
     field = RationalField()
     vector = geometry.within(field)
-    points = general_program(topology, "platform_points").function
-    program = general_program(topology, "regressor").function
+    points = Evaluation(general_program(topology, "platform_points").function, field, [vector])
+    program = Evaluation(general_program(topology, "regressor").function, field)
     places = number_places(topology)
     rows: list[list[Fraction]] = []
     while len(rows) < states * topology.freedom:
         pose = [random_fraction(rng) for _ in range(topology.freedom)]
-        flat = evaluate(points, field, [vector, pose])[0]
+        flat = points(pose)[0]
         placed = list(vector)
         for i, (leg, at) in enumerate(zip(topology.legs, places, strict=False)):
             sizes = {q.name: len(q.value) for q in leg.quantities}
@@ -91,7 +91,7 @@ def rational_rows(
             placed[at["elbow"]] = Fraction(sigma)
         motion = [[random_fraction(rng) for _ in range(topology.freedom)] for _ in range(2)]
         try:
-            values = evaluate(program, field, [placed, pose, *motion])[0]
+            values = program(placed, pose, *motion)[0]
         except ZeroDivisionError:
             continue
         rows += _split(values, topology)
