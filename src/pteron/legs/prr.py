@@ -99,16 +99,8 @@ class PRREquations(SlideEquations):
 
     kinds: ClassVar = {"p": PointMass.kinds, "l": PlanarInertia.kinds}
 
-    def __init__(
-        self,
-        guide_point: Expression,
-        direction: Expression,
-        slider_direction: Expression,
-        plane_axis: Expression,
-        lower_length: Expression,
-        elbow: Expression,
-    ) -> None:
-        super().__init__(guide_point, slider_direction, lower_length, elbow)
+    def __init__(self, direction: Expression, plane_axis: Expression, **slide: Expression) -> None:
+        super().__init__(**slide)
         self.d = direction
         self.plane = plane_of(direction, plane_axis)
 

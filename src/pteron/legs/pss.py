@@ -68,15 +68,8 @@ class PSSEquations(SlideEquations):
 
     kinds: ClassVar = {"p": PointMass.kinds, "l": RodInertia.kinds}
 
-    def __init__(
-        self,
-        guide_point: Expression,
-        slider_direction: Expression,
-        bar_direction: Expression,
-        lower_length: Expression,
-        elbow: Expression,
-    ) -> None:
-        super().__init__(guide_point, slider_direction, lower_length, elbow)
+    def __init__(self, bar_direction: Expression, **slide: Expression) -> None:
+        super().__init__(**slide)
         self.bar = bar_direction
 
     def counted(self, v: Expression) -> Expression:

@@ -152,16 +152,21 @@ class PlatformEquations(ABC):
         more: Mapping[str, Any] | None = None,
     ) -> None:
         self.frame, self.points, self.fixed = frame, platform_points, fixed_offsets
-        x0, y0, k = frame
+        self.more = more or {}
         self.offsets = [
-            Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
-            for s, t in zip(platform_points, fixed_offsets, strict=True)
+            self.offset(s, t) for s, t in zip(platform_points, fixed_offsets, strict=True)
         ]
+        x0, y0, k = frame
         along = {"x": x0, "y": y0, "z": k}
         lengths = [along[name] for name in self.coordinates if name in along]
         self.directions = ca.SX.eye(3) if len(lengths) == 3 else ca.horzcat(ca.SX(3, 0), *lengths)
         """(3, l): along which the pose's lengths count; P is at directions (x, y, ...), where they
         tell its place."""
+
+    def offset(self, s: Expression, t: Expression) -> Offset:
+        """Return the offset of a platform point: s in the platform's frame, t that is still."""
+        x0, y0, k = self.frame
+        return Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
 
     @classmethod
     def angles(cls) -> list[int]:

@@ -5,9 +5,6 @@ A rack and a pinion turn the tool by phi as they slide. Nothing that the legs ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import casadi as ca
 
 from pteron.bodies.motion import (
@@ -31,19 +28,9 @@ class Sliding(PlatformEquations):
     coordinates = ("x", "y", "z", "phi")
     slides = True
 
-    def __init__(
-        self,
-        frame: Sequence[Expression],
-        platform_points: Sequence[Expression],
-        fixed_offsets: Sequence[Expression],
-        more: Mapping[str, Any] | None = None,
-    ) -> None:
-        super().__init__(frame, platform_points, fixed_offsets)
-        x0, y0, _ = frame
-        self.offsets = [
-            Offset(x0 * v[0] + y0 * v[1], ca.SX(3, 1), t)
-            for v, t in zip(platform_points, fixed_offsets, strict=True)
-        ]
+    def offset(self, s: Expression, t: Expression) -> Offset:
+        x0, y0, _ = self.frame
+        return Offset(x0 * s[0] + y0 * s[1], ca.SX(3, 1), t)
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression

@@ -6,7 +6,7 @@ R is a product of turns by one angle of the pose each, about axes that move with
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
@@ -78,20 +78,13 @@ class Tilting(PlatformEquations):
     order: ClassVar[tuple[str, ...]]
     """The angles' coordinates, in the order in which their turns follow each other."""
 
-    def __init__(
-        self,
-        frame: Sequence[Expression],
-        platform_points: Sequence[Expression],
-        fixed_offsets: Sequence[Expression],
-        more: Mapping[str, Any] | None = None,
-    ) -> None:
-        super().__init__(frame, platform_points, fixed_offsets)
-        self.more = more or {}
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
         self.based: Tilting | None = None
         """The same along the base's axes, where vectors are along the platform's."""
-        self.zero = ca.horzcat(*frame)
+        self.zero = ca.horzcat(*self.frame)
         """(3, 3): the platform's axes at angles zero."""
-        self.arms = [ca.mtimes(self.zero, s) for s in platform_points]
+        self.arms = [ca.mtimes(self.zero, s) for s in self.points]
         """R s0 at angles zero."""
 
     def turn_axes(self) -> list[Expression]:

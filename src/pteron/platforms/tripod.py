@@ -8,7 +8,7 @@ leaves A cos(yaw) + B sin(yaw) = C.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -29,15 +29,9 @@ class Tripod(Tilting):
     order = ("yaw", "pitch", "roll")
     joints = ("x", "y", "z", *order)
 
-    def __init__(
-        self,
-        frame: Sequence[Expression],
-        platform_points: Sequence[Expression],
-        fixed_offsets: Sequence[Expression],
-        more: Mapping[str, Any],
-    ) -> None:
-        super().__init__(frame, platform_points, fixed_offsets, more)
-        self.planes: Sequence[HeldPlane] = more["planes"]
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.planes: Sequence[HeldPlane] = self.more["planes"]
         k = self.frame[2]
         normals = [plane.normal for plane in self.planes]
         pairs = [(1, 2), (2, 0), (0, 1)]

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from pteron.bodies.tables import Table
+from pteron.bodies.tables import Table, key
 from pteron.design.choosing.job_tables import (
     AccuracyTable,
     BoundTable,
@@ -70,10 +70,8 @@ class Job(Table):
     links: LinksTable = Field(default_factory=lambda: LinksTable.model_validate({}))
     floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
     most: BoundTable = Field(default_factory=lambda: BoundTable.model_validate({}))
-    kinds: Names | None = Field(None, description="to choose from; else all that can do it")
-    objectives: Names = Field(
-        ["price"], description=f"what is to be small: {', '.join(OBJECTIVES)}"
-    )
+    kinds: Names | None = key("to choose from; else all that can do it", None)
+    objectives: Names = key(f"what is to be small: {', '.join(OBJECTIVES)}", ["price"])
     search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
 
     _folder: Path = PrivateAttr(Path())

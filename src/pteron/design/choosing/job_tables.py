@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
-from pteron.bodies.tables import Count, Number, Table, Three, Two
-from pteron.design.loads import PayloadTable, Positive
+from pteron.bodies.tables import Count, Number, Table, Three, Two, key
+from pteron.design.loads import Least, PayloadTable, Positive
 from pteron.design.spec import Floor
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -74,23 +74,23 @@ Place = Annotated[Three, AfterValidator(_near)]
 class WorkspaceTable(Table):
     """`[workspace]`: where the tool's centre point must work; it has one of three shapes."""
 
-    size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = Field(
-        None, description="sides of a box, m; two for a flat one"
+    size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = key(
+        "sides of a box, m; two for a flat one", None
     )
-    radius: Near | None = Field(None, description="of an upright cylinder, m")
-    height: Near | None = Field(None, description="of the cylinder, m")
-    poses: Annotated[list[tuple[Number, ...]], Field(min_length=1)] | None = Field(
-        None, description="positions, all of which must be met: x y z, m"
+    radius: Near | None = key("of an upright cylinder, m", None)
+    height: Near | None = key("of the cylinder, m", None)
+    poses: Annotated[list[tuple[Number, ...]], Field(min_length=1)] | None = key(
+        "positions, all of which must be met: x y z, m", None
     )
-    center: Place | None = Field(
-        None, description="its middle in the cell, m; left out, it may be anywhere in the cell"
+    center: Place | None = key(
+        "its middle in the cell, m; left out, it may be anywhere in the cell", None
     )
-    turn: Two | None = Field(None, description="least and greatest turn about the upright, rad")
-    tilt: Annotated[Positive, AfterValidator(_leaning)] | None = Field(
-        None, description="of the platform to every side, rad: it fills a cone"
+    turn: Two | None = key("least and greatest turn about the upright, rad", None)
+    tilt: Annotated[Positive, AfterValidator(_leaning)] | None = key(
+        "of the platform to every side, rad: it fills a cone", None
     )
-    directions: Annotated[list[Three], Field(min_length=1)] | None = Field(
-        None, description="of the platform's z, at each of which it must work; level is [0, 0, 1]"
+    directions: Annotated[list[Three], Field(min_length=1)] | None = key(
+        "of the platform's z, at each of which it must work; level is [0, 0, 1]", None
     )
 
     @model_validator(mode="after")
@@ -154,9 +154,8 @@ class WorkspaceTable(Table):
 class LoadTable(PayloadTable):
     """`[payload]`: what the platform carries, a tool with its centre point among it."""
 
-    tool: Place = Field(
-        (0.0, 0.0, 0.0),
-        description="the tool's centre point in the platform's frame, m: what must reach",
+    tool: Place = key(
+        "the tool's centre point in the platform's frame, m: what must reach", (0.0, 0.0, 0.0)
     )
 
 
@@ -166,46 +165,43 @@ class CycleTable(Table):
     name: str | None = None
     points: Annotated[
         list[tuple[Number, ...]], Field(min_length=2), AfterValidator(_near_points)
-    ] = Field(
-        description="from the middle of the workspace, m; a turn about the upright may follow, or "
+    ] = key(
+        "from the middle of the workspace, m; a turn about the upright may follow, or "
         "roll, pitch and yaw, rad"
     )
-    corner: Annotated[Number, Field(ge=0.0)] = Field(
-        0.0, description="metres before and after a point where the path leaves its lines; 0: stop"
+    corner: Least = key(
+        "metres before and after a point where the path leaves its lines; 0: stop", 0.0
     )
-    duration: Positive | None = Field(
-        None, description="of the path, s; left out, as fast as the motors can"
+    duration: Positive | None = key("of the path, s; left out, as fast as the motors can", None)
+    dwell: Least = key("rest after it, s", 0.0)
+    back: bool = key("whether the path goes back as it came", False)
+    share: Positive | None = key(
+        "how often it is done in a duty cycle of all; without it each counts by itself", None
     )
-    dwell: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="rest after it, s")
-    back: bool = Field(False, description="whether the path goes back as it came")
-    share: Positive | None = Field(
-        None,
-        description="how often it is done in a duty cycle of all; without it each counts by itself",
-    )
-    anywhere: bool = Field(
-        True, description="whether it may be at any place and in any direction of the workspace"
+    anywhere: bool = key(
+        "whether it may be at any place and in any direction of the workspace", True
     )
 
 
 class MotionTable(Table):
     """`[motion]`: what the platform must be able to do everywhere, in every direction."""
 
-    speed: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of P, m/s")
-    acceleration: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of P, m/s^2")
+    speed: Least = key("of P, m/s", 0.0)
+    acceleration: Least = key("of P, m/s^2", 0.0)
 
 
 class AccuracyTable(Table):
     """`[accuracy]`: how far the tool may be from where it should be."""
 
-    most: Fine = Field(description="m")
-    counted: Literal["deviation", "worst"] = Field(
-        "deviation", description="root of the sum of squares of all errors, or their sum"
+    most: Fine = key("m")
+    counted: Literal["deviation", "worst"] = key(
+        "root of the sum of squares of all errors, or their sum", "deviation"
     )
-    counts_per_turn: Positive = Field(20000.0, description="of the motors' encoders")
-    backlash: bool = Field(True, description="whether the gearboxes' backlash counts")
-    point: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of joints' places, m")
-    length: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of links, m")
-    angle: Annotated[Number, Field(ge=0.0)] = Field(0.0, description="of axes, rad")
+    counts_per_turn: Positive = key("of the motors' encoders", 20000.0)
+    backlash: bool = key("whether the gearboxes' backlash counts", True)
+    point: Least = key("of joints' places, m", 0.0)
+    length: Least = key("of links, m", 0.0)
+    angle: Least = key("of axes, rad", 0.0)
 
     @property
     def of_parts(self) -> bool:
@@ -216,15 +212,15 @@ class AccuracyTable(Table):
 class StiffnessTable(Table):
     """`[stiffness]`: how far the tool may give way."""
 
-    force: Positive = Field(description="in any direction, N")
-    most: Fine = Field(description="m")
+    force: Positive = key("in any direction, N")
+    most: Fine = key("m")
 
 
 class KeepOutTable(Table):
     """`[[keep_out]]`: a box in which no part of the machine may be."""
 
-    low: Place = Field(description="m; from the middle of a workspace that floats")
-    high: Place = Field(description="m")
+    low: Place = key("m; from the middle of a workspace that floats")
+    high: Place = key("m")
 
     @model_validator(mode="after")
     def _rises(self) -> Self:
@@ -236,40 +232,34 @@ class KeepOutTable(Table):
 class CellTable(Table):
     """`[cell]`: the room for the machine."""
 
-    footprint: tuple[Near, Near] | None = Field(None, description="along x and y, m")
-    height: Near | None = Field(None, description="m")
-    low: Place | None = Field(None, description="of a cell with a place of its own, m")
-    high: Place | None = Field(None, description="m")
-    margin: Annotated[Number, Field(ge=0.0)] = Field(
-        0.03, description="half the width of bodies about their middle lines, m"
-    )
+    footprint: tuple[Near, Near] | None = key("along x and y, m", None)
+    height: Near | None = key("m", None)
+    low: Place | None = key("of a cell with a place of its own, m", None)
+    high: Place | None = key("m", None)
+    margin: Least = key("half the width of bodies about their middle lines, m", 0.03)
 
 
 class MotorsTable(Table):
     """`[motors]`: what the drives are chosen from."""
 
-    list: str | None = Field(None, description="CSV or TOML file; else the package's examples")
-    gearboxes: str | None = Field(None, description="CSV file; else the package's examples")
-    margin: Annotated[Number, Field(ge=1.0)] = Field(
-        1.2, description="what a drive must be able to do, over what is asked"
+    list: str | None = key("CSV or TOML file; else the package's examples", None)
+    gearboxes: str | None = key("CSV file; else the package's examples", None)
+    margin: Annotated[Number, Field(ge=1.0)] = key(
+        "what a drive must be able to do, over what is asked", 1.2
     )
-    friction: Annotated[Number, Field(ge=0.0, lt=0.5)] = Field(
-        0.05, description="dry friction as a share of the rated torque"
+    friction: Annotated[Number, Field(ge=0.0, lt=0.5)] = key(
+        "dry friction as a share of the rated torque", 0.05
     )
 
 
 class LinksTable(Table):
     """`[links]`: what the moving parts are made of."""
 
-    upper: Names = Field(
-        ["aluminium-tube:40x2", "aluminium-tube:60x3"], description="stock of cranks, to choose"
-    )
-    lower: Names = Field(
-        ["carbon-tube:12x1", "carbon-tube:20x1.5"], description="stock of rods, to choose from"
-    )
-    plate: Positive = Field(0.006, description="thickness of an aluminium platform, m")
-    carriage: Positive = Field(0.4, description="mass of what slides on a guide, kg")
-    guide: Positive = Field(0.015, description="half the width of a guide, m")
+    upper: Names = key("stock of cranks, to choose", ["aluminium-tube:40x2", "aluminium-tube:60x3"])
+    lower: Names = key("stock of rods, to choose from", ["carbon-tube:12x1", "carbon-tube:20x1.5"])
+    plate: Positive = key("thickness of an aluminium platform, m", 0.006)
+    carriage: Positive = key("mass of what slides on a guide, kg", 0.4)
+    guide: Positive = key("half the width of a guide, m", 0.015)
 
     @field_validator("upper", "lower")
     @classmethod
@@ -287,15 +277,13 @@ class FloorsTable(Table):
 
     type_i: Floor = 0.1
     type_ii: Floor = 0.05
-    clearance: Annotated[Number, Field(ge=0.0)] = Field(
-        0.0, description="least distance of two bodies from surface to surface, m"
-    )
+    clearance: Least = key("least distance of two bodies from surface to surface, m", 0.0)
 
 
 class SearchTable(Table):
     """`[search]`: how long, and by what chance."""
 
-    evaluations: Count = Field(800, description="designs of each kind")
+    evaluations: Count = key("designs of each kind", 800)
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
