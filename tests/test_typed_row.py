@@ -11,9 +11,9 @@ from pteron.tables import Table
 
 RNG = np.random.default_rng(7)
 VALUES = [
-    *(RNG.choice([-1.0, 1.0], 3000) * 10.0 ** RNG.uniform(-30.0, 30.0, 3000)),
-    *(RNG.choice([-1.0, 1.0], 2000) * 10.0 ** RNG.uniform(-7.0, -3.0, 2000)),
-    *(RNG.choice([-1.0, 1.0], 2000) * 10.0 ** RNG.uniform(14.0, 18.0, 2000)),
+    *(RNG.choice([-1.0, 1.0], 3000) * 10.0 ** RNG.uniform(-30.0, 30.0, 3000)).tolist(),
+    *(RNG.choice([-1.0, 1.0], 2000) * 10.0 ** RNG.uniform(-7.0, -3.0, 2000)).tolist(),
+    *(RNG.choice([-1.0, 1.0], 2000) * 10.0 ** RNG.uniform(14.0, 18.0, 2000)).tolist(),
     *(0.0, -0.0, 1.0, 1e-6, 1e-5, -1e-5, 9.999e-5, 1e-4, 1e15, 1e16, 1e22, 1e100, 5e-324),
 ]
 

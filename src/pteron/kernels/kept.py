@@ -167,8 +167,10 @@ def _source(packages: tuple[str, ...]) -> str:
 
 @lru_cache
 def _digest(name: str) -> str:
-    """Return a digest of the source of a package, or of a module."""
+    """Return a digest of the source of a package, or of a module, and of its templates."""
     total, module = hashlib.sha256(), (_PACKAGE / name).with_suffix(".py")
-    for path in [module] if module.is_file() else sorted((_PACKAGE / name).rglob("*.py")):
-        total.update(path.read_bytes())
+    files = [module] if module.is_file() else sorted((_PACKAGE / name).rglob("*.*"))
+    for path in files:
+        if path.suffix in (".py", ".j2"):
+            total.update(path.read_bytes())
     return total.hexdigest()
