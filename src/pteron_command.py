@@ -16,6 +16,9 @@ _INTERRUPTED = 130
 _THREADS = "OPENBLAS_NUM_THREADS"
 """Read once, when NumPy is imported."""
 
+_PLUGINS = "PYDANTIC_DISABLE_PLUGINS"
+"""Read when Pydantic makes its first model: it would look for plugins in all that is installed."""
+
 _ALIVE = 1_000_000
 """Objects made before Python looks for cycles among them: imports make many, and no garbage."""
 
@@ -24,6 +27,7 @@ def main() -> None:
     """Run the command line."""
     # Matrices are small: more threads wait more than they work, and add up in another order.
     os.environ.setdefault(_THREADS, "1")
+    os.environ.setdefault(_PLUGINS, "__all__")
     gc.set_threshold(_ALIVE, *gc.get_threshold()[1:])
     ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if ours:

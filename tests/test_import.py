@@ -51,7 +51,14 @@ SURFACE = {
 }
 """The public names that the design promised and that the library has."""
 
-HEAVY = ("sympy", "scipy", "polars", "matplotlib", "pydantic", "typer", "rich", "tomlkit")
+HEAVY = (
+    *("sympy", "scipy", "polars", "matplotlib", "pydantic", "typer", "rich", "tomlkit"),
+    *("jaxtyping", "unittest.mock", "asyncio"),
+)
+
+
+READING = ("pteron.manipulator.tables", "pteron.bodies.tables", "jaxtyping", "asyncio")
+"""What reads and checks a machine's file, and what comes with the type hints of arrays."""
 
 
 def in_a_fresh_python(code):
@@ -106,13 +113,22 @@ def loaded_by(words):
     ("words", "unused"),
     [
         ("--version", ("numpy", "rich.console", "urllib.request")),
-        ("catalog", ("scipy", "sympy", "polars", "urllib.request")),
-        ("inverse quadrupteron 0.01 0.02 -0.03 0.1", ("scipy", "sympy", "rich.console")),
-        ("base quadrupteron", ("sympy", "polars")),
-        ("cycle quadrupteron", ("scipy.optimize", "sympy", "polars")),
+        ("catalog", ("scipy", "sympy", "polars", "urllib.request", *READING)),
+        ("check delta", ("scipy.optimize", "sympy", "polars", "jinja2", "jaxtyping")),
+        (
+            "inverse quadrupteron 0.01 0.02 -0.03 0.1",
+            ("scipy", "sympy", "polars", "rich.console", *READING),
+        ),
+        ("direct quadrupteron 0.03 0.02 0.01 0.02", ("scipy", "sympy", "polars", *READING)),
+        ("forces quadrupteron --pose 0.01 0.02 -0.03 0.1", ("sympy", "polars", *READING)),
+        ("base quadrupteron", ("sympy", "polars", *READING)),
+        ("cycle quadrupteron", ("scipy.optimize", "sympy", "polars", "jinja2", *READING)),
+        ("export quadrupteron --c controller", ("sympy", "polars", *READING)),
+        ("report quadrupteron --out report", ("scipy.optimize", "sympy", *READING)),
     ],
 )
-def test_a_command_loads_what_it_uses(words, unused):
+def test_a_command_loads_what_it_uses(words, unused, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     loaded_by(words)  # what it keeps on disk is there the second time
     modules = loaded_by(words)
     assert [name for name in unused if name in modules] == []

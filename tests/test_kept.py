@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import pteron
+from pteron.cli.kept_machines import kept_machine
 from pteron.kernels import cache
 from pteron.kernels.kept import EQUATIONS, kept_result
 from pteron.workspace import home
@@ -128,3 +129,18 @@ def test_a_damaged_result_is_found_again_and_kept(damage, tmp_path, monkeypatch)
     assert result() == value
     assert len(asked) == 2
     assert [one.name for one in (tmp_path / cache.TEXTS).iterdir()] == [path.name]
+
+
+def test_a_machine_is_that_of_its_file_as_it_is_now(tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "cache"))
+    file = tmp_path / "own.toml"
+    pteron.save(pteron.load("delta"), file)
+    for name in ("first", "second"):
+        text = file.read_text(encoding="utf-8").splitlines()
+        text = [f'name = "{name}"' if line.startswith("name = ") else line for line in text]
+        file.write_text("\n".join(text) + "\n", encoding="utf-8")
+        for _ in range(2):
+            robot, unlikely = kept_machine(str(file))
+            assert (robot, unlikely) == (pteron.load(file), ())
+            assert robot.name == name
+    assert len(list((tmp_path / "cache" / cache.TEXTS).iterdir())) == 2

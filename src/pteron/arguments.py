@@ -12,6 +12,7 @@ import inspect
 import math
 import operator
 import os
+import sys
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +20,6 @@ from functools import cache, update_wrapper
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from jaxtyping import AbstractArray
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, PteronError, shown
@@ -217,7 +217,7 @@ def _kind(hint: Any) -> _Kind | None:
     if hint in _PLAIN:
         return _PLAIN[hint]
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
-    if origin is np.ndarray or (isinstance(hint, type) and issubclass(hint, AbstractArray)):
+    if np.ndarray in (hint, origin) or _has_shape(hint):
         return _Kind("an array", _is_array)
     if origin in (typing.Union, types.UnionType):
         # ArrayLike is a union too, and one with another flattens it.
@@ -249,6 +249,16 @@ def _kind(hint: Any) -> _Kind | None:
     article = "an" if kind.__name__[0] in "AEIO" else "a"
     called = _CALLED.get(kind.__name__, f"{article} {kind.__name__}")
     return _Kind(called, lambda value: isinstance(value, kind))
+
+
+def _has_shape(hint: Any) -> bool:
+    """Say whether a type hint is an array of jaxtyping, which then is imported."""
+    jaxtyping = sys.modules.get("jaxtyping")
+    return (
+        jaxtyping is not None
+        and isinstance(hint, type)
+        and issubclass(hint, jaxtyping.AbstractArray)
+    )
 
 
 def _alternative(hint: Any) -> _Kind | None:

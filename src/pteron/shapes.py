@@ -7,14 +7,29 @@ without phi where the platform does not turn, with three angles, or two, where i
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from pteron.arguments import Between
+
+if TYPE_CHECKING or "jaxtyping" in sys.modules:
+    from jaxtyping import Float as Float, Int as Int
+else:
+
+    class _Unchecked:
+        """An array's type hint where nobody who checks shapes has imported jaxtyping.
+
+        Its import takes most of a tenth of a second, and what it says is for type checkers.
+        """
+
+        def __class_getitem__(cls, given: tuple[Any, str]) -> Any:
+            return given[0]
+
+    Float = Int = _Unchecked
 
 OnFailure = Literal["raise", "nan"]
 """The action of a batch function at a pose that fails: raise the error, or return NaN there."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections import deque
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from typer.core import TyperCommand
 
 from pteron.cli.terminal import warn
-from pteron.errors import DataError, UnlikelyValue
+from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
@@ -153,16 +152,15 @@ def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = Fa
 
     Warnings about its file are shown unless `quiet`.
     """
-    from pteron.manipulator import load
-    from pteron.manipulator.variants import with_elbows
+    from pteron.cli.kept_machines import kept_machine
 
-    with warnings.catch_warnings(record=True) as unlikely:
-        warnings.simplefilter("always", UnlikelyValue)
-        robot = load(name_or_path)
+    robot, unlikely = kept_machine(name_or_path)
     if not quiet:
-        warn(str(warning.message) for warning in unlikely)
+        warn(unlikely, f"{name_or_path}: ")
     if elbows is None:
         return robot
+    from pteron.manipulator.variants import with_elbows
+
     if set(elbows) - set("+-") or len(elbows) != len(robot.legs):
         raise DataError(
             f"--elbows: {elbows!r} given, {len(robot.legs)} signs + or - expected, one for each "

@@ -19,6 +19,7 @@ from pteron.errors import DataError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pteron.cli.typed_row import TypedRow
     from pteron.manipulator import Manipulator
     from pteron.tables import Table
 
@@ -139,23 +140,31 @@ def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
         note(f"Note: beyond the joints' limits: {', '.join(told)}")
 
 
-def _modes(table: Table, poses: NDArray[Any], coordinates: tuple[str, ...]) -> Table:
+def _modes(
+    table: Table | TypedRow, poses: NDArray[Any], coordinates: tuple[str, ...]
+) -> Table | TypedRow:
     """Return one row for each real pose, and one without a pose where there is none."""
     from dataclasses import replace
 
     import numpy as np
-    import polars as pl
+
+    from pteron.cli.typed_row import TypedRow
 
     real = ~np.isnan(poses).any(axis=-1)
     lost = ~real.any(axis=-1)
     real[lost, 0] = True
     row, mode = np.nonzero(real)
+    found = dict(zip(coordinates, poses[row, mode].T, strict=True))
+    if isinstance(table, TypedRow):
+        numbers = [None] if lost.any() else (mode + 1).tolist()
+        return table.repeated(numbers, coordinates).extended(found)
+    import polars as pl
+
     frame = table.frame.drop("row", "mode", *coordinates, strict=False)[row]
     frame.insert_column(0, pl.Series("row", row + 1))
     modes = pl.Series("mode", mode + 1, dtype=pl.Int64)
     frame = frame.hstack([modes.zip_with(~pl.Series(lost[row]), pl.Series([None], dtype=pl.Int64))])
-    found = poses[row, mode].T
-    return replace(table, frame=frame).extended(dict(zip(coordinates, found, strict=True)))
+    return replace(table, frame=frame).extended(found)
 
 
 def forces(

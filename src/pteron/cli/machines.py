@@ -40,12 +40,12 @@ def catalog() -> Result:
     --------
     pteron catalog --json
     """
-    from pteron.manipulator import load
+    from pteron.cli.kept_machines import kept_machine
     from pteron.manipulator.files import descriptions
 
     found = [
         {**_machine(robot), "legs": len(robot.legs), "description": text}
-        for robot, text in ((load(name), text) for name, text in descriptions().items())
+        for robot, text in ((kept_machine(name)[0], text) for name, text in descriptions().items())
     ]
     keys = ("name", "motion", "types", "description")
     cells = ((one[key] for key in keys) for one in found)

@@ -16,6 +16,7 @@ from pteron.errors import DataError, OutputError, PteronError, SingularPose, Unr
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pteron.cli.typed_row import TypedRow
     from pteron.manipulator import Manipulator
     from pteron.tables import Table
 
@@ -34,8 +35,14 @@ _DECIMALS = {"m": 6, "rad": 6, "N": 4, "N m": 4}
 class Rows:
     """A table, or a single row that was typed: messages about it speak of no rows."""
 
-    table: Table
-    single: bool = False
+    table: Table | TypedRow
+
+    @property
+    def single(self) -> bool:
+        """Whether the row was typed."""
+        from pteron.cli.typed_row import TypedRow
+
+        return isinstance(self.table, TypedRow)
 
     def served(
         self,
@@ -116,12 +123,9 @@ def given_rows(
 
 def single_row(columns: Sequence[str], values: Sequence[float]) -> Rows:
     """Return the row that was typed."""
-    import polars as pl
+    from pteron.cli.typed_row import TypedRow
 
-    from pteron.tables import Table
-
-    cells = {name: [value] for name, value in zip(columns, values, strict=True)}
-    return Rows(Table("the command line", pl.DataFrame(cells)), single=True)
+    return Rows(TypedRow({name: [value] for name, value in zip(columns, values, strict=True)}))
 
 
 def rows_of_table(robot: Manipulator, file: str | None, what: str, names: Sequence[str]) -> Rows:
@@ -137,7 +141,7 @@ def rows_of_table(robot: Manipulator, file: str | None, what: str, names: Sequen
 
 
 def check_destination(
-    out: str | None, source: str | None, table: Table, added: Sequence[str]
+    out: str | None, source: str | None, table: Table | TypedRow, added: Sequence[str]
 ) -> None:
     """Refuse, before the work begins, a file that cannot be written or would lose data."""
     # The columns added replace those of the same name, in another file than the table's own.
@@ -155,7 +159,7 @@ def check_destination(
 
 def deliver(
     robot: Manipulator,
-    result: Table,
+    result: Table | TypedRow,
     shown: Sequence[str],
     *,
     out: str | None,
@@ -164,7 +168,7 @@ def deliver(
 ) -> None:
     """Write a result with all its columns to a file or a program, or show some to a person."""
     # The last column shown is empty in a row that failed.
-    empty = result.frame[shown[-1]].null_count()
+    empty = result.empty(shown[-1])
     without = f", {empty} of them without a result" if empty else ""
     if out is not None:
         from pteron.tables import write_table
@@ -187,13 +191,15 @@ def deliver(
             note(f"Printed {_count(len(result))}{without}")
 
 
-def _show(robot: Manipulator, result: Table, shown: Sequence[str], *, single: bool) -> None:
+def _show(
+    robot: Manipulator, result: Table | TypedRow, shown: Sequence[str], *, single: bool
+) -> None:
     known = robot.column_units
     units = [known.get(name, "") for name in shown]
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
     rows = [
         [str(i), *map(_text, cells, units)]
-        for i, cells in enumerate(result.frame.select(shown).head(SHOWN_ROWS).iter_rows(), start=1)
+        for i, cells in enumerate(result.rows(shown, SHOWN_ROWS), start=1)
     ]
     if single or "mode" in shown:
         show(table(*headings, rows=(row[1:] for row in rows), numbers=tuple(headings)))

@@ -18,6 +18,7 @@ import sysconfig
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache, partial
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -39,6 +40,7 @@ from pteron.kernels.code import (
 from pteron.kernels.compilers import built, run
 from pteron.kernels.exponential import straight
 from pteron.kernels.graph import Graph, graph_of
+from pteron.kernels.kept import kept_result
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
 
 FLAGS = (
@@ -156,7 +158,12 @@ class Code:
 
     @cached_property
     def source(self) -> str:
-        """The C code."""
+        """The C code: writing it takes 0.1 s and more, so that it is kept."""
+        function, outputs = self._program
+        key = self.name, function.serialize(), self.ports, outputs, self.dtype, version("jinja2")
+        return kept_result(("c source", *key), ("templates",), self._written)
+
+    def _written(self) -> str:
         function, outputs = self._program
         graph = graph_of(straight(function), self.ports)
         return module_source(self.name, graph, self.ports, outputs, self.dtype)

@@ -97,12 +97,17 @@ def kept(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
 
 
 def kept_result(
-    key: tuple[Any, ...], packages: tuple[str, ...], find: Callable[[], _Result]
+    key: tuple[Any, ...],
+    packages: tuple[str, ...],
+    find: Callable[[], _Result],
+    *,
+    keeps: Callable[[_Result], bool] = lambda _: True,
 ) -> _Result:
     """Return the result of a key: the one on disk, or one that is found now, and then kept.
 
-    It depends on the source of `packages` and of all equations. It is pickled: the cache is the
-    user's alone and holds code that is run.
+    It depends on the source of `packages`, or of modules at the top, and of all equations. It is
+    pickled: the cache is the user's alone and holds code that is run. What `keeps` is false of is
+    not kept.
     """
     name = name_of(*key, sources=(*EQUATIONS, *packages))
     text = None if name is None else cache.find_text(name)
@@ -111,7 +116,7 @@ def kept_result(
             found: _Result = pickle.loads(text.encode("latin-1"))
             return found
     found = find()
-    if name is not None:
+    if name is not None and keeps(found):
         cache.keep_text(name, pickle.dumps(found).decode("latin-1"))
     return found
 
@@ -119,7 +124,7 @@ def kept_result(
 def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
     """Return the name under which the text of a key is kept, see `cache`; None for a foreign leg.
 
-    It changes with the source of each of the packages `sources`.
+    It changes with the source of each of the packages, or modules at the top, `sources`.
     """
     told = _told(key)
     return None if told is None else cache.digest(told, _source(sources), ca.__version__)
@@ -161,10 +166,16 @@ def _told(value: Any) -> str | None:
     return None if None in parts else f"{kind.__module__}.{kind.__qualname__}{parts}"
 
 
-@lru_cache
 def _source(packages: tuple[str, ...]) -> str:
-    total = hashlib.sha256()
-    files = (file for name in packages for file in (_PACKAGE / name).rglob("*.*"))
-    for path in sorted(file for file in files if file.suffix in (".py", ".j2")):
-        total.update(path.read_bytes())
+    return " ".join(_digest(name) for name in sorted(packages))
+
+
+@lru_cache
+def _digest(name: str) -> str:
+    """Return a digest of the source of a package, or of a module, with its templates and data."""
+    total, module = hashlib.sha256(), (_PACKAGE / name).with_suffix(".py")
+    files = [module] if module.is_file() else sorted((_PACKAGE / name).rglob("*.*"))
+    for path in files:
+        if path.suffix in (".py", ".j2", ".toml"):
+            total.update(path.read_bytes())
     return total.hexdigest()

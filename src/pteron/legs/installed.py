@@ -6,7 +6,7 @@ file asks for the kind, not before.
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
 
 from pteron.errors import ModelError
 from pteron.legs.kind import LegKind
@@ -21,6 +21,9 @@ from pteron.legs.rrs import RRS
 from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
 from pteron.legs.ups import UPS
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "pteron.legs"
 
@@ -54,6 +57,8 @@ def kind_named(name: str) -> type[LegKind] | None:
 
 
 def _others() -> tuple[EntryPoint, ...]:
+    from importlib.metadata import entry_points
+
     return tuple(entry_points(group=GROUP))
 
 

@@ -83,14 +83,14 @@ def load(name_or_path: str | Path) -> Manipulator:
     >>> pteron.load("tripteron").coordinates
     ('x', 'y', 'z')
     """
-    robot, unlikely = _loaded(*_contents(name_or_path), str(name_or_path))
+    robot, unlikely = read_machine(*contents(name_or_path), str(name_or_path))
     for text in unlikely:
         warn_unlikely(f"{name_or_path}: {text}")
     return robot
 
 
 @lru_cache(maxsize=64)
-def _loaded(data: bytes, source: str, given: str) -> tuple[Manipulator, tuple[str, ...]]:
+def read_machine(data: bytes, source: str, given: str) -> tuple[Manipulator, tuple[str, ...]]:
     """Return the machine of a file's contents, and warnings; what was read once is kept."""
     robot = _machine(parsed_toml(data, source, ModelError), given)
     # Pteron writes first moments, persons centres of mass: what identification finds for a body
@@ -100,10 +100,10 @@ def _loaded(data: bytes, source: str, given: str) -> tuple[Manipulator, tuple[st
 
 def document(name_or_path: str | Path) -> dict[str, Any]:
     """Return what the file of a machine holds, unchecked."""
-    return parsed_toml(*_contents(name_or_path), ModelError)
+    return parsed_toml(*contents(name_or_path), ModelError)
 
 
-def _contents(name_or_path: str | Path) -> tuple[bytes, str]:
+def contents(name_or_path: str | Path) -> tuple[bytes, str]:
     """Return the bytes of a machine's file, and what messages call it."""
     name = str(name_or_path)
     if name in catalog():

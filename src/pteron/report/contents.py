@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.metadata import version
 
 import numpy as np
 
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
+from pteron.kernels.kept import kept_result
 from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
@@ -161,6 +163,11 @@ class Report:
         return any(drive.rotor_inertia > 0.0 for drive in self.sizing.drives)
 
 
+def _volume(robot: Manipulator, home: Array) -> ReachVolume:
+    key = "reach_volume", robot, tuple(home.tolist()), version("scipy")
+    return kept_result(key, ("kinematics", "workspace"), lambda: reach_volume(robot, home))
+
+
 def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     """Return the report on a machine that reaches a pose and is not singular everywhere.
 
@@ -170,7 +177,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     at_home = pose_margins(robot, home)
     cycle = pick_and_place(robot, home) if motion is None else motion.motion
     sizing = size(robot, cycle)
-    volume = reach_volume(robot, home) if len(robot.platform.lengths) > 1 else None
+    volume = _volume(robot, home) if len(robot.platform.lengths) > 1 else None
     base = base_parameters(robot)
     return Report(
         robot=robot,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from functools import partial
+from importlib.metadata import version
 from math import prod
 from operator import itemgetter
 from typing import Any
@@ -13,6 +15,7 @@ from markupsafe import Markup, escape
 from pteron.bodies.inertia import Inertia, with_center
 from pteron.errors import ModelError
 from pteron.kernels import Array
+from pteron.kernels.kept import kept_result
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
 from pteron.manipulator import Manipulator
@@ -259,6 +262,19 @@ def _without_rounding(base: BaseParameters) -> Array:
 
 def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
     """Return the sums in symbols and the symbols' values in m; None if none, or too long."""
+    key = base.robot, base.parameters, base.kept, base.certificate.method, version("sympy")
+    packages = "kinematics", "reduction", "report", "short_numbers"
+    found = kept_result(("symbols", *key), packages, partial(_in_symbols, base))
+    if found is None:
+        return None
+    sums, lengths = found
+    return {
+        "sums": [Markup(line) for line in sums],
+        "lengths": [(Markup(name), value) for name, value in lengths],
+    }
+
+
+def _in_symbols(base: BaseParameters) -> tuple[list[str], list[tuple[str, float]]] | None:
     try:
         lines = base.expressions(symbols=True)
     except ModelError:
@@ -266,11 +282,6 @@ def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
     if max(map(len, lines)) > _LONGEST:
         return None
     used = {s.name for line in base.expressions("sympy", symbols=True) for s in line.free_symbols}
-    return {
-        "sums": [Markup(line) for line in base.expressions("html", symbols=True)],
-        "lengths": [
-            (Markup(html_symbol(name)), value)
-            for name, value in base.geometry_values.items()
-            if name in used
-        ],
-    }
+    values = base.geometry_values.items()
+    lengths = [(str(html_symbol(name)), value) for name, value in values if name in used]
+    return list(map(str, base.expressions("html", symbols=True))), lengths

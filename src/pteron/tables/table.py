@@ -109,6 +109,14 @@ class Table:
         kept = self.frame.drop(*results, strict=False)
         return replace(self, frame=kept.hstack(added))
 
+    def empty(self, column: str) -> int:
+        """Return how many cells of a column are empty."""
+        return self.frame[column].null_count()
+
+    def rows(self, columns: Sequence[str], most: int) -> Iterator[tuple[Any, ...]]:
+        """Return the first rows of columns."""
+        return self.frame.select(columns).head(most).iter_rows()
+
     def json(self) -> str:
         """Return the rows as a JSON list of objects; what is not a finite number is null."""
         for name, kind in self.frame.schema.items():

@@ -8,14 +8,13 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Int
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.legs.reading import Reading
-from pteron.shapes import PerCoordinate, PerJoint, Series
+from pteron.shapes import Int, PerCoordinate, PerJoint, Series
 
 _WIDE = 1.5
 """Length of a time step, in usual steps, beyond which a sample may be missing."""

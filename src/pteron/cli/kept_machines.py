@@ -1,0 +1,31 @@
+"""`kept_machine`: a machine from its file, which is read and checked once and then kept on disk."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
+
+_READING = ("arguments", "errors", "toml")
+"""The modules at the top that read a file, or word its warnings."""
+
+
+def kept_machine(name_or_path: str) -> tuple[Manipulator, tuple[str, ...]]:
+    """Return a machine, and what is unlikely in its file, as `pteron.load` warns of it.
+
+    What is kept is that of the very bytes of the file, and of the sources and the Pydantic that
+    read them. A machine with a leg from outside this package is read again each time.
+    """
+    from pydantic import VERSION
+
+    from pteron.kernels.kept import kept_result, name_of
+    from pteron.manipulator.files import contents, read_machine
+
+    data, source = contents(name_or_path)
+    return kept_result(
+        ("machine", data.decode("latin-1"), source, name_or_path, VERSION),
+        _READING,
+        lambda: read_machine(data, source, name_or_path),
+        keeps=lambda found: name_of(found[0]) is not None,
+    )

@@ -1,0 +1,103 @@
+"""`TypedRow`: a row that was typed, and its results, in the text that `Table` would give.
+
+`pteron.tables` loads Polars, which takes longer than all else that a typed pose needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Cell = float | int | None
+
+
+@dataclass(frozen=True)
+class TypedRow:
+    """Columns of finite numbers by name, all as long as each other; None is an empty cell."""
+
+    cells: Mapping[str, Sequence[Cell]]
+    source: str = "the command line"
+
+    def __len__(self) -> int:
+        return len(next(iter(self.cells.values())))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns, in order."""
+        return tuple(self.cells)
+
+    @property
+    def frame(self) -> pl.DataFrame:
+        """The same as a data frame, to be written to a file."""
+        import polars as pl
+
+        return pl.DataFrame(dict(self.cells))
+
+    def place(self, index: int) -> str:
+        """Return the place of a row."""
+        return f"{self.source}: row {index + 1}"
+
+    def numbers(self, columns: Sequence[str], on_failure: str | None = None) -> NDArray[Any]:
+        """Return columns as an array of floats; whatever was typed is a finite number."""
+        return np.array([self.cells[name] for name in columns], dtype=float).T
+
+    def extended(self, results: Mapping[str, ArrayLike]) -> TypedRow:
+        """Return the row with columns added behind its own, see `Table.extended`."""
+        added = {name: _column(values) for name, values in results.items()}
+        return replace(self, cells=self._without(results) | added)
+
+    def repeated(self, modes: Sequence[int | None], replaced: Collection[str]) -> TypedRow:
+        """Return the row once for each mode, before it `row`, behind it `mode`."""
+        kept = self._without({"row", "mode", *replaced})
+        count = len(modes)
+        cells = {name: [*values] * count for name, values in kept.items()}
+        return replace(self, cells={"row": [1] * count, **cells, "mode": modes})
+
+    def empty(self, column: str) -> int:
+        """Return how many cells of a column are empty."""
+        return sum(cell is None for cell in self.cells[column])
+
+    def rows(self, columns: Sequence[str], most: int) -> Iterator[tuple[Cell, ...]]:
+        """Return the first rows of columns."""
+        return islice(zip(*(self.cells[name] for name in columns), strict=True), most)
+
+    def json(self) -> str:
+        """Return the rows as a JSON list of objects."""
+        lines = (
+            ",".join(
+                f'"{name}":{_text(cell) or "null"}'
+                for name, cell in zip(self.cells, row, strict=True)
+            )
+            for row in zip(*self.cells.values(), strict=True)
+        )
+        return f"[{','.join(f'{{{line}}}' for line in lines)}]"
+
+    def text(self) -> Iterator[str]:
+        """Yield the rows as CSV, the header first."""
+        yield ",".join(self.cells) + "\n"
+        for row in zip(*self.cells.values(), strict=True):
+            yield ",".join(map(_text, row)) + "\n"
+
+    def _without(self, names: Collection[str]) -> dict[str, Sequence[Cell]]:
+        return {name: values for name, values in self.cells.items() if name not in names}
+
+
+def _column(values: ArrayLike) -> list[Cell]:
+    return [None if value != value else value for value in np.asarray(values).tolist()]
+
+
+def _text(cell: Cell) -> str:
+    """Return a number as Polars writes it, with Python's digits and fewer zeros or exponents."""
+    text = "" if cell is None else repr(cell)
+    if text.endswith("e-05"):
+        sign, digits = text[: -len(text.lstrip("-"))], text[:-4].lstrip("-").replace(".", "")
+        return f"{sign}0.0000{digits}"
+    return text.replace("e-0", "e-")
