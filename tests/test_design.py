@@ -238,6 +238,18 @@ def test_a_search_that_was_ended_goes_on_to_the_same_front(found, tmp_path):
 
 
 @CLIENTS
+def test_processes_find_the_same_front_and_go_on_where_one_ended(found, tmp_path):
+    front, folder = found
+    again = tmp_path / "generations"
+    shutil.copytree(folder, again)
+    for chunk in sorted(again.glob("*/0*.parquet"))[1:]:
+        chunk.unlink()
+    assert search(spec_of(), folder=again, workers=2).table.equals(front.table)
+    written = {file.relative_to(folder): file.read_bytes() for file in folder.rglob("*.parquet")}
+    assert written == {f.relative_to(again): f.read_bytes() for f in again.rglob("*.parquet")}
+
+
+@CLIENTS
 def test_a_checkpoint_that_is_damaged_is_computed_again(found, tmp_path):
     front, folder = found
     again = tmp_path / "generations"

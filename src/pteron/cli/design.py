@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 _GENERATIONS, _SURVEY = "generations", "survey"
 """Subfolders of the results that keep the designs evaluated: by a search, by `--sweep`."""
 
+_MOST_WORKERS = 8
+"""Most processes of a search where nothing else is asked: a generation has not many more designs
+for each."""
+
 
 def design(
     spec: str,
@@ -54,7 +58,7 @@ def design(
     --out FOLDER: Write the results to a folder, and go on there if ended.
     --seed: Of all chance. [default: the file's]
     --sweep: Evaluate so many designs spread evenly, in whole files of 256, instead of a search.
-    --workers: Processes that do the work. [default: this one]
+    --workers: Processes that do the work. [default: of a search one a core, up to 8]
 
     Examples
     --------
@@ -96,6 +100,7 @@ def _found(
     spec: Spec, out: str | None, count: int | None, workers: int | None, scheduler: str | None
 ) -> Front:
     from pteron.design import search, survey
+    from pteron.maps.sweep import cores
 
     work: dict[str, Any] = {"workers": workers, "scheduler": scheduler}
     if count is not None:
@@ -104,6 +109,8 @@ def _found(
             return survey(spec, count, Path(str(out)) / _SURVEY, **work)
     with progress_bar("Searching") as tell:
         work["progress"] = tell
+        if workers is None and scheduler is None:
+            work["workers"] = min(cores(), _MOST_WORKERS)
         return search(spec, folder=None if out is None else Path(out) / _GENERATIONS, **work)
 
 

@@ -8,17 +8,18 @@ and goes on: it ends in the same front as a run that was not interrupted.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pteron.design.evolution import Evolution, one_thread
 from pteron.design.front import Front, Proofs
+from pteron.design.processes import Processes, processes
 from pteron.design.refine import refined
 from pteron.design.rows import FAILED, MISSES, design_table
 from pteron.design.spec import Spec
@@ -26,7 +27,6 @@ from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
-from pteron.maps.sweep import local_workers
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -60,7 +60,8 @@ def search(
     seed : int, optional
         Seed of all chance, in place of the spec's.
     workers : int, optional
-        Processes of this computer that do the work; by default this one does.
+        Processes of this computer that do the work; by default this one does. A script that asks
+        for them does so under ``if __name__ == "__main__":``.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work; they must reach the folder.
     progress : callable, optional
@@ -87,14 +88,17 @@ def search(
         raise DataError("workers and scheduler given; a scheduler has its own workers: give one")
     with ExitStack() as opened:
         kept = folder or opened.enter_context(TemporaryDirectory(prefix="pteron-design-"))
-        if workers is not None:
-            # One cluster for all generations: a process compiles what it needs once.
-            scheduler = str(opened.enter_context(local_workers(workers)).scheduler_address)
-        return _generations(task, Path(kept), scheduler, progress)
+        # The same for all generations: a process compiles what it needs once.
+        shared = opened.enter_context(processes(task, workers or 1))
+        return _generations(task, Path(kept), scheduler, shared, progress)
 
 
 def _generations(
-    task: Task, folder: Path, scheduler: str | None, progress: Callable[[float], None] | None
+    task: Task,
+    folder: Path,
+    scheduler: str | None,
+    shared: Processes | None,
+    progress: Callable[[float], None] | None,
 ) -> Front:
     """Return the front of all designs that were evaluated, each design of it proved."""
     settings = task.spec.search
@@ -106,7 +110,7 @@ def _generations(
         settings.seed,
     )
     tables: list[pl.DataFrame] = []
-    proofs = Proofs(task, partial(swept_proofs, task, folder, scheduler))
+    proofs = Proofs(task, partial(swept_proofs, task, folder, scheduler, shared=shared))
     front: Front | None = None
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
@@ -118,13 +122,30 @@ def _generations(
         store = TableStore(folder / f"{number:04d}", plan)
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
         tell = None if progress is None else partial(_tell, progress, number, settings.generations)
-        sweep(partial(worked, task), chunks, store, scheduler=scheduler, progress=tell)
+        _swept(task, worked, chunks, store, shared, scheduler=scheduler, progress=tell)
         tables.append(store.scan().collect())
         front = _proved_front(proofs, tables)
         found = proofs.applied(tables[-1])
         values = np.asarray(found.select([v.name for v in task.variables]).to_numpy())
         evolution.tell((values - low) / (high - low), *_costs(task, found))
     return proofs.front(lambda: tables)
+
+
+def _swept(
+    task: Task,
+    function: Callable[..., pl.DataFrame],
+    chunks: Sequence[Any],
+    store: TableStore,
+    shared: Processes | None,
+    **options: Any,
+) -> None:
+    """Compute the chunks of designs that a store has not yet; processes share them."""
+    if shared is None:
+        sweep(partial(function, task), chunks, store, **options)
+    else:
+        left = sorted({*range(len(chunks))} - store.finished())
+        table = shared.tables(function, {k: chunks[k] for k in left})
+        sweep(table, range(len(chunks)), store, **options)
 
 
 def _tell(progress: Callable[[float], None], number: int, count: int, share: float) -> None:
@@ -147,13 +168,13 @@ def swept_proofs(
     designs: list[list[float]],
     *,
     workers: int | None = None,
+    shared: Processes | None = None,
 ) -> pl.DataFrame:
     """Return the rows of designs, as far as they are proved, kept in a folder as the others are."""
     digest = _digest(np.array(designs))
     store = TableStore(folder / f"proofs-{digest}", {**task.plan, "designs": digest})
     chunks = [designs[k : k + _CHUNK] for k in range(0, len(designs), _CHUNK)]
-    prove = partial(design_table, task, proofs=True)
-    sweep(prove, chunks, store, scheduler=scheduler, workers=workers)
+    _swept(task, proved_table, chunks, store, shared, scheduler=scheduler, workers=workers)
     return store.scan().collect()
 
 
@@ -167,11 +188,16 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
     return designs
 
 
-def worked(task: Task, jobs: list[tuple[list[float], int]]) -> pl.DataFrame:
+def worked(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
     """Return the rows of designs; one whose number is an objective is improved in it first."""
     with one_thread():
         designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
     return design_table(task, designs)
+
+
+def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
+    """Return the rows of designs, as far as they are proved."""
+    return design_table(task, designs, proofs=True)
 
 
 def _promising(

@@ -94,8 +94,10 @@ def frames(
 
     probes = np.unique(np.linspace(0, len(times) - 1, _PROBES).astype(int)).tolist()
     _draw_still(sheet, scene, path)
+    sheet.measures = True
     for k in probes:
         draw_machine(sheet, scene, points.at(k))
+    sheet.measures = False
     sheet.fill(angles[probes].tolist() if turns else (0.0,))
     sheet.clear(0)
     kept = 0

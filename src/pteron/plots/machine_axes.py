@@ -22,7 +22,10 @@ Style = str | tuple[float, tuple[float, ...]]
 
 
 class MachineAxes(ABC):
-    """Axes of a figure, and the `things` drawn on them, in their order."""
+    """Axes of a figure, and the `things` drawn on them, in their order.
+
+    While it `measures` nothing is drawn, but `fill` leaves space for it.
+    """
 
     _line: ClassVar[Any] = Line2D
 
@@ -34,6 +37,7 @@ class MachineAxes(ABC):
         self._weight = SMALL if small else 1.0
         self._font = FONT_SIZE - 2.0 if small else FONT_SIZE
         self.things: list[Artist] = []
+        self.measures = False
         self._drawn: list[Array] = []
 
     @abstractmethod
@@ -77,6 +81,8 @@ class MachineAxes(ABC):
     ) -> None:
         """Draw a line through points (K, 3)."""
         p = self._placed(points)
+        if self.measures:
+            return
         look: dict[str, Any] = {"color": color, "linewidth": self._weight * width}
         look |= {"linestyle": style, "solid_capstyle": "round"}
         self._add_line(p, zorder=self._order(p) + raised, **look)
@@ -84,6 +90,8 @@ class MachineAxes(ABC):
     def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
         """Draw a ring at a point."""
         p = self._placed(point[None], held=False)
+        if self.measures:
+            return
         look: dict[str, Any] = {"marker": "o", "markersize": self._weight * size}
         look |= {"markeredgewidth": 1.4 * self._weight, "linestyle": "none"}
         look |= {"markerfacecolor": face, "markeredgecolor": edge}
@@ -96,6 +104,8 @@ class MachineAxes(ABC):
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
         """Draw polygons, all in one place of the order."""
         placed = [self._placed(face, held=False) for face in faces]
+        if self.measures:
+            return
         look: dict[str, Any] = {"facecolors": color, "edgecolors": PAPER, "linewidths": 0.6}
         order = self._order(np.vstack(placed)) + raised
         self.things.append(self._polygons(placed, alpha=alpha, zorder=order, **look))
@@ -105,4 +115,6 @@ class MachineAxes(ABC):
         look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
         look |= {"ha": "center", "va": "center", "zorder": 30.0}
         p = self._placed(point[None])[0]
+        if self.measures:
+            return
         self.things.append(self.axes.text(*p, text, color=color, **look))

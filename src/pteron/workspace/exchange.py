@@ -205,8 +205,15 @@ def _cut_step(program: Program, samples: Samples, good: Array, z: Array, length:
 
 def _worst(values: Array) -> set[tuple[int, int]]:
     """Return points and rows: of each row the points where it is least."""
-    ordered = np.argsort(np.nan_to_num(values, nan=np.inf), axis=0, kind="stable")[:_PER_ROW]
-    return {(int(i), r) for r in range(values.shape[1]) for i in ordered[:, r]}
+    known = np.where(np.isnan(values), np.inf, values).T
+    count = min(_PER_ROW, known.shape[1])
+    last = np.partition(known, count - 1, axis=1)[:, count - 1]
+    found = set()
+    for r, (row, most) in enumerate(zip(known, last, strict=True)):
+        low = np.flatnonzero(row <= most)
+        low = low[np.argsort(row[low], kind="stable")[:count]]
+        found |= {(i, r) for i in low.tolist()}
+    return found
 
 
 def _solved(

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 
@@ -41,11 +40,10 @@ def failing_between(
     count = len(axes)
     values = np.nan_to_num(rows, nan=-1.0)
     # Each point and its neighbours, also across corners, row by row.
-    around = (*[3] * count, 1)
-    lowest = values == scipy.ndimage.minimum_filter(values, around)
+    lowest = (values == _around(values, np.minimum, count)) & (values >= -_DEPTH)
     # A row that rises by less to the neighbours than to zero has none between them.
-    near = values < scipy.ndimage.maximum_filter(values, around) - values
-    found = np.argwhere(lowest & near & (values >= -_DEPTH))
+    near = values < _around(values, np.maximum, count) - values
+    found = np.argwhere(lowest & near)
     if not len(found):
         return np.empty((0, count))
     found = found[np.argsort(values[tuple(found.T)], kind="stable")]
@@ -70,3 +68,15 @@ def failing_between(
         step = (_BEYOND * value[:, None] / steep + _FURTHER * cell.min()) * slope / steep
         places = np.clip(places - np.where(moving, step, 0.0), least, most)
     return np.asarray(places[failing])
+
+
+def _around(values: Array, extreme: np.ufunc, count: int) -> Array:
+    """Return the least or greatest value of each point and its neighbours along `count` axes."""
+    for axis in range(count):
+        along = np.moveaxis(values, axis, 0)
+        found = values.copy()
+        whole = np.moveaxis(found, axis, 0)
+        extreme(whole[1:], along[:-1], out=whole[1:])
+        extreme(whole[:-1], along[1:], out=whole[:-1])
+        values = found
+    return values

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import active_children, get_context, parent_process
-from multiprocessing.process import BaseProcess
+from multiprocessing import active_children, get_context
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -27,6 +22,7 @@ from pteron.design.choosing.rating import Case
 from pteron.design.choosing.samples import half_sides
 from pteron.design.choosing.search import search_kind
 from pteron.design.evolution import one_thread
+from pteron.design.processes import begin_process, ended_with
 from pteron.errors import DataError, PteronError
 from pteron.json_values import json_ready
 from pteron.kernels.kept import EQUATIONS, name_of
@@ -212,7 +208,7 @@ def _searched(
         return
     context, others = get_context("spawn"), set(active_children())
     done = context.Array("d", len(cases))
-    with ProcessPoolExecutor(workers, context, _begin, (done,)) as pool, _ended_with(others):
+    with ProcessPoolExecutor(workers, context, _begin, (done,)) as pool, ended_with(others):
         jobs = {
             pool.submit(_in_process, case, k): name for k, (name, case) in enumerate(cases.items())
         }
@@ -226,33 +222,13 @@ def _searched(
                 yield jobs[one], one.result()
 
 
-@contextmanager
-def _ended_with(others: set[BaseProcess]) -> Iterator[None]:
-    """End the processes that were started since, where the work is broken off."""
-    try:
-        yield
-    except BaseException:
-        for process in set(active_children()) - others:
-            process.terminate()
-        raise
-
-
 _shares: Any = None
 
 
 def _begin(shares: Any) -> None:
     global _shares
     _shares = shares
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End this process when that which asked has ended, even if it was killed."""
-    parent = parent_process()
-    assert parent is not None  # this one was spawned
-    parent.join()
-    os._exit(1)
+    begin_process()
 
 
 def _in_process(case: Case, k: int) -> Candidate:
