@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import sympy
 from counted_modes import count_modes
-from mechanisms import CATALOG, gated, random_machine, with_elbows
+from mechanisms import CATALOG, CLIENTS, gated, random_machine, with_elbows
 
 import pteron
 from pteron.equations.machine import closure_of
@@ -271,6 +271,7 @@ def test_what_is_no_number_has_no_pose():
         assert pteron.direct_kinematics(robot, np.zeros((2, 0, n))).shape[:2] == (2, 0)
 
 
+@CLIENTS
 def test_without_a_closed_form_there_is_the_step(tmp_path):
     robot = pteron.load("par4")
     with pytest.raises(ModelError, match='"direct_step" follows the pose from one that is near'):

@@ -420,6 +420,7 @@ def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named(monkeypatch):
     assert pose_margins(narrow, home_pose(narrow)).least > 0.3
 
 
+@CLIENTS
 def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are(monkeypatch):
     monkeypatch.setenv("PTERON_KERNELS", "auto")  # millions of poses are drawn
     robot = CATALOG["3-rrr"]

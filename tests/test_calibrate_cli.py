@@ -9,7 +9,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 from measured import built, positions
-from mechanisms import CATALOG
+from mechanisms import CATALOG, CLIENTS
 from test_cli import done, refused
 
 import pteron
@@ -30,6 +30,7 @@ def log() -> pl.DataFrame:
     return pl.DataFrame(columns | dict(zip("xyz", poses.T, strict=True)))
 
 
+@CLIENTS
 def test_the_files_agree_with_the_terminal():
     text = done("calibrate log.csv --robot linear-delta --out found")
     folder = Path("found")

@@ -69,6 +69,7 @@ def test_of_a_machine_that_turns_only_the_angles_are_mapped(tmp_path: Path):
     assert "the tool goes wrong" not in text
 
 
+@CLIENTS
 def test_the_file_holds_the_machine_as_found(tmp_path: Path):
     model = write_calibration(calibration(), tmp_path).model
     found = pteron.load(model)

@@ -98,6 +98,7 @@ def test_a_chosen_machine_keeps_what_was_asked(chosen):
     assert one.figures["shortest_time"] < 0.3
 
 
+@CLIENTS
 def test_what_is_tried_is_told_first_and_the_page_says_it_well(chosen, tmp_path):
     choice, folder = chosen
     told = []

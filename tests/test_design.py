@@ -427,6 +427,7 @@ def loaded():
     return Summary(search(Spec.model_validate(LOADED)))
 
 
+@CLIENTS
 def test_no_state_of_a_machine_designed_for_loads_breaks_a_bound(loaded):
     """A workspace that floats has its place in the results; everywhere in it what is told holds."""
     data = loaded.data()

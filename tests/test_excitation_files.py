@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from logs_of_motions import machine
-from mechanisms import CATALOG, gated
+from mechanisms import CATALOG, CLIENTS, gated
 from typer.testing import CliRunner
 
 import pteron
@@ -444,6 +444,7 @@ def about_home(low: float, high: float) -> pteron.Manipulator:
     return replace(robot, legs=legs)
 
 
+@CLIENTS
 def test_a_safe_distance_from_the_joints_limits_is_kept_unasked(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     robot = about_home(-0.3, 0.3)

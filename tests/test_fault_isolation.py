@@ -332,6 +332,7 @@ def test_play_cannot_be_told_where_no_load_changes_its_direction(gentle):
     assert ("play" in result.fault_isolation.tried) != gentle
 
 
+@CLIENTS
 def test_no_play_is_named_where_it_changes_next_to_nothing():
     """What sampling leaves without noise is largest where loads turn: 0.0001 % of the forces."""
     robot = pteron.load("delta")

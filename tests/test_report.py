@@ -174,6 +174,7 @@ def test_no_number_is_missing(name):
     assert not re.search(r"(?<!\de)-\d", text), "a hyphen where a minus belongs"
 
 
+@CLIENTS
 def test_a_name_is_text_wherever_it_stands():
     found = read("hostile")
     assert HOSTILE in found.text
@@ -412,6 +413,7 @@ def test_what_turns_a_platform_does_not_carry_it():
     assert "(3T1R, Schoenflies motion); a shaft turns it." in read("shaft").text
 
 
+@CLIENTS
 def test_a_cone_has_one_limit_on_the_page():
     assert "at most 85.9\u00b0" in read("shaft").text
     assert "\u221285.9" not in read("shaft").text

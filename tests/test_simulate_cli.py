@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from mechanisms import CLIENTS
 from typer.testing import CliRunner
 
 import pteron
@@ -29,6 +30,7 @@ def weak(tmp_path):
     return path
 
 
+@CLIENTS
 def test_a_folder_has_table_numbers_and_pictures(weak, tmp_path):
     out = tmp_path / "run"
     data = json.loads(run(weak, "--duration", 2, "--step", 5e-4, "--out", out, "--json").stdout)

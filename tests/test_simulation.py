@@ -5,6 +5,7 @@ from dataclasses import replace
 import mechanisms
 import numpy as np
 import pytest
+from mechanisms import CLIENTS
 
 import pteron
 from pteron.controllers import FeedForwardPD
@@ -171,6 +172,7 @@ def test_a_delay_beyond_the_end_holds_the_first_command():
     np.testing.assert_array_equal(found.forces, np.zeros((11, 3)))
 
 
+@CLIENTS
 def test_encoders_count_on_where_a_cranks_angle_jumps():
     """The same machine, its angles counted from elsewhere: they pass half a turn on the way."""
     robot, home = pteron.load("five-bar"), np.array([0.0, 0.138])

@@ -347,6 +347,7 @@ def test_the_estimate_of_a_turn_is_about_the_axis_that_leads_there_soonest():
     assert numeric(robot, "type_ii_distances")(pose)[1] == pytest.approx(expected, rel=1e-8)
 
 
+@CLIENTS
 def test_distances_in_closed_form_are_met():
     robot, pose = CATALOG["quadrupteron"], np.array([0.01, 0.0, 0.02, 0.3])
     found = nearest_singularities(robot, pose)

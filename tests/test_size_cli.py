@@ -122,6 +122,7 @@ def test_what_the_drives_cannot_do_is_told_and_ends_with_1(driven: str):
     assert "Not enough: the drives in the file have a margin of 0." in result.stdout
 
 
+@CLIENTS
 def test_motors_of_a_list_are_fitted_to_each_joint(driven: str):
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
     done(f"size {driven} --motors motors.csv --out made")
