@@ -82,7 +82,10 @@ def _longest(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple
     kind, found = DriveKind.of(robot), (float("inf"), "")
     if own.viscous.any() or kind.bends:
         system, bent = _linear(robot, rows, mass, own)
-        rates, vectors = np.linalg.eig(system)
+        if kind.bends:
+            rates, vectors = np.linalg.eig(system)
+        else:  # nothing pulls a machine back to where it was: friction's part has all rates
+            rates = np.linalg.eigvals(system[..., robot.freedom :, robot.freedom :])
         fastest = int(np.abs(rates).argmax())
         rate = float(np.abs(rates.flat[fastest]))
         if rate > 0.0:
