@@ -38,8 +38,8 @@ from pteron.equations.transmissions import (
 )
 from pteron.equations.virtual_work import generalized_forces
 
-STUCK = "stuck_"
-"""Before the name of what joints that stick change."""
+STUCK = {f"stuck_{name}": name for name in ("acceleration", "growth", "friction", "motor_growth")}
+"""The names of what joints that stick change: with what holds them, and without."""
 
 
 class Sides(NamedTuple):

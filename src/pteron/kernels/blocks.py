@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,14 +21,15 @@ class Block:
     """The statements of a program's C for one lane k; `loop.c.j2` puts functions around them.
 
     Its rows are the elements of its inputs: `in` of those of a state, `numbers` of those that are
-    the machine's own, of which `own` is computed once. An output whose name begins with `later`
-    stands for that without it in lanes that do not `slide`. Where the block is `split` they come in
-    a second part, which reads rows that the first has `kept`; else all is one.
+    the machine's own, of which `own` is computed once. An output whose name is
+    a key of `later` takes the place of the one named there, in lanes that do not `slide`. Where the
+    block is `split` these come in a second part, which reads rows that the first has `kept`; else
+    all is one.
     """
 
     name: str
     program: Program
-    later: str | None = None
+    later: Mapping[str, str] | None = None
     split: bool = False
 
     @cached_property
@@ -98,14 +99,14 @@ class Block:
     def _results(self, *, later: bool) -> list[tuple[int, int]]:
         """Return rows of `out` and their nodes, of one of the parts."""
         return [
-            (self.out[port.name.removeprefix(self.later or "")] + i, k)
+            (self.out[(self.later or {}).get(port.name, port.name)] + i, k)
             for port, part in zip(self.program.outputs, self._graph.outputs, strict=True)
             if self._is_late(port) == later
             for i, k in enumerate(part)
         ]
 
     def _is_late(self, port: Port) -> bool:
-        return self.later is not None and port.name.startswith(self.later)
+        return port.name in (self.later or ())
 
     @property
     def has_angles(self) -> bool:

@@ -70,7 +70,7 @@ class Program:
 
     @property
     def text(self) -> str:
-        """What it is on disk; the same for those that are the same."""
+        """The program as it is written on disk; equal programs have equal texts."""
         return _written(self)
 
     def optimised(self) -> Self:

@@ -82,11 +82,11 @@ class Plant:
     def _moved(self, held: dict[str, Array], arrays: Mapping[str, Array]) -> dict[str, Array]:
         """Return what happens in a state, with the friction that holds joints where some stick."""
         found = self._program(held, arrays)
-        stuck = {name: found.pop(name) for name in list(found) if name.startswith(STUCK)}
+        stuck = {name: found.pop(name) for name in STUCK if name in found}
         if stuck:
             sticks = (held["side"] == 0.0).any(axis=1)
             for name, values in stuck.items():
-                found[name.removeprefix(STUCK)][sticks] = values[sticks]
+                found[STUCK[name]][sticks] = values[sticks]
         return found
 
     def begin(

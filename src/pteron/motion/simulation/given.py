@@ -1,4 +1,4 @@
-"""What motors give of what is asked of them: their curves' and windings' limits at a speed."""
+"""The forces that motors give: those asked for, within their curves and windings at a speed."""
 
 from __future__ import annotations
 
