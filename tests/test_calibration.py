@@ -135,7 +135,7 @@ def test_heights_over_an_unknown_plane_show_less(name, equal, count):
     "robot",
     [
         pteron.load("quadrupteron-oblique"),
-        tilting.machine("1T2R", ("PRS", "RRS", "RPS"), 3)[0],
+        pytest.param(tilting.machine("1T2R", ("PRS", "RRS", "RPS"), 3)[0], marks=NIGHTLY),
         tilting.machine("2R", ("PSS", "RSS"), 3)[0],
         pytest.param(tilting.machine("3T3R", ("UPS", "PSS", "RSS"), 5)[0], marks=NIGHTLY),
         pytest.param(pteron.load("3-rrr"), marks=NIGHTLY),
@@ -189,7 +189,7 @@ def test_slopes_are_those_of_differences(robot, frame_known):
 
 @pytest.mark.parametrize(
     "name",
-    ["quadrupteron", "stewart", *(pytest.param(n, marks=NIGHTLY) for n in ("3-rrr", "par4"))],
+    gated(["quadrupteron", "stewart", "3-rrr", "par4"], ["stewart"]),
 )
 def test_a_machine_off_its_drawing_is_found(name):
     robot = pteron.load(name)
@@ -313,7 +313,7 @@ def faulty(given, kind):
     return replace(given, readings=readings, positions=positions)
 
 
-@pytest.mark.parametrize("told", [True, False])
+@pytest.mark.parametrize("told", gated([True, False], [True]))
 @pytest.mark.parametrize(
     ("kind", "words"),
     [

@@ -52,6 +52,7 @@ def test_the_page_is_whole_and_says_the_verdict_first(tmp_path: Path):
     assert [value["name"] for value in data["values"]] == [value.name for value in result.values]
 
 
+@CLIENTS
 def test_of_a_machine_that_turns_only_the_angles_are_mapped(tmp_path: Path):
     robot = pteron.load("ankle")
     poses, off = pteron.random_poses(robot, 30), np.array([0.01, -0.01])

@@ -326,6 +326,7 @@ def tilted(case, count):
     return at
 
 
+@CLIENTS
 def test_worse_tilts_are_looked_for_in_the_whole_cone():
     tool = {"payload": {"mass": 1.0, "tool": [0.0, 0.0, 0.1]}}
     job = of(workspace={"size": [0.2, 0.2, 0.1], "tilt": 0.3}, kinds=["stewart"], **tool)
@@ -344,6 +345,7 @@ def test_worse_tilts_are_looked_for_in_the_whole_cone():
     assert leans.max() <= 0.3 + 1e-9
 
 
+@CLIENTS
 def test_rams_go_as_far_as_the_job_asks():
     space = {"size": [0.2, 0.2, 0.1], "tilt": 0.2}
     (case,) = cases_of(of(workspace=space, kinds=["stewart"])).values()

@@ -499,6 +499,7 @@ def test_what_is_left_out_is_at_rest():
     assert [row[f"force{i}"] for i in (1, 2, 3)] == expected.tolist()
 
 
+@CLIENTS
 def test_the_working_mode_may_be_chosen():
     modes = pteron.working_modes(pteron.load("tripteron"))
     robot, rest = modes[0b010], np.zeros(3)
@@ -620,6 +621,7 @@ def driven(robot, **more):
     return replace(robot, legs=legs)
 
 
+@CLIENTS
 def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     robot = driven(pteron.load("quadrupteron"), stribeck=pteron.legs.Stribeck(1.0, 0.01))

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from controlled import controlled
-from mechanisms import CATALOG, gated, random_machine, relative_error, several, states
+from mechanisms import CATALOG, NIGHTLY, gated, random_machine, relative_error, several, states
 
 import pteron
 from pteron.controllers import (
@@ -152,7 +152,8 @@ def test_pd_with_gravity_compensation_holds_any_pose(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "friction"), [("five-bar", False), ("five-bar", True), ("delta", True)]
+    ("name", "friction"),
+    [("five-bar", False), ("five-bar", True), pytest.param("delta", True, marks=NIGHTLY)],
 )
 def test_adaptive_control_takes_energy_at_the_rate_of_its_damping(name, friction):
     """V = z_x^T M z_x / 2 + |eta - eta_true|^2 / 2 falls by z^T K z: Slotine and Li's proof.
@@ -267,7 +268,7 @@ def wrong(robot, seed, share=0.2):
 
 @pytest.mark.parametrize(
     "name",
-    gated([name for name in MACHINES if not name.startswith("random")], ["five-bar", "delta"]),
+    gated([name for name in MACHINES if not name.startswith("random")], ["five-bar"]),
 )
 def test_adaptive_control_learns_what_the_cycle_shows(name):
     """Errors fall ten times within six cycles, where all bodies are off by 20 %."""

@@ -58,6 +58,7 @@ def test_no_pose_leaves_the_box_whatever_the_vehicle_does():
     assert ((low <= joints) & (joints <= high)).all()
 
 
+@CLIENTS
 def test_what_cannot_be_shown_is_told():
     with pytest.raises(ModelError, match="3T platform shows no vehicle's motion"):
         cue("delta", {"t": TIME, **NONE})

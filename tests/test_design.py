@@ -450,6 +450,7 @@ def test_no_state_of_a_machine_designed_for_loads_breaks_a_bound(loaded):
         assert told["workspace_proved"] == [True]
 
 
+@CLIENTS
 def test_a_report_tells_how_far_each_quantity_is_known_and_what_was_asked(loaded):
     page = loaded.page()
     for text in (

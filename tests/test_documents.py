@@ -159,6 +159,7 @@ SESSIONS = [
 ]
 
 
+@CLIENTS
 @pytest.mark.parametrize(("name", "line", "shown"), SESSIONS, ids=[s[1] for s in SESSIONS])
 def test_output_is_what_is_shown(name, line, shown, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -178,18 +179,10 @@ def blocks(text):
 WITH_BLOCKS = [name for name, text in TEXTS.items() if name != "README.md" and blocks(text)]
 
 
-SLOW = {
-    *("docs/plots.md", "docs/play.md", "docs/simulation.md", "docs/controllers.md"),
-    *("docs/how-to/prove-a-workspace.md", "docs/how-to/singularities.md"),
-    "docs/how-to/platforms-that-tilt.md",
-    "docs/how-to/simulate-then-identify.md",
-    "docs/start/coming-from.md",
-}
+QUICK = [name for name in WITH_BLOCKS if "theory" in name]
 
 
-@pytest.mark.parametrize(
-    "name", gated(WITH_BLOCKS, [name for name in WITH_BLOCKS if name not in SLOW], CLIENTS)
-)
+@pytest.mark.parametrize("name", gated(WITH_BLOCKS, QUICK, CLIENTS))
 def test_python_runs(name, tmp_path, monkeypatch):
     """In order, in one session; what follows `>>>` is compared with what is shown."""
     monkeypatch.chdir(tmp_path)

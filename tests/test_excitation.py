@@ -580,6 +580,7 @@ def test_what_the_search_cannot_do_is_refused(given: dict, words: str):
 # What is written
 
 
+@CLIENTS
 def test_the_table_for_the_controller(tmp_path: Path):
     found = small()
     robot = found.motion.robot

@@ -339,6 +339,7 @@ def test_a_file_may_hold_the_joints_or_the_poses_alone(contents: str, names: lis
     assert len(frame) == round(led.duration * RATE) + 1
 
 
+@CLIENTS
 def test_units_are_those_of_each_joint():
     robot = driven("mixed")
     found = excited("mixed")
@@ -419,6 +420,7 @@ def test_the_command_refuses_in_one_line_before_it_works(line, words, tmp_path, 
     assert [path.name for path in tmp_path.iterdir()] == ["robot.toml"]
 
 
+@CLIENTS
 def test_where_no_cycle_fits_it_is_said(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # A machine with a range of the joints that is no more than the clearance leaves.

@@ -86,6 +86,7 @@ def run(folder):
     return done.returncode, done.stdout
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("name", "real", "compiler"),
     [
@@ -151,7 +152,7 @@ def library(name, real="double"):
     return call
 
 
-@pytest.mark.parametrize("name", gated(ROBOTS, ["quadrupteron", "delta", "mixed", "five_bar"]))
+@pytest.mark.parametrize("name", gated(ROBOTS, ["delta", "mixed"]))
 def test_random_states_give_the_bits_that_the_library_gives(name):
     robot, call = ROBOTS[name], library(name)
     given = {"parameters": pteron.parameters(robot), "drives": drive_numbers(robot)}
@@ -195,9 +196,8 @@ def compiled(robot, functions, folder, **options):
 
 
 @pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize(
-    "name", gated(["quadrupteron", "par4", "ankle", "3-rrr"], ["par4"], CLIENTS)
-)
+@CLIENTS
+@pytest.mark.parametrize("name", gated(["quadrupteron", "par4", "ankle", "3-rrr"], ["par4"]))
 def test_a_payload_is_set_while_the_code_runs(tmp_path, name, real):
     robot = ROBOTS.get(name) or pteron.load(name)
     mass, center = 0.7, (0.03, -0.02, 0.05)
@@ -657,6 +657,7 @@ def test_what_cannot_be_written_is_said(tmp_path):
         pteron.export_c(ROBOT, ["jacobian"], tmp_path / "file")
 
 
+@CLIENTS
 def test_the_command(tmp_path):
     runner = CliRunner()
     arguments = ["export", "delta", "--c", str(tmp_path / "c"), "--st", str(tmp_path / "st")]

@@ -148,6 +148,7 @@ def with_phases(name, mass, **about):
     return robot, noisy(both)
 
 
+@CLIENTS
 def test_a_factor_of_all_forces_is_told_by_a_known_payload():
     robot, log = with_phases("delta", 1.5, payload=KnownPayload(1.5))
     terms = Terms(payload=True)
@@ -200,6 +201,7 @@ def test_rotors_heavier_than_what_is_there_are_not_trusted():
 # Where fault isolation is run ------------------------------------------------------
 
 
+@CLIENTS
 def test_play_is_named_where_a_drives_load_changes_direction(monkeypatch):
     """One encoder a drive, at the motor: the same drives without play are not accused of it."""
     monkeypatch.delenv("PTERON_KERNELS", raising=False)  # drives that bend take short steps
@@ -246,6 +248,7 @@ def test_a_fault_shows_in_a_log_with_two_phases_too_long_to_be_looked_at_whole()
     assert mended.preprocessing[0].delay == pytest.approx(6e-3, abs=5e-4)
 
 
+@CLIENTS
 def test_a_fault_shows_that_is_in_the_second_log_alone():
     robot, log, friction = clean("delta")
     other = log_of(robot, friction=friction, seed=5, **brisk(robot))
@@ -295,7 +298,7 @@ def test_forces_held_from_sample_to_sample_are_no_fault_and_spoil_no_value(name)
     assert off.max() < 0.02 * spoiled.max()
 
 
-@pytest.mark.parametrize("name", gated(["delta", "par4"]))
+@pytest.mark.parametrize("name", gated(["delta", "par4"], ["delta"]))
 def test_a_delay_of_held_forces_that_is_left_in_marks_the_intervals(name):
     robot, log, _ = held(name)
     result = found(robot, log, processing=Processing(delay=0.0))

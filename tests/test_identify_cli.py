@@ -152,6 +152,7 @@ def test_choices_are_those_of_the_library():
     assert set(command.Derivatives.__args__) == set(Derivatives.__args__)
 
 
+@CLIENTS
 @QUICK
 def test_findings_and_a_bad_verdict_are_said_plainly():
     good, other = log("tripteron"), log("tripteron", 5, 3.0)

@@ -114,17 +114,25 @@ def loaded_by(words):
     [
         ("--version", ("numpy", "rich.console", "urllib.request")),
         ("catalog", ("scipy", "sympy", "polars", "urllib.request", *READING)),
-        ("check delta", ("scipy.optimize", "sympy", "polars", "jinja2", "jaxtyping")),
+        pytest.param(
+            *("check delta", ("scipy.optimize", "sympy", "polars", "jinja2", "jaxtyping")),
+            marks=CLIENTS,
+        ),
         (
             "inverse quadrupteron 0.01 0.02 -0.03 0.1",
             ("scipy", "sympy", "polars", "rich.console", *READING),
         ),
         ("direct quadrupteron 0.03 0.02 0.01 0.02", ("scipy", "sympy", "polars", *READING)),
         ("forces quadrupteron --pose 0.01 0.02 -0.03 0.1", ("sympy", "polars", *READING)),
-        ("base quadrupteron", ("sympy", "polars", *READING)),
-        ("cycle quadrupteron", ("scipy.optimize", "sympy", "polars", "jinja2", *READING)),
-        ("export quadrupteron --c controller", ("sympy", "polars", *READING)),
-        ("report quadrupteron --out report", ("scipy.optimize", "sympy", *READING)),
+        *(
+            pytest.param(words, (*unused, *READING), marks=CLIENTS)
+            for words, *unused in (
+                ("base quadrupteron", "sympy", "polars"),
+                ("cycle quadrupteron", "scipy.optimize", "sympy", "polars", "jinja2"),
+                ("export quadrupteron --c controller", "sympy", "polars"),
+                ("report quadrupteron --out report", "scipy.optimize", "sympy"),
+            )
+        ),
     ],
 )
 def test_a_command_loads_what_it_uses(words, unused, tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from differences import gradient
-from mechanisms import CATALOG, random_machine, states
+from mechanisms import CATALOG, gated, random_machine, states
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
@@ -104,7 +104,7 @@ SOME = {
 }
 
 
-@pytest.mark.parametrize("name", SOME)
+@pytest.mark.parametrize("name", gated(SOME, ["delta-4", "mixed"]))
 def test_indices_by_second_formulas(name):
     robot = MIXED if name == "mixed" else CATALOG[name]
     poses = states(robot, 20)[0]

@@ -186,6 +186,7 @@ def test_standard_deviations_cover_the_error(name):
     assert 0.2 < np.sqrt(np.square(errors).mean()) < 2.0
 
 
+@CLIENTS
 def test_another_estimator_forgives_outliers():
     log = make_log("tripteron", noise=NOISE)
     forces = log.forces.copy()
@@ -219,6 +220,7 @@ def test_uneven_stamps_are_no_gaps_and_are_named(jitter):
         identify_payload(robot, *few)
 
 
+@CLIENTS
 def test_columns_that_are_swapped_are_refused_as_by_identify():
     log = make_log("quadrupteron", noise=NOISE)
     swapped = replace(log, forces=log.forces[:, [1, 0, 2, 3]])
@@ -237,6 +239,7 @@ def test_what_the_residuals_show_is_said_with_the_payload():
     assert found.as_dict()["trial"]["faults"][0]["fault"] == "delay"
 
 
+@CLIENTS
 def test_values_of_no_real_body_are_told():
     # As much taken off one side of the platform as the moment of inertia allows.
     log = make_log("quadrupteron", load=LOAD)

@@ -12,6 +12,7 @@ import jedi
 import numpy as np
 import pandas as pd
 import pytest
+from mechanisms import CLIENTS
 
 import pteron
 from pteron.controllers import ComputedTorque
@@ -73,6 +74,7 @@ def test_every_public_function_takes_a_robot_by_name():
             inspect.unwrap(function)(**by_name | {"robot": "quadruptron"})
 
 
+@CLIENTS
 def test_a_name_serves_as_the_robot_does():
     robot, state = pteron.load("quadrupteron"), np.array([[0.01, -0.02, 0.03, 0.2]] * 3)
     rest = np.zeros(4)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanisms import CLIENTS
 
 from pteron.errors import DataError, ModelError
 from pteron.identification import estimate, ordinary, reduced, weighted
@@ -189,6 +190,7 @@ def arm():
     return runpy.run_path(str(ARM))
 
 
+@CLIENTS
 def test_a_serial_arm_is_identified():
     example = arm()
     other = example["prepared"](*example["recorded"](100))

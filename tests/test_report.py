@@ -190,6 +190,7 @@ def test_3t_machines_have_no_angle(name):
     assert (report(name).orientations is None) != shown
 
 
+@CLIENTS
 def test_a_page_is_the_same_each_time():
     assert page(report("hostile")) == html("hostile")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomlkit
-from mechanisms import CATALOG, gated
+from mechanisms import CATALOG, CLIENTS, gated
 from pydantic import TypeAdapter
 
 import pteron
@@ -119,6 +119,7 @@ def test_a_file_of_one_s_own_is_explained_too(tmp_path):
         pteron.save(robot, tmp_path / "no" / "where.toml")
 
 
+@CLIENTS
 def test_dimensions_are_what_a_file_written_by_hand_gives(program):
     given = [
         "--base-radius",

@@ -62,6 +62,7 @@ def test_the_model_has_the_machines_working_mode():
     assert own["tracking"] == other["tracking"]
 
 
+@CLIENTS
 def test_a_pipe_gets_the_table(weak):
     text = run(weak, "--duration", 2, "--rate", 500, "--step", 5e-4, "--controller", "pd").stdout
     assert text.startswith("t,x,y,z,dx,dy,dz,ddx,ddy,ddz,xref,yref,zref,rho1,rho2,rho3,drho1")
@@ -94,6 +95,7 @@ def test_units_of_a_cycle_and_a_payload_are_doubted(tmp_path):
     assert "Note: a payload of 500 kg" in heavy.stderr
 
 
+@CLIENTS
 def test_a_table_on_a_narrow_screen_keeps_its_numbers(monkeypatch):
     monkeypatch.setattr("pteron.cli.simulate.is_terminal", lambda: True)
     monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)

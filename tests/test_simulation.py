@@ -58,6 +58,7 @@ def test_free_motion_keeps_its_energy(name, monkeypatch):
     assert worst.max() > 0.0
 
 
+@mechanisms.CLIENTS
 @pytest.mark.parametrize("name", mechanisms.gated(["quadrupteron", "delta", "3-prr"], ["3-prr"]))
 def test_the_steps_of_c_and_of_the_virtual_machine_are_the_same_bits(name, monkeypatch):
     robot = driven(pteron.load(name))

@@ -7,7 +7,7 @@ import descriptions
 import numpy as np
 import pytest
 import singular_poses
-from mechanisms import CATALOG, gated, random_machine, states
+from mechanisms import CATALOG, NIGHTLY, gated, random_machine, states
 
 import pteron
 from pteron.kernels import numeric
@@ -18,12 +18,17 @@ from pteron.workspace import Box, free_of_singularities, prove
     ("kinds", "fault", "expected"),
     [
         ("PRS", degraded.coincident, "flagged"),
-        ("CS", degraded.coincident, "flagged"),
         ("SSSSI", degraded.in_line, "flagged"),
-        ("CCC", degraded.in_line, "flagged"),
         ("RRR", degraded.alongside, "flagged"),
-        ("PPP", degraded.in_a_plane, "flagged"),
-        ("PPPP", degraded.mirrored, "flagged"),
+        *(
+            pytest.param(kinds, fault, "flagged", marks=NIGHTLY)
+            for kinds, fault in (
+                ("CS", degraded.coincident),
+                ("CCC", degraded.in_line),
+                ("PPP", degraded.in_a_plane),
+                ("PPPP", degraded.mirrored),
+            )
+        ),
         ("CPR", degraded.across_the_plane, "refused"),
         ("LP", degraded.slanted, "refused"),
         ("CCU", degraded.no_gear, "refused"),

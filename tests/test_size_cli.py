@@ -156,11 +156,13 @@ def test_a_folder_gets_tables_numbers_and_pictures(driven: str):
     assert len(data["motors"]) == len(pl.read_csv("made/sizing/motors.csv")) == 4
 
 
+@CLIENTS
 def test_one_table_may_be_written(driven: str):
     assert run(f"size {driven} --out sizing.parquet").exit_code == 0
     assert pl.read_parquet("sizing.parquet")["leg"].to_list() == [1, 2]
 
 
+@CLIENTS
 def test_a_person_sees_tables_within_80_columns(driven: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")

@@ -201,7 +201,12 @@ def test_motions_and_rests_follow_each_other():
 
 
 @pytest.mark.parametrize(
-    ("name", "wider"), [("five-bar", 0.1), ("delta-4", 0.1), ("quadrupteron-oblique", 0.05)]
+    ("name", "wider"),
+    [
+        ("five-bar", 0.1),
+        pytest.param("delta-4", 0.1, marks=NIGHTLY),
+        pytest.param("quadrupteron-oblique", 0.05, marks=NIGHTLY),
+    ],
 )
 def test_places_are_those_that_a_loop_over_all_finds(name, wider):
     robot, tool = MACHINES[name], cycle(name, 31)

@@ -141,6 +141,7 @@ def own_law(robot, *, motors=False):
     return Custom(function, parameters=numbers, memory=np.zeros(n))
 
 
+@mechanisms.CLIENTS
 @pytest.mark.parametrize(
     ("name", "elastic"),
     [

@@ -331,6 +331,7 @@ def test_an_angle_of_no_vector_is_singular():
     assert block(v={(0,): 0.0, (1,): 0.0})["status"] == 2
 
 
+@CLIENTS
 def test_a_machine_with_drives_has_its_feed_forward_too(tmp_path):
     for name, more in (
         ("par4", ["Par4_FeedForward.st", "Par4_JointFeedForward.st"]),

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import tilting
-from mechanisms import NIGHTLY, TILTED, gated
+from mechanisms import CLIENTS, NIGHTLY, TILTED, gated
 from test_cli import run
 
 import pteron
@@ -91,6 +91,7 @@ def test_tables_of_poses_may_be_in_mm_and_degrees(tmp_path):
     np.testing.assert_allclose(shown.motion.pose[0], pose, rtol=1e-12)
 
 
+@CLIENTS
 def test_a_map_of_lengths_and_an_angle_has_the_reach_of_every_angle():
     robot = TILTED["ball-table"]
     over = pose_grid(robot, held={"pitch": 0.1}, ranges={"roll": (-0.3, 0.3)})

@@ -71,7 +71,7 @@ def same(one, other, angular):
     return np.abs(apart).max(axis=-1)
 
 
-@pytest.mark.parametrize("name", gated(CASES, ["3T3R", "2R", "1T2R"]))
+@pytest.mark.parametrize("name", gated(CASES, ["3T3R"]))
 def test_direct_inverts_inverse(name):
     robot, x = drawn(name)
     joints = pteron.inverse_kinematics(robot, x)
@@ -90,7 +90,7 @@ def test_direct_inverts_inverse(name):
     assert (np.diff(poses[..., -1], axis=-1)[whole[:, 1:]] > -1e-8).all()
 
 
-@pytest.mark.parametrize("name", gated(CASES, ["3T3R", "2R", "1T2R"]))
+@pytest.mark.parametrize("name", gated(CASES, ["3T3R"]))
 def test_poses_are_counted_another_way(name):
     """By Newton's steps from many poses."""
     robot, x = drawn(name)
@@ -128,7 +128,7 @@ def test_dietmaiers_machine_has_forty_poses():
     np.testing.assert_allclose(back, np.broadcast_to(LENGTHS, back.shape), atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", gated(["general", "plane", "6-3", "turned"], ["6-3", "turned"]))
+@pytest.mark.parametrize("kind", gated(["general", "plane", "6-3", "turned"], ["6-3"]))
 def test_every_regular_pose_is_found(kind):
     """Real poses come in pairs, and no more than the machine may have."""
     rng = np.random.default_rng(4)
@@ -226,7 +226,7 @@ def moving_hexapod(kind, rng):
 MOVING = ["line-symmetric", "translation", "about a line"]
 
 
-@pytest.mark.parametrize("kind", gated(MOVING, MOVING[:2]))
+@pytest.mark.parametrize("kind", gated(MOVING, MOVING[:1]))
 def test_a_platform_that_moves_with_its_joints_held_has_no_list_of_poses(kind):
     rng = np.random.default_rng(8)
     robot, pose = moving_hexapod(kind, rng)

@@ -73,6 +73,7 @@ def test_c_of_a_tilting_machine_returns_what_the_library_does(tmp_path, motion):
         np.testing.assert_allclose(found, given, rtol=0, atol=1e-9 * np.abs(given).max())
 
 
+@CLIENTS
 def test_c_of_a_hexapod_takes_every_state_of_its_reach(tmp_path):
     """The library's code has vectors along the platform's axes, exported code along the base's."""
     robot = pteron.load("stewart")
@@ -115,6 +116,7 @@ def test_casadi_functions_of_a_tilting_machine_take_a_wrench_of_six(motion):
         np.testing.assert_allclose(np.array(rates).ravel(), np.concatenate([dx, ddx]), 1e-7)
 
 
+@CLIENTS
 @pytest.mark.parametrize("motion", gated(tilting.LEGS, ["2R"]))
 def test_an_fmu_of_a_tilting_machine_moves_as_the_librarys_equations(tmp_path, motion):
     """With forces, a wrench of six, and a payload, which here is another platform."""

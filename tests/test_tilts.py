@@ -22,7 +22,13 @@ from pteron.workspace.conditions import keeps
 
 drawn = lru_cache(tilting.machine)
 
-CASES = [("3R", ("UPS",)), ("3T3R", ("UPS",)), pytest.param("1T2R", ("RPS",), marks=NIGHTLY)]
+CASES = [
+    ("3R", ("UPS",)),
+    *(
+        pytest.param(motion, (kind,), marks=NIGHTLY)
+        for motion, kind in (("3T3R", "UPS"), ("1T2R", "RPS"))
+    ),
+]
 
 
 def leaning(robot, home, tilt, count=20_000, radius=0.0):

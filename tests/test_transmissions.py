@@ -228,6 +228,7 @@ def test_ripple_and_cogging_come_by_the_motors_angle(mass):
     assert np.ptp(found.acceleration[:, 0]) > 5.0
 
 
+@mechanisms.CLIENTS
 @pytest.mark.parametrize("encoder", ["motor", "joint"])
 def test_a_machine_with_soft_drives_follows_its_cycle_alike_in_c_and_numpy(encoder, monkeypatch):
     robot = pteron.load("quadrupteron")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mechanisms import CLIENTS
+from mechanisms import CLIENTS, NIGHTLY
 from typer.testing import CliRunner
 
 import pteron
@@ -42,7 +42,6 @@ from pteron.motion import (
 )
 from pteron.workspace import home_pose
 
-NIGHTLY = pytest.mark.nightly
 OTHERS = "delta", "quadrupteron", "hexa", "wrist"
 MACHINES = ["five-bar", *(pytest.param(name, marks=NIGHTLY) for name in OTHERS)]
 
@@ -157,7 +156,7 @@ def test_predicted_margins_are_those_of_simulation(name: str) -> None:
     [
         ("rigid", Sensors(noise=1e-30, cutoff=100.0)),
         pytest.param("rigid", Sensors(encoder=(1e-13, 0.0), cutoff=100.0), marks=NIGHTLY),
-        ("motor", Sensors(motor_encoder=1e-13, cutoff=100.0)),
+        pytest.param("motor", Sensors(motor_encoder=1e-13, cutoff=100.0), marks=NIGHTLY),
         pytest.param("joint", Sensors(motor_encoder=1e-13), marks=NIGHTLY),
         pytest.param("both", Sensors(noise=1e-30, cutoff=100.0, delay=2e-4), marks=NIGHTLY),
     ],

@@ -273,6 +273,7 @@ def test_a_damped_spring_only_takes_energy_and_the_free_machine_falls_as_simulat
     assert np.ptp(found) > 0.0
 
 
+@CLIENTS
 def test_a_spring_lifts_a_small_machine_that_has_fallen():
     session = Session(pteron.load("ball-table"))
     session.begin_push("off: no force")

@@ -283,7 +283,7 @@ def test_a_reach_without_an_end_is_refused():
     assert np.ptp(bounding_box(with_limits(endless, -0.5, 0.5), pose), axis=0).max() < 3.0
 
 
-@pytest.mark.parametrize("name", gated([*MACHINES, *CONES], ["five-bar", "delta with cones"]))
+@pytest.mark.parametrize("name", gated([*MACHINES, *CONES], ["five-bar"]))
 def test_the_box_holds_the_reach_and_touches_it(name):
     robot = machine(name)
     box = bounding_box(robot, home(name))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import casadi as ca
 
@@ -54,8 +54,7 @@ _CODES = {
 _NAMES = {code: name for name, code in _CODES.items()}
 
 
-@dataclass(frozen=True)
-class Node:
+class Node(NamedTuple):
     """One value: an operation on earlier nodes, an input's element, or a constant."""
 
     operation: str
@@ -172,11 +171,16 @@ def function_like(
     given: ca.Function,
     elements: Sequence[Sequence[Expression]],
     inputs: Sequence[Expression] | None = None,
+    *,
+    once: bool = False,
 ) -> ca.Function:
-    """Return a function with the names and the sparsities of another, its outputs' elements new."""
+    """Return a function with the names and the sparsities of another, its outputs' elements new.
+
+    Equal expressions become one; `once` says that they are already, which saves the search.
+    """
     outputs = [
         ca.SX(given.sparsity_out(i), ca.vertcat(*values)) for i, values in enumerate(elements)
     ]
     arguments = given.sx_in() if inputs is None else inputs
     names = given.name_in(), given.name_out()
-    return ca.Function(given.name(), arguments, ca.cse(outputs), *names)
+    return ca.Function(given.name(), arguments, outputs if once else ca.cse(outputs), *names)

@@ -86,7 +86,7 @@ def _cost(graph: TermGraph, roots: list[int]) -> int:
     cost, alone = 0, {abs(value) for value in roots}
     order = graph.order(roots)
     for k in order:
-        kind, operands = graph.nodes[k][0], graph.operands(k)
+        kind, operands = graph.kinds[k], graph.operands[k]
         if kind in ("sum", "product"):
             cost += len(operands) - 1
         elif operands and kind != "inverse":
@@ -101,16 +101,16 @@ def _flattened(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
-        kind = old.nodes[k][0]
+        kind = old.kinds[k]
         if kind == "reciprocal" and uses[k] == 1:
             return new.inverse(values[0])
         if kind not in ("sum", "product"):
             return old.copied(new, k, values)
         parts: list[int] = []
-        for v, value in zip(old.operands(k), values, strict=True):
+        for v, value in zip(old.operands[k], values, strict=True):
             inner = [value]
             if uses[abs(v)] == 1 and new.is_a(kind, value):
-                inner = list(new.operands(abs(value)))
+                inner = list(new.operands[abs(value)])
                 if value < 0 and kind == "sum":
                     inner = [-part for part in inner]
                 elif value < 0:
@@ -129,10 +129,10 @@ def _factored(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
         if not old.is_a("sum", k):
             return old.copied(new, k, values)
         terms = []
-        for v, value in zip(old.operands(k), values, strict=True):
+        for v, value in zip(old.operands[k], values, strict=True):
             # A product that others use is computed anyhow: taking it apart saves nothing.
             apart = uses[abs(v)] == 1 and new.is_a("product", value)
-            terms.append((sign_of(value), new.operands(abs(value)) if apart else (abs(value),)))
+            terms.append((sign_of(value), new.operands[abs(value)] if apart else (abs(value),)))
         return _sum_of_products(new, terms)
 
     return old.rebuilt(roots, rule)
@@ -166,7 +166,7 @@ def _shared(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
 
 def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
     """Put a node in the place of each pair that several of the owners hold, most frequent first."""
-    lists = {k: list(graph.operands(k)) for k in owners}
+    lists = {k: list(graph.operands[k]) for k in owners}
     holders: dict[tuple[int, int], dict[int, None]] = defaultdict(dict)
     for k, values in lists.items():
         for a, b in combinations(values, 2):

@@ -29,6 +29,9 @@ class TermGraph:
 
     def __init__(self) -> None:
         self.nodes: list[Node] = [()]
+        self.kinds: list[str] = [""]
+        self.operands: list[tuple[int, ...]] = [()]
+        """The values that each node is made of."""
         self.numbers: dict[Node, int] = {}
         self._constants: dict[int, float] = {}
         self._orders: dict[tuple[int, ...], list[int]] = {}
@@ -38,14 +41,17 @@ class TermGraph:
         number = self.numbers.get(node)
         if number is None:
             number = self.numbers[node] = len(self.nodes)
+            kind = node[0]
             self.nodes.append(node)
-            if node[0] == "constant" and isfinite(node[1]):
+            self.kinds.append(kind)
+            self.operands.append(() if kind in ("input", "constant") else node[1:])
+            if kind == "constant" and isfinite(node[1]):
                 self._constants[number] = node[1]
         return number
 
     def replace(self, k: int, *node: Any) -> None:
-        """Put another node of the same value in the place of one."""
-        self.nodes[k] = node
+        """Put another node of the same value and kind in the place of one."""
+        self.nodes[k], self.operands[k] = node, node[1:]
         self._orders.clear()
 
     def constant(self, c: float) -> int:
@@ -59,6 +65,19 @@ class TermGraph:
 
     def sum(self, values: Iterable[int]) -> int:
         """Return the value of a sum."""
+        terms = list(values)
+        sizes = set(map(abs, terms))
+        if len(sizes) < len(terms) or not self._constants.keys().isdisjoint(sizes):
+            terms = self._collected(terms)
+        if len(terms) == 1:
+            return terms[0]
+        terms.sort(key=abs)
+        if terms[0] > 0:
+            return self.add("sum", *terms)
+        return -self.add("sum", *[-term for term in terms])
+
+    def _collected(self, values: list[int]) -> list[int]:
+        """Return a sum's terms, those that are equal as one, and its constants as one."""
         constant = 0.0
         counts: dict[int, int] = {}
         for value in values:
@@ -76,30 +95,27 @@ class TermGraph:
                 terms.append(size if count > 0 else -size)
         if constant or not terms:
             terms.append(self.constant(constant))
-        if len(terms) == 1:
-            return terms[0]
-        terms.sort(key=abs)
-        sign = sign_of(terms[0])
-        return sign * self.add("sum", *(sign * term for term in terms))
+        return terms
 
     def product(self, values: Iterable[int]) -> int:
         """Return the value of a product."""
-        constant, factors = 1.0, []
-        for value in values:
-            k = abs(value)
-            c = self._constants.get(k)
-            if c is None:
-                factors.append(k)
-            else:
-                constant *= c
-            if value < 0:
-                constant = -constant
-        if constant == 0.0 or not factors:
-            return self.constant(constant)
-        if abs(constant) != 1.0:
-            factors.append(self.constant(abs(constant)))
-        number = factors[0] if len(factors) == 1 else self.add("product", *sorted(factors))
-        return number if constant > 0.0 else -number
+        given = list(values)
+        factors = sorted(map(abs, given))
+        turned = sum([value < 0 for value in given]) % 2
+        if not self._constants.keys().isdisjoint(factors):
+            constant = -1.0 if turned else 1.0
+            for k in map(abs, given):
+                constant *= self._constants.get(k, 1.0)
+            factors = [k for k in factors if k not in self._constants]
+            if constant == 0.0 or not factors:
+                return self.constant(constant)
+            if abs(constant) != 1.0:
+                factors = sorted([*factors, self.constant(abs(constant))])
+            turned = constant < 0
+        elif not factors:
+            return self.constant(1.0)
+        number = factors[0] if len(factors) == 1 else self.add("product", *factors)
+        return -number if turned else number
 
     def quotient(self, a: int, b: int) -> int:
         """Return the value of a/b; 1/b becomes an operation that others may use."""
@@ -121,14 +137,9 @@ class TermGraph:
         there = self.numbers.get(("reciprocal", abs(value)))
         return sign_of(value) * (there or self.add("inverse", abs(value)))
 
-    def operands(self, k: int) -> tuple[int, ...]:
-        """Return the values that a node is made of."""
-        node = self.nodes[k]
-        return () if node[0] in ("input", "constant") else node[1:]
-
     def is_a(self, kind: str, value: int) -> bool:
         """Return whether a value is a sum, a product, ..., or the negative of one."""
-        return bool(self.nodes[abs(value)][0] == kind)
+        return self.kinds[abs(value)] == kind
 
     def order(self, roots: Iterable[int]) -> list[int]:
         """Return the nodes that the roots depend on, operands first."""
@@ -138,21 +149,23 @@ class TermGraph:
         order: dict[int, None] = {}
         stack = list(start)
         while stack:
-            last = stack[-1]
-            waiting = last not in order and [
-                k for k in map(abs, self.operands(last)) if k not in order
-            ]
-            if waiting:
-                stack += waiting
-            else:
-                order[stack.pop()] = None
+            last = stack.pop()
+            if last < 0:  # what -last is made of is there
+                order[-last] = None
+            elif last not in order:
+                waiting = [k for k in map(abs, self.operands[last]) if k not in order]
+                if waiting:
+                    stack.append(-last)
+                    stack += waiting
+                else:
+                    order[last] = None
         self._orders[start] = found = list(order)
         return found
 
     def uses(self, roots: Iterable[int]) -> Counter[int]:
         """Return the number of times that each node is an operand or a root."""
         roots = list(roots)
-        operands = chain.from_iterable(map(self.operands, self.order(roots)))
+        operands = chain.from_iterable([self.operands[k] for k in self.order(roots)])
         return Counter(map(abs, chain(roots, operands)))
 
     def rebuilt(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
@@ -160,13 +173,13 @@ class TermGraph:
         new = TermGraph()
         values: dict[int, int] = {}
         for k in self.order(roots):
-            values[k] = value = rule(new, k, [values[v] for v in self.operands(k)])
+            values[k] = value = rule(new, k, [values[v] for v in self.operands[k]])
             values[-k] = -value
         return new, [values[v] for v in roots]
 
     def copied(self, new: TermGraph, k: int, values: list[int]) -> int:
         """Return the value in a new graph that differs in the operands alone: the plainest rule."""
-        kind = self.nodes[k][0]
+        kind = self.kinds[k]
         if kind in ("sum", "product"):
             return new.sum(values) if kind == "sum" else new.product(values)
         if kind in ("inverse", "reciprocal"):

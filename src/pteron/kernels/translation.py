@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from itertools import islice
 from typing import Any
@@ -53,12 +52,16 @@ def written(graph: TermGraph, roots: list[int], function: ca.Function) -> ca.Fun
         size, sign = found[abs(value)]
         return size, sign * sign_of(value)
 
+    negatives: dict[int, Any] = {}
+
     def plain(value: int) -> Any:
         size, sign = signed(value)
-        return size if sign > 0 else -size
+        if sign < 0 and abs(value) not in negatives:
+            negatives[abs(value)] = -size
+        return size if sign > 0 else negatives[abs(value)]
 
     for k in order:
-        kind, operands = graph.nodes[k][0], graph.operands(k)
+        kind, operands = graph.kinds[k], graph.operands[k]
         if kind == INPUT:
             _, port, element = graph.nodes[k]
             found[k] = elements[port][element], 1
@@ -67,7 +70,7 @@ def written(graph: TermGraph, roots: list[int], function: ca.Function) -> ca.Fun
         elif kind == "sum":
             found[k] = _sum([signed(v) for v in operands], wanted[k])
         elif kind == "product":
-            below = [graph.operands(f)[0] for f in operands if graph.is_a("inverse", f)]
+            below = [graph.operands[f][0] for f in operands if graph.is_a("inverse", f)]
             above = [f for f in operands if not graph.is_a("inverse", f)]
             found[k] = _product([found[f] for f in above], [found[f] for f in below], wanted[k])
         elif kind in ("inverse", "reciprocal"):
@@ -78,26 +81,28 @@ def written(graph: TermGraph, roots: list[int], function: ca.Function) -> ca.Fun
     return function_like(
         function,
         [[plain(v) for v in islice(values, function.nnz_out(i))] for i in range(function.n_out())],
+        once=True,
     )
 
 
-def _wanted_signs(graph: TermGraph, order: list[int], roots: list[int]) -> Counter[int]:
+def _wanted_signs(graph: TermGraph, order: list[int], roots: list[int]) -> list[int]:
     """Return for each node whether its value (> 0) or its negative (< 0) serves its users more."""
-    wanted: Counter[int] = Counter()
+    wanted = [0] * len(graph.nodes)
     for v in roots:
         wanted[abs(v)] += sign_of(v)
     for k in reversed(order):
-        kind, operands = graph.nodes[k][0], graph.operands(k)
+        kind, operands = graph.kinds[k], graph.operands[k]
         if kind == "product":
-            turning = [f for f in operands if graph.is_a("sum", f) or graph.is_a("product", f)]
             # One that turns is enough, or -1/x in the place of 1/x: see `_product`.
-            reciprocals = [f for f in operands if graph.is_a("reciprocal", f)]
-            sign = (-1) ** len(reciprocals)
-            wanted.update(dict.fromkeys(turning[:1], sign * wanted[k]))
-            if not turning:
-                wanted.update(dict.fromkeys(reciprocals[:1], wanted[k]))
+            reciprocals = [f for f in operands if graph.kinds[f] == "reciprocal"]
+            turning = [f for f in operands if graph.kinds[f] in ("sum", "product")]
+            if turning:
+                wanted[turning[0]] += (-1) ** len(reciprocals) * wanted[k]
+            elif reciprocals:
+                wanted[reciprocals[0]] += wanted[k]
         elif kind not in ("sum", "inverse", "reciprocal"):
-            wanted.update({abs(v): sign_of(v) for v in operands})
+            for size, sign in {abs(v): sign_of(v) for v in operands}.items():
+                wanted[size] += sign
     return wanted
 
 
