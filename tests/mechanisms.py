@@ -360,7 +360,7 @@ TURNS = {}
 """By file and its gate, the cases that had a turn."""
 
 
-def in_turn(cases, gate=GATE, share=3, argument="name", **options):
+def in_turn(cases, gate=GATE, share=2, argument="name", **options):
     """Return what parametrizes the claims of a file, each in the gate by the next of its cases.
 
     A file with claims enough has each case of its gate, and each claim `share` of them: a machine

@@ -106,8 +106,8 @@ def test_modes_counted_another_way(kinds, seed):
     _agree(robot, reached(robot, 3, seed)[1])
 
 
-@pytest.mark.parametrize("name", ["par4", "h4", "3-rrr", "3-prr"])
-@pytest.mark.parametrize("spread", [0.0, 1e-12, 1e-8, 1e-4, 0.3])
+@pytest.mark.parametrize("name", gated(["par4", "h4", "3-rrr", "3-prr"], ["h4", "3-rrr"]))
+@pytest.mark.parametrize("spread", gated([0.0, 1e-12, 1e-8, 1e-4, 0.3], [0.0, 1e-12, 1e-4]))
 def test_modes_where_all_joints_are_nearly_equal(name, spread):
     """The tips then lie in a plane, and differences of closures are singular in p for every phi."""
     robot = pteron.load(name)

@@ -151,6 +151,7 @@ def test_the_cube_is_that_of_the_proved_search(name):
     assert cube.edge == pytest.approx(known.edge, rel=0.005)
 
 
+@CLIENTS
 def test_a_tube_between_the_points_is_no_part_of_the_cube():
     """The Tripteron's links are equally long: they fold, unreachable, onto a line through it."""
     asked = spec_of(robot="tripteron", variables=LENGTHS[:1], requirements=[])
@@ -174,6 +175,7 @@ def test_a_tube_is_seen_beside_many_points_on_a_limit(task):
     assert proved_cube(design).edge > 0.99 * design.cube.edge
 
 
+@CLIENTS
 def test_what_the_points_miss_goes_back_to_the_search():
     """A tube, as wide as the links differ, through which no point and no step of a search goes."""
     asked = {"floors": {"type_i": 0.0, "type_ii": 0.0}, "requirements": []}

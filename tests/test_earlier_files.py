@@ -49,7 +49,7 @@ def _numbers(value):
 
 def waits(path):
     """Say whether a file is one more robot of a kind that another one stands for."""
-    stand = ("3-prr", "delta-4", "five-bar", "h4", "mixed", "quadrupteron", "tripteron-oblique")
+    stand = ("delta-4", "five-bar", "mixed", "quadrupteron")
     return path.parent == ROBOTS and path.suffix == ".toml" and path.stem not in stand
 
 

@@ -256,6 +256,7 @@ LAYOUT = Layout(
 CRANK_AND_SLIDER = {"delta": ("A", "B", "C"), "mixed": ("A", "B", "C"), "five-bar": ("A", "B")}
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", gated(CRANK_AND_SLIDER, ["delta", "five-bar"]))
 def test_the_log_of_what_was_written_gives_the_parameters_back(name: str, tmp_path: Path):
     robot, found = driven(name), excited(name)

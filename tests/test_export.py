@@ -372,6 +372,7 @@ class Falling(Friction):
         return super().forces(rates) + np.sign(rates) * np.exp(-((rates / 0.2) ** 2))
 
 
+@CLIENTS
 @pytest.mark.parametrize("offset", [True, False])
 def test_an_identified_machine_goes_to_the_controller_as_it_was_printed(tmp_path, offset):
     """Rotors and friction too, of a machine with two cranks and an inclined slider.

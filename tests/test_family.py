@@ -50,7 +50,7 @@ class Case(NamedTuple):
 EVERY = in_turn(
     [*CATALOG, *((kinds, seed) for kinds in KINDS for seed in range(MANY))],
     GATE,
-    share=4,
+    share=3,
     argument="case",
     indirect=True,
     ids=lambda p: p if isinstance(p, str) else f"{p[0]}-{p[1]}",

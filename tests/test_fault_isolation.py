@@ -281,6 +281,7 @@ def held(name):
     return robot, replace(log, forces=later.forces), friction
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", gated(["delta", "par4"]))
 def test_forces_held_from_sample_to_sample_are_no_fault_and_spoil_no_value(name):
     robot, log, friction = held(name)

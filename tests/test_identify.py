@@ -151,6 +151,7 @@ def resting(robot, *, seed=3, rate=1000.0):
     return Log("rests", time, pteron.inverse_kinematics(robot, pose), forces)
 
 
+@CLIENTS
 @pytest.mark.parametrize("period", [12.0])
 def test_kinks_of_a_motion_without_noise_do_no_harm(period):
     about = Description(period=period)

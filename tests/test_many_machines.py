@@ -169,6 +169,7 @@ def test_a_machine_that_comes_to_nothing_is_told():
     assert np.isnan(found.force[1]).all() or found.samples[1] < found.samples[0]
 
 
+@CLIENTS
 @pytest.mark.parametrize("elastic", [None, pytest.param(Elastic(2e5), marks=NIGHTLY)])
 def test_steps_are_short_enough_for_each_of_many_machines(elastic, monkeypatch):
     """Lighter machines, and those of more friction, ask for shorter steps than the one as drawn."""

@@ -91,6 +91,7 @@ def test_the_chunks_of_a_grid_are_the_grid():
     assert grid.regions()[0] == tuple(slice(0, side) for side in grid.chunk)
 
 
+@CLIENTS
 def test_an_angle_varies_over_its_turn_and_the_box_is_that_of_all_its_values():
     robot = pteron.load("3-prr")
     grid = pose_grid(robot, {}, {"phi": (-0.5, 0.5, 9)}, points=4)

@@ -113,7 +113,7 @@ def test_casadi_functions_are_the_librarys(name):
 
 
 @pytest.mark.parametrize("name", gated(["quadrupteron", "mixed"], ["mixed"]))
-@pytest.mark.parametrize("speed", [0.0, 1.0])
+@pytest.mark.parametrize("speed", gated([0.0, 1.0], [0.0]))
 def test_casadi_differentiates_friction_also_at_rest(name, speed):
     robot = ROBOTS[name]
     pose, velocity = (value[0] for value in states(robot, 1)[:2])

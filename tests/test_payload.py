@@ -174,6 +174,7 @@ def test_two_logs_say_what_one_with_both_phases_says(name):
     np.testing.assert_allclose(two.deviations, both.deviations, rtol=0.6)
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", ["quadrupteron"])
 def test_standard_deviations_cover_the_error(name):
     errors = []

@@ -34,6 +34,7 @@ def energy(robot, pose, velocity):
     return pteron.kinetic_energy(robot, pose, velocity) + pteron.potential_energy(robot, pose)
 
 
+@mechanisms.CLIENTS
 @pytest.mark.parametrize("name", mechanisms.gated(FREE, ["five-bar"]))
 def test_free_motion_keeps_its_energy(name, monkeypatch):
     """For 2 s, or until a leg's margin is below 5 % of its longest reach; 100 random states."""
