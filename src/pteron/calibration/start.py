@@ -85,7 +85,8 @@ def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
     points = guess.points(given.marks, poses)
     seen = ~np.isnan(given.positions).any(axis=-1)
     if not given.setup.frame_known and seen.sum() >= _FEW:
-        fixed = np.array([_is_known(given, name) for name in given.marks])[seen]
+        free = {name for name, mark in given.setup.marks.items() if not mark.known}
+        fixed = np.array([name not in free for name in given.marks])[seen]
         used = np.flatnonzero(seen)[fixed] if fixed.sum() >= _FEW else np.flatnonzero(seen)
         p, y = points[used], given.positions[used]
         turn, _ = scipy.spatial.transform.Rotation.align_vectors(
@@ -108,7 +109,3 @@ def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
             normal = normal / np.linalg.norm(normal)
         planes[name] = np.append(normal, np.median(points[here] @ normal - given.heights[here]))
     return replace(guess, planes=planes)
-
-
-def _is_known(given: Measurements, name: str) -> bool:
-    return name not in given.setup.marks or given.setup.marks[name].known

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pteron.errors import DataError
+from pteron.arguments import expect
 from pteron.identification.estimators.estimate import Estimate, Search, estimate_of, residuals_of
 from pteron.identification.estimators.qr import actuator_factors, qr_factor
 from pteron.identification.observation import Observations
@@ -100,8 +100,7 @@ def huber(
     DataError
         If the observations do not determine the values, or the threshold is not positive.
     """
-    if not threshold > 0.0:
-        raise DataError(f"threshold: {threshold} given, a number above 0 expected")
+    expect(threshold > 0.0, "threshold", threshold, "a number above 0")
     factor = qr_factor(observations).check_seen()
     values = factor.values()
     converged = False

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from pteron.arguments import expect_one_of
+from pteron.arguments import expect, expect_one_of
 from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
@@ -118,12 +118,10 @@ class Processing:
             expect_one_of(get_args(Derivatives), derivatives=self.derivatives)
         for name in ("cutoff", "band", "period"):
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise DataError(f"{name}: {value} given, a number above 0 expected")
-        if not 0.0 <= self.slow < 1.0:
-            raise DataError(f"slow: {self.slow} given, a share from 0 to below 1 expected")
-        if self.delay not in (None, "auto") and not abs(float(self.delay)) <= LATEST:
-            raise DataError(f'delay: {self.delay} s given, at most {LATEST:g} s or "auto" expected')
+            expect(value is None or 0.0 < value < np.inf, name, value, "a number above 0")
+        expect(0.0 <= self.slow < 1.0, "slow", self.slow, "a share from 0 to below 1")
+        small = self.delay in (None, "auto") or abs(float(self.delay)) <= LATEST
+        expect(small, "delay", f"{self.delay} s", f'at most {LATEST:g} s or "auto"')
 
 
 @dataclass(frozen=True)
