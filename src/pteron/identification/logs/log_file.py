@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError, shown
+from pteron.identification.errors import OfLog
 from pteron.identification.logs.at_motor import joint_factors
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.clock import Clock, find_clock
@@ -55,7 +56,7 @@ _PER_METRE = {"mm": 1e3, "um": 1e6}
 Values = NDArray[np.float64]
 
 
-class LogFile:
+class LogFile(OfLog):
     """A log that is open for reading; each pass over its pieces reads the file anew.
 
     Attributes

@@ -9,7 +9,6 @@ import numpy as np
 
 from pteron.arguments import expect, expect_one_of
 from pteron.errors import DataError
-from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.identification.signals.derivatives import (
     CentralDifferences,
@@ -293,16 +292,14 @@ def _longest_part(log: Log) -> Log:
 def _checked_series(log: Log, period: float | None) -> FittedSeries:
     """Return the series of the positions; refuse a period that is not that of the motion."""
     if period is None:
-        raise LogError(
+        raise log.fault(
             "no period",
-            log.source,
             'derivatives "periodic" needs the period; declare it under [motion] in the log\'s '
             "description, or give period",
         )
     if log.duration < period * (1.0 - 1e-3):
-        raise LogError(
+        raise log.fault(
             "too short",
-            log.source,
             f"lasts {log.duration:g} s, less than its period of {period:g} s; record a whole "
             'period, or choose derivatives "central"',
         )
@@ -310,9 +307,8 @@ def _checked_series(log: Log, period: float | None) -> FittedSeries:
     span = np.ptp(log.joints, axis=0)
     worst = int(np.argmax(series.noise / span))
     if series.noise[worst] > _REPEATS * span[worst]:
-        raise LogError(
+        raise log.fault(
             "not repeating",
-            log.source,
             f"does not repeat after its period of {period:g} s: {log.joint_names[worst]} "
             f"is {series.noise[worst]:.2g} (rms, m or rad) off; correct the "
             "period in the log's description, or leave it out",
