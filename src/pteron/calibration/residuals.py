@@ -100,8 +100,8 @@ class MachineSlopes:
     def pose_slopes(self, guess: Guess, given: Measurements, poses: Array) -> tuple[Array, Array]:
         """Return the slopes of poses at given joints (N, m, p), and of their marks (N, 3, p)."""
         _, moved, slopes = self._marks(guess, given, poses, np.arange(len(poses)))
-        lengths = np.eye(3) if len(self._lengths) == 3 else self._axes[self._lengths]
-        whole = np.concatenate([lengths @ slopes[:, :3], slopes[:, 6:]], axis=1)
+        lengths = self._axes[self._lengths] @ slopes[:, :3]
+        whole = np.concatenate([lengths, slopes[:, 6:]], axis=1)
         return whole[..., : self.count], moved[..., : self.count]
 
     def _wrapped(self, missed: Array) -> Array:

@@ -9,7 +9,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Guess
-from pteron.calibration.measurements import Measurements, length_columns
+from pteron.calibration.measurements import Measurements, length_columns, position_axes
 from pteron.calibration.residuals import MachineSlopes
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
@@ -49,9 +49,7 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     )
     lengths = length_columns(robot)
     arms = guess.points(given.marks, begin) - robot.platform.at(begin)[0]
-    if len(lengths) not in (0, 3):
-        arms = arms @ np.array(robot.platform.frame).T
-    places = (given.positions - arms)[:, lengths]
+    places = (given.positions - arms @ position_axes(robot).T)[:, lengths]
     if given.setup.frame_known:
         at = np.flatnonzero(~robot.platform.angular)
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)

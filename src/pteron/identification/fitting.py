@@ -24,7 +24,7 @@ from pteron.identification.estimators import (
 from pteron.identification.estimators.least_squares import median_noise
 from pteron.identification.exchanged_columns import DECISIVE, column_fault, exchanged_joints
 from pteron.identification.logs import Log
-from pteron.identification.logs.at_motor import per_cent_advice
+from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cent_advice
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model, identification_model
 from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
@@ -51,6 +51,11 @@ _MOST = 10.0
 
 _NOISELESS = 1e-10
 """Residuals, relative to the forces, that are rounding."""
+
+
+def in_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
+    """Return a log; if its forces are in per cent of rated torque, by the machine's drives."""
+    return by_rated_torque(log, robot) if log.description.force_unit == "%" else log
 
 
 def check_recordings(

@@ -28,10 +28,10 @@ from pteron.identification.fitting import (
     estimated,
     findings_told,
     fit_observations,
+    in_newtons,
     preprocessing_for,
 )
 from pteron.identification.logs import Log, LogFile
-from pteron.identification.logs.at_motor import in_newtons
 from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations

@@ -23,9 +23,9 @@ from pteron.identification.fitting import (
     check_motion,
     check_recordings,
     findings_told,
+    in_newtons,
 )
 from pteron.identification.logs import Finding, Log
-from pteron.identification.logs.at_motor import in_newtons
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.plausibility import CHANCE, left_over, unphysical

@@ -70,13 +70,13 @@ def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.
     return 2.0 * np.pi / (np.array(counts) * [d.gear for d in drives])
 
 
-def in_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
-    """Return a log; forces in per cent of rated torque with gains that make N or N m of them.
+def by_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
+    """Return a log of forces in per cent of rated torque with gains that make N or N m of them.
 
     Where a drive lacks a value for that, the log is returned as it is.
     """
     about = log.description
-    if about.force_unit != "%" or _lacking(robot, _RATED):
+    if _lacking(robot, _RATED):
         return log
     drives = [leg.drive or Drive() for leg in robot.legs]
     gains = tuple(drive.gear * (drive.rated_torque or 0.0) / 100.0 for drive in drives)
