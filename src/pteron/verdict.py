@@ -51,6 +51,12 @@ class Opinion:
         """Lower the grade to another one, if that is worse."""
         self.grade = max(self.grade, grade, key=get_args(Grade).index)
 
+    def add(self, reason: str, step: str = "", *, grade: Grade = "trustworthy") -> None:
+        """Add a reason, with the grade that it allows at best and a step that would help."""
+        self.lower(grade)
+        self.reasons.append(reason)
+        self.steps += [step] * bool(step)
+
     def verdict(self) -> Verdict:
         """Return the verdict."""
         return Verdict(self.grade, tuple(self.reasons), tuple(dict.fromkeys(self.steps)))

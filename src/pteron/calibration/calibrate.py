@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect
 from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements, evenly
@@ -131,8 +132,8 @@ def calibrate(
 
 
 def _check(joints: int, given: Measurements) -> None:
-    if given.readings.ndim != 2 or given.readings.shape[1] != joints:
-        raise DataError(f"readings: shape {given.readings.shape} given, (N, {joints}) expected")
+    shape = given.readings.shape
+    expect(len(shape) == 2 and shape[1] == joints, "readings", f"shape {shape}", f"(N, {joints})")
     if not np.isfinite(given.readings).all():
         row = int(np.argwhere(~np.isfinite(given.readings))[0, 0])
         raise DataError(f"{given.places[row]}: a reading is missing or not finite")

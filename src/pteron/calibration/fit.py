@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess, tolerances_of
-from pteron.calibration.measurements import KINDS, Measurements
+from pteron.calibration.measurements import KINDS, Measurements, evenly
 from pteron.calibration.residuals import MachineSlopes, Rows
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
@@ -72,14 +73,14 @@ class Fit:
         The rows that are no outliers.
     poses : array, shape (N, m)
         Of all rows.
+    prior : array, shape (p,)
+        What tolerances say: one over their squares.
     residuals, measured : array, shape (N, K)
         Of all rows, computed minus measured, m and rad; and which of them count.
     distances : array, shape (N,)
         Of each row's residuals from zero, in standard deviations (Mahalanobis).
     information, gradient : array, shapes (p, p) and (p,)
         What the data alone say: J' W J and J' W r.
-    prior : array, shape (p,)
-        What tolerances say: one over their squares.
     cost : float
         Squared residuals, in variances, and tolerances.
     steps : int
@@ -94,13 +95,13 @@ class Fit:
     noise: dict[str, float]
     kept: NDArray[np.bool_]
     poses: Array
+    prior: Array
     residuals: Array
     measured: NDArray[np.bool_]
     distances: Array
     information: Array
     gradient: Array
-    prior: Array
-    cost: float
+    cost: float = np.inf
     steps: int = 0
     shared: Array | float = 0.0
 
@@ -162,9 +163,10 @@ class Fitter:
         noise = {kind: max(setup.get(kind, _START), FLOOR) for kind in KINDS}
         if before is not None:
             guess, total, noise = before.guess, before.total, before.noise
-        kept = np.ones(len(self.given), dtype=bool)
+        kept, none = np.ones(len(self.given), dtype=bool), np.empty(0)
+        begin = guess, total, noise, kept, self.begin_poses, self.prior
         try:
-            at = self._at(guess, total, self.begin_poses, noise, kept)
+            at = self._at(Fit(*begin, none, none > 0.0, none, none, none))
         except ValueError:
             raise DataError(
                 "most readings lead to no pose of the machine as drawn; check their units, zeros "
@@ -183,8 +185,7 @@ class Fitter:
             alike = all(abs(noise[k] / at.noise[k] - 1.0) < 0.01 for k in sought)
             if alike and (kept == at.kept).all():
                 break
-            again = self._at(at.guess, at.total, at.poses, noise, kept)
-            at = replace(again, steps=at.steps)
+            at = self._at(at, noise=noise, kept=kept)
         return replace(at, shared=self._shared(at))
 
     def _found_again(self, at: Fit) -> Fit:
@@ -197,8 +198,7 @@ class Fitter:
             off = np.abs(modes - self.begin_poses[i]).max(axis=-1)
             if np.isfinite(off).any():
                 poses[i] = modes[np.nanargmin(off)]
-        again = self._at(at.guess, at.total, poses, at.noise, at.kept)
-        return replace(again, steps=at.steps)
+        return self._at(at, poses=poses)
 
     def _settled(self, begin: Fit) -> Fit:
         """Return the most probable values for a noise and rows that are kept."""
@@ -211,11 +211,9 @@ class Fitter:
             share = 1.0
             while True:
                 try:
-                    moved, total = (
-                        at.guess.moved(self.blocks, share * step),
-                        at.total + share * step,
-                    )
-                    after = self._at(moved, total, at.poses, at.noise, kept)
+                    part = share * step
+                    moved, total = at.guess.moved(self.blocks, part), at.total + part
+                    after = self._at(at, guess=moved, total=total, kept=kept)
                     fell = after.cost <= at.cost * (1.0 + 1e-9) + 1e-12
                     if not fell and share == 1.0:
                         strays = self._strays(at, after, kept)
@@ -253,19 +251,17 @@ class Fitter:
     def cost(self, guess: Guess, total: Array, fit: Fit) -> float:
         """Return the squared residuals, in variances, and tolerances of a guess; inf: no pose."""
         try:
-            return self._at(guess, total, fit.poses, fit.noise, fit.kept).cost
+            return self._at(fit, guess=guess, total=total).cost
         except ValueError:
             return float(np.inf)
 
-    def _at(
-        self,
-        guess: Guess,
-        total: Array,
-        poses: Array,
-        noise: dict[str, float],
-        kept: NDArray[np.bool_],
-    ) -> Fit:
-        """Return residuals and normal equations at a guess; ValueError where it has no poses."""
+    def _at(self, fit: Fit, **changed: Any) -> Fit:
+        """Return a fit with other values, and its residuals and normal equations there.
+
+        ValueError where they have no poses.
+        """
+        fit = replace(fit, **changed)
+        guess, kept, poses = fit.guess, fit.kept, fit.poses
         count, rows = len(self.prior), len(self.given)
         width = len(self.kind_of)
         matrix, right, cost = np.zeros((count, count)), np.zeros(count), 0.0
@@ -284,7 +280,7 @@ class Fitter:
             at = self.slopes.rows(guess, self.given, found, chosen)
             residuals[chosen], measured[chosen] = at.residuals, at.measured
             lost[chosen] |= ~np.isfinite(at.by_reading).all(axis=(1, 2))
-            r, slopes, _ = self.whitened(at, guess, noise)
+            r, slopes, _ = self.whitened(at, guess, fit.noise)
             r[lost[chosen]], slopes[lost[chosen]] = 0.0, 0.0
             squares = np.einsum("nk,nk->n", r, r)
             distances[chosen] = np.sqrt(squares)
@@ -299,12 +295,12 @@ class Fitter:
             flat = (heavy[..., None] * slopes[:, used]).reshape(-1, count)
             matrix += flat.T @ flat
             right += flat.T @ (heavy * r[:, used]).reshape(-1)
-        cost += float(self.prior @ total**2) + _LOST * float((lost & kept).sum())
+        cost += float(self.prior @ fit.total**2) + _LOST * float((lost & kept).sum())
         if not np.isfinite(cost):
             raise ValueError
         distances[lost] = BEYOND
-        values = guess, total, noise, kept
-        return Fit(*values, found, residuals, measured, distances, matrix, right, self.prior, cost)
+        values = guess, fit.total, fit.noise, kept, found, self.prior
+        return Fit(*values, residuals, measured, distances, matrix, right, cost, fit.steps)
 
     def whitened(
         self, at: Rows, guess: Guess, noise: dict[str, float]
@@ -350,7 +346,7 @@ class Fitter:
             return {}
         kept = fit.kept & (fit.distances < BEYOND)
         rows = np.flatnonzero(kept)
-        some = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _CHUNK)).astype(int))]
+        some = rows[evenly(len(rows), _CHUNK)]
         at = self.slopes.rows(fit.guess, self.given, fit.poses, some)
         found = {}
         for kind in sought:

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.arguments import expect_one_of
+from pteron.arguments import expect, expect_one_of
 from pteron.calibration.guess import Guess, tolerances_of, variances
 from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, Plane, Setup
 from pteron.calibration.residuals import MachineSlopes
@@ -144,8 +144,7 @@ def plan(
         If no box of poses around home, or on the plane, is proved to serve.
     """
     robot = as_manipulator(robot)
-    if count < 1:
-        raise DataError(f"count: {count} given, 1 or more expected")
+    expect(count >= 1, "count", count, "1 or more")
     expect_one_of(get_args(Measure), measure=measure)
     expect_one_of(get_args(Criterion), criterion=criterion)
     if measure != "poses" and not (robot.platform.lengths or any(robot.platform.tool)):
@@ -155,8 +154,9 @@ def plan(
         )
     home = home_pose(robot)
     setup = setup or Setup()
+    drawn = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
     if measure == "heights":
-        home, setup = _on_plane(robot, home, setup)
+        home, setup = _on_plane(drawn, home, setup)
     region = proved_box(robot, home, measure == "heights")
     rng = np.random.default_rng(seed)
     low, high = region.box
@@ -166,11 +166,10 @@ def plan(
     if measure == "heights":
         poses[:, _upright(robot)] = home[_upright(robot)]
         poses[:, robot.platform.angular] = home[robot.platform.angular]
-    drawn = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
     if measure == "distances" and not setup.anchors:
         place = robot.platform.at(home[None])[0][0] - [0.0, 0.0, robot.legs[0].size]
         setup = replace(setup, anchors={TOOL: Place(tuple(place.tolist()), known=False)})
-    given = _imagined(robot, poses, drawn, measure, setup)
+    given = _imagined(drawn, poses, measure, setup)
     blocks = blocks_of(robot, given, free, prior)
     start = Guess.drawn(robot, given)
     slopes = MachineSlopes(robot, blocks)
@@ -256,13 +255,13 @@ def _upright(robot: Manipulator) -> int:
     return int(lengths[np.abs(robot.platform.directions[:, 2]).argmax()])
 
 
-def _on_plane(robot: Manipulator, home: Array, setup: Setup) -> tuple[Array, Setup]:
+def _on_plane(drawn: Guess, home: Array, setup: Setup) -> tuple[Array, Setup]:
     """Return home with the tool on the setup's plane; without one, a plane below home."""
+    robot = drawn.robot
     if not np.abs(robot.platform.directions[:, 2]).max(initial=0.0) > _RISES:
         raise DataError(f"measure: the heights of a {robot.platform.motion} platform do not vary")
     at = _upright(robot)
-    tool = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
-    point = tool.points([TOOL], home[None])[0]
+    point = drawn.points([TOOL], home[None])[0]
     moved = home.copy()
     if setup.planes:
         plane = next(iter(setup.planes.values()))
@@ -275,22 +274,17 @@ def _on_plane(robot: Manipulator, home: Array, setup: Setup) -> tuple[Array, Set
     return moved, replace(setup, planes={TOOL: plane})
 
 
-def _imagined(
-    robot: Manipulator, poses: Array, drawn: Guess, measure: Measure, setup: Setup
-) -> Measurements:
+def _imagined(drawn: Guess, poses: Array, measure: Measure, setup: Setup) -> Measurements:
     """Return the measurements that a faultless machine would give at poses."""
-    n = len(poses)
+    robot, n = drawn.robot, len(poses)
     readings = drawn.readings(MachineSlopes(robot, ()).joints(drawn, poses))
     given = Measurements.of(robot, readings, setup=setup)
     if measure == "positions":
         return replace(given, positions=np.zeros((n, 3)))
     if measure == "poses":
-        known = [axis in robot.coordinates for axis in "xyz"]
-        return replace(
-            given,
-            positions=np.where(known, 0.0, np.full((n, 3), np.nan)),
-            angles=poses[:, robot.platform.angular],
-        )
+        known = [0.0 if axis in robot.coordinates else np.nan for axis in "xyz"]
+        angles = poses[:, robot.platform.angular]
+        return replace(given, positions=np.tile(known, (n, 1)), angles=angles)
     if measure == "heights":
         return replace(given, heights=np.zeros(n), planes=(next(iter(setup.planes), TOOL),) * n)
     return replace(given, distances=np.ones(n), anchors=(next(iter(setup.anchors), TOOL),) * n)

@@ -100,8 +100,8 @@ class MachineSlopes:
     def pose_slopes(self, guess: Guess, given: Measurements, poses: Array) -> tuple[Array, Array]:
         """Return the slopes of poses at given joints (N, m, p), and of their marks (N, 3, p)."""
         _, moved, slopes = self._marks(guess, given, poses, np.arange(len(poses)))
-        lengths = np.eye(3) if len(self._lengths) == 3 else self._axes[self._lengths]
-        whole = np.concatenate([lengths @ slopes[:, :3], slopes[:, 6:]], axis=1)
+        lengths = self._axes[self._lengths] @ slopes[:, :3]
+        whole = np.concatenate([lengths, slopes[:, 6:]], axis=1)
         return whole[..., : self.count], moved[..., : self.count]
 
     def _wrapped(self, missed: Array) -> Array:
@@ -120,7 +120,8 @@ class MachineSlopes:
             residuals[:, 3:-2] = self._angles(guess, poses[chosen], given.angles[chosen])
         if measured[:, -2].any():
             planes = np.stack([guess.planes[given.planes[i]] for i in chosen])
-            residuals[:, -2] = _dot(planes[:, :3], point) - planes[:, 3] - given.heights[chosen]
+            over = np.einsum("ni,ni->n", planes[:, :3], point) - planes[:, 3]
+            residuals[:, -2] = over - given.heights[chosen]
         if measured[:, -1].any():
             residuals[:, -1] = np.linalg.norm(apart, axis=-1) - given.distances[chosen]
         residuals[~measured], slopes[~measured] = 0.0, 0.0
@@ -297,7 +298,3 @@ def _skew(v: Array) -> Array:
     zero = np.zeros(len(v), dtype=v.dtype)
     x, y, z = v.T
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("ni,ni->n", a, b))

@@ -9,7 +9,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Guess
-from pteron.calibration.measurements import Measurements, length_columns
+from pteron.calibration.measurements import Measurements, length_columns, position_axes
 from pteron.calibration.residuals import MachineSlopes
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
@@ -49,9 +49,7 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     )
     lengths = length_columns(robot)
     arms = guess.points(given.marks, begin) - robot.platform.at(begin)[0]
-    if len(lengths) not in (0, 3):
-        arms = arms @ np.array(robot.platform.frame).T
-    places = (given.positions - arms)[:, lengths]
+    places = (given.positions - arms @ position_axes(robot).T)[:, lengths]
     if given.setup.frame_known:
         at = np.flatnonzero(~robot.platform.angular)
         begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
@@ -85,7 +83,8 @@ def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
     points = guess.points(given.marks, poses)
     seen = ~np.isnan(given.positions).any(axis=-1)
     if not given.setup.frame_known and seen.sum() >= _FEW:
-        fixed = np.array([_is_known(given, name) for name in given.marks])[seen]
+        free = {name for name, mark in given.setup.marks.items() if not mark.known}
+        fixed = np.array([name not in free for name in given.marks])[seen]
         used = np.flatnonzero(seen)[fixed] if fixed.sum() >= _FEW else np.flatnonzero(seen)
         p, y = points[used], given.positions[used]
         turn, _ = scipy.spatial.transform.Rotation.align_vectors(
@@ -108,7 +107,3 @@ def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
             normal = normal / np.linalg.norm(normal)
         planes[name] = np.append(normal, np.median(points[here] @ normal - given.heights[here]))
     return replace(guess, planes=planes)
-
-
-def _is_known(given: Measurements, name: str) -> bool:
-    return name not in given.setup.marks or given.setup.marks[name].known

@@ -59,7 +59,8 @@ def blocks_of(
         If a name is none of the machine's.
     """
     given = dict(prior or {})
-    asked = list(free) if free is not None else _default(measured)
+    placed = {"position", "height"} & set(measured.kinds)
+    asked = [g for g in GROUPS if g != "tool" or placed] if free is None else list(free)
 
     def unknown(name: str, group: str, unit: str) -> Unknown:
         where = f"{group}, rad" if group == "zeros" and unit == "rad" else group
@@ -99,11 +100,6 @@ def blocks_of(
     if not found:
         raise DataError("free: nothing is free; name a group")
     return numbered(found)
-
-
-def _default(measured: Measurements) -> list[str]:
-    placed = {"position", "height"} & set(measured.kinds)
-    return [group for group in GROUPS if group != "tool" or placed]
 
 
 def _three(name: str, tolerance: float = _WIDE, group: str = "setup") -> tuple[Unknown, ...]:

@@ -51,11 +51,11 @@ def verdict_of(
     """Return the verdict."""
     found = Opinion()
     if held_out is None:
-        found.lower("usable with care")
-        found.reasons.append("No rows were left for a check: all were needed for the fit.")
-        found.steps.append(
+        found.add(
+            "No rows were left for a check: all were needed for the fit.",
             f"Measure at {checked} or more poses (fewer where the noise is given), or give a "
-            "second log (--held-out)."
+            "second log (--held-out).",
+            grade="usable with care",
         )
     else:
         for kind, after in held_out.after.items():
@@ -69,14 +69,13 @@ def verdict_of(
             # The error of few rows strays further by chance.
             chance = np.sqrt(scipy.stats.chi2.ppf(_SURE, held_out.rows) / held_out.rows)
             if ratio <= max(_AT_THE_NOISE, chance):
-                found.reasons.append(f"{text}: as noise and intervals expect.")
+                found.add(f"{text}: as noise and intervals expect.")
             else:
-                found.lower(
-                    "not trustworthy"
-                    if ratio > _FAR and after > 0.5 * before
-                    else "usable with care"
+                lost = ratio > _FAR and after > 0.5 * before
+                found.add(
+                    f"{text}: {ratio:.2g} times what noise and intervals expect.",
+                    grade="not trustworthy" if lost else "usable with care",
                 )
-                found.reasons.append(f"{text}: {ratio:.2g} times what noise and intervals expect.")
     unknowns = [u for block in blocks for u in block.unknowns]
     far = [
         u.name
@@ -84,23 +83,22 @@ def verdict_of(
         if u.group != "setup" and abs(t) > _OFF * u.tolerance
     ]
     if far:
-        found.lower("usable with care")
         several = f"{', '.join(far[:4])}{' ...' if len(far) > 4 else ''}"
-        found.reasons.append(f"More than {_OFF:g} tolerances from the drawing: {several}.")
-        found.steps.append(
-            "Check the robot's file at these values, or say by `prior` how far off they may be."
+        found.add(
+            f"More than {_OFF:g} tolerances from the drawing: {several}.",
+            "Check the robot's file at these values, or say by `prior` how far off they may be.",
+            grade="usable with care",
         )
-    if findings:
-        found.lower("usable with care")
-        found.reasons += [finding.text for finding in findings]
+    for finding in findings:
+        found.add(finding.text, grade="usable with care")
     out = int((~fit.kept).sum())
     if out > 0.1 * len(fit.kept):
-        found.lower("usable with care")
-        found.reasons.append(f"{out} of {len(fit.kept)} rows do not fit and were left out.")
+        text = f"{out} of {len(fit.kept)} rows do not fit and were left out."
+        found.add(text, grade="usable with care")
     open_values = shown.columns - shown.shown
     if open_values:
         more = f"; at more poses {shown.rank} would" if shown.rank > shown.shown else ""
-        found.reasons.append(
+        found.add(
             f"{shown.shown} of {shown.columns} combinations show in these measurements, the other "
             f"{open_values} are kept at the drawing{more}."
         )

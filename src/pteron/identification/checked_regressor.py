@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.identification.observation import Observations
 from pteron.kernels import Array
@@ -30,8 +31,8 @@ def checked_observations(
     start = f"{place}: " if place else ""
     f = finite(forces, f"{start}forces")
     w = finite(regressor, f"{start}regressor")
-    if f.ndim not in (1, 2) or not f.size:
-        raise DataError(f"{start}forces: shape {f.shape} given, (R, n) or (R,) expected")
+    shaped = f.ndim in (1, 2) and f.size
+    expect(shaped, f"{start}forces", f"shape {f.shape}", "(R, n) or (R,)")
     f = f.reshape(len(f), -1)
     rows, n = f.shape
     if w.ndim == 2 and len(w) == rows * n:
@@ -50,8 +51,7 @@ def checked_observations(
     if t.shape != (rows,) or (np.diff(t) <= 0.0).any():
         raise DataError(f"{start}time: {rows} rising numbers expected, one for each sample, in s")
     counts = np.ones(f.shape, dtype=bool) if used is None else np.asarray(used, dtype=bool)
-    if counts.size != f.size:
-        raise DataError(f"{start}used: shape {counts.shape} given, {f.shape} expected")
+    expect(counts.size == f.size, f"{start}used", f"shape {counts.shape}", f.shape)
     counts = counts.reshape(f.shape)
     return Observations(
         called,

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, qr_factor, weighted
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.estimators.total import smallest_corrections
@@ -156,16 +155,14 @@ def identify_drive_gains(
     unit = _unit(logs)
     known = payload or logs[-1].description.payload or log.description.payload
     if known is None:
-        raise LogError(
+        raise logs[-1].fault(
             "no payload",
-            logs[-1].source,
             "the payload is not known, and without it gains and inertia cannot be told apart; "
             "declare [payload] in the log's description",
         )
     if robot.platform.angles and not known.inertia:
-        raise LogError(
+        raise logs[-1].fault(
             "no payload",
-            logs[-1].source,
             f"only the payload's mass is known, but {robot.name} turns its platform; declare its "
             "center_of_mass (or first_moment) and inertia about P too",
         )
@@ -175,9 +172,9 @@ def identify_drive_gains(
     observations = observations_with_payload(model, log, with_payload, processing)
     carried = observations.matrix[..., -len(known.values) :] @ np.array(known.values)
     observations = observations.columns(range(len(plain.names)))
-    start, condition, gap = _total(observations, carried, log.source)
+    start, condition, gap = _total(observations, carried)
     units = [f"{leg.joint.force_unit}/{unit}" for leg in robot.legs]
-    estimate = _likely(observations, carried, start, units, log.source)
+    estimate = _likely(observations, carried, start, units)
     n = observations.actuators
     return DriveGains(
         gains=estimate.values[:n],
@@ -194,24 +191,22 @@ def identify_drive_gains(
 def _unit(logs: list[Log]) -> str:
     for log in logs:
         if log.description.force_unit == "N":
-            raise LogError(
+            raise log.fault(
                 "currents",
-                log.source,
                 "its forces are in newtons already, motor currents (A, V or %) are expected; "
                 "declare their unit, and no gains, under [forces] in its description",
             )
     units = {log.description.force_unit for log in logs}
     if len(units) > 1:
-        raise LogError(
+        raise logs[1].fault(
             "currents",
-            logs[1].source,
             f"its forces are in {logs[1].description.force_unit}, those of {logs[0].source} in "
             f"{logs[0].description.force_unit}; give both in one unit",
         )
     return units.pop()
 
 
-def _total(observations: Observations, carried: Array, source: str) -> tuple[Array, float, float]:
+def _total(observations: Observations, carried: Array) -> tuple[Array, float, float]:
     """Return g and beta by total least squares, with the condition number and the gap."""
     # The columns W are exact, as in the likelihood: noise is in the currents alone. Else the
     # weakest of dozens of inertial parameters would pass for the null vector.
@@ -227,7 +222,8 @@ def _total(observations: Observations, carried: Array, source: str) -> tuple[Arr
     factor = qr_factor(homogeneous)
     length = np.sqrt(factor.image @ factor.image + factor.rest)
     if length == 0.0:
-        raise LogError("no payload", source, "the actuators do not feel the payload; move it about")
+        said = "the actuators do not feel the payload; move it about"
+        raise observations.fault("no payload", said)
     # W has to be seen by itself, and its message names what is not.
     qr_factor(observations).check_seen()
     upper = np.zeros((p + n + 1, p + n + 1))
@@ -236,9 +232,8 @@ def _total(observations: Observations, carried: Array, source: str) -> tuple[Arr
     found = smallest_corrections(upper, p, np.r_[np.ones(n), length])
     sizes = found.sizes
     if sizes[-2] <= _UNSEEN * sizes[0] or found.share <= _UNSEEN:
-        raise LogError(
+        raise observations.fault(
             "too little motion",
-            source,
             "the payload does not tell the gains from the inertia; carry a heavier one, and move "
             "all coordinates in both phases",
         )
@@ -247,7 +242,7 @@ def _total(observations: Observations, carried: Array, source: str) -> tuple[Arr
 
 
 def _likely(
-    observations: Observations, carried: Array, start: Array, units: Sequence[str], source: str
+    observations: Observations, carried: Array, start: Array, units: Sequence[str]
 ) -> Estimate:
     """Return g and beta of greatest likelihood, the noise being in the currents alone."""
     n = observations.actuators
@@ -272,9 +267,8 @@ def _likely(
         if change <= max(_SETTLED * rest, _ROUNDING * np.linalg.norm(observations.forces)):
             break
         if iteration == _ITERATIONS:
-            raise LogError(
+            raise observations.fault(
                 "unsettled",
-                source,
                 "the gains do not settle; record longer, or carry a heavier payload",
             )
     estimate = weighted(linear)

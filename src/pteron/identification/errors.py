@@ -41,3 +41,13 @@ class LogError(DataError):
         super().__init__(message, subject=place)
         self.reason = reason
         self.place = place
+
+
+class OfLog:
+    """Base class of a log, or of what is made of one; `source` is its name in messages."""
+
+    source: str
+
+    def fault(self, reason: Reason, message: str) -> LogError:
+        """Return the error that it does not show what is asked of it."""
+        return LogError(reason, self.source, message)

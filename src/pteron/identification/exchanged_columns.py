@@ -123,9 +123,10 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
     usual = observations_of(model, log, plain)
     none = _fault(model, usual.actuators)
-    found = [(fault, usual, model) for fault in _of_forces(none, usual)]
+    tried = _with_signs(none, permutations(none.order))
+    found = [(fault, usual, model) for fault in _with_errors(usual, tried)]
     before = found[0][0].after
-    found += _others(model, log, plain, before)
+    found += _others(none, model, log, plain, before)
     faults = [replace(fault, before=before) for fault, _, _ in found]
     least = min(fault.after for fault in faults)
     limit = _ALIKE * max(least, _ROUNDING)
@@ -153,9 +154,9 @@ def exchanged_joints(
     none = _fault(model, log.joints.shape[1])
     best: ColumnFault | None = None
     for fault, observations in _moved_joints(none, model, log, preprocessing):
-        (error,) = _errors(observations, [fault])
-        if error * DECISIVE < (before if best is None else best.after * DECISIVE):
-            best = replace(fault, before=before, after=error)
+        (one,) = _with_errors(observations, [fault])
+        if one.after * DECISIVE < (before if best is None else best.after * DECISIVE):
+            best = replace(one, before=before)
     return best
 
 
@@ -166,38 +167,31 @@ def _fault(model: LinearModel, n: int) -> ColumnFault:
     return ColumnFault(*names, usual, upright, usual, upright, np.inf, np.inf)
 
 
-def _of_forces(none: ColumnFault, observations: Observations) -> list[ColumnFault]:
-    """Return all orders and signs of the forces with their errors, the usual one first."""
-    signs = list(product((1, -1), repeat=len(none.order)))
-    orders = permutations(none.order)
-    return _with_errors(
-        observations, [replace(none, order=o, signs=s) for o in orders for s in signs]
-    )
+def _with_signs(fault: ColumnFault, orders: Iterable[tuple[int, ...]]) -> list[ColumnFault]:
+    """Return a fault with orders of the forces, each with all signs; the usual ones first."""
+    signs = list(product((1, -1), repeat=len(fault.order)))
+    return [replace(fault, order=o, signs=s) for o in orders for s in signs]
 
 
 def _others(
-    model: Model, log: Log, how: Preprocessing, before: float
+    none: ColumnFault, model: Model, log: Log, how: Preprocessing, before: float
 ) -> Iterator[tuple[ColumnFault, Observations, Model]]:
     """Yield faults of joints, of legs and of gravity that explain the forces far better."""
-    none = _fault(model, log.joints.shape[1])
-    signs = list(product((1, -1), repeat=len(none.order)))
 
-    def clear(faults: Iterable[ColumnFault]) -> Iterator[ColumnFault]:
-        return (fault for fault in faults if fault.after * DECISIVE < before)
+    def tried() -> Iterator[tuple[list[ColumnFault], Observations, Model]]:
+        for fault, observations in _moved_joints(none, model, log, how):
+            yield _with_signs(fault, {none.order, fault.joint_order}), observations, model
+        if any(model.robot.gravity):
+            x, y, z = model.robot.gravity
+            turned = replace(model.robot, gravity=(-x, -y, -z))
+            other = replace(model, base=replace(model.base, robot=turned))
+            faults = _with_signs(replace(none, gravity=True), [none.order])
+            yield faults, observations_of(other, log, how), other
 
-    for fault, observations in _moved_joints(none, model, log, how):
-        orders = {none.order, fault.joint_order}
-        tried = [replace(fault, order=o, signs=s) for o in orders for s in signs]
-        for one in clear(_with_errors(observations, tried)):
-            yield one, observations, model
-    if any(model.robot.gravity):
-        x, y, z = model.robot.gravity
-        turned = replace(model.robot, gravity=(-x, -y, -z))
-        other = replace(model, base=replace(model.base, robot=turned))
-        observations = observations_of(other, log, how)
-        tried = [replace(none, gravity=True, signs=s) for s in signs]
-        for one in clear(_with_errors(observations, tried)):
-            yield one, observations, other
+    for faults, observations, other in tried():
+        for one in _with_errors(observations, faults):
+            if one.after * DECISIVE < before:
+                yield one, observations, other
 
 
 def _moved_joints(
@@ -220,12 +214,7 @@ def _moved_joints(
 
 
 def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[ColumnFault]:
-    errors = _errors(observations, faults)
-    return [replace(fault, after=error) for fault, error in zip(faults, errors, strict=True)]
-
-
-def _errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[float]:
-    """Return the error of the fit relative to the forces, for each order and signs of these."""
+    """Return faults with the error of the fit, relative to the forces, for the orders and signs."""
     step = max(len(observations.forces) // _ROWS, 1)
     matrix, forces = observations.matrix[::step], observations.forces[::step]
     rows, n, p = matrix.shape
@@ -235,9 +224,9 @@ def _errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[f
     power = float((forces**2).sum())
     found = []
     for fault in faults:
-        chosen = parts[np.arange(n), list(fault.order)]
-        image = np.array(fault.signs) @ chosen
-        found.append(float(np.sqrt(max(power - float(image @ image), 0.0) / power)))
+        image = np.array(fault.signs) @ parts[np.arange(n), list(fault.order)]
+        error = float(np.sqrt(max(power - float(image @ image), 0.0) / power))
+        found.append(replace(fault, after=error))
     return found
 
 

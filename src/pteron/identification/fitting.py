@@ -70,9 +70,8 @@ def check_recordings(
         unit = one.head().description.force_unit
         if unit != "N":
             other = f", {per_cent_advice(robot)}" if unit == "%" else ""
-            raise LogError(
+            raise one.log.fault(
                 "currents",
-                one.source,
                 f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
                 f"description, or find them with identify_drive_gains{other}",
             )
@@ -85,13 +84,12 @@ def check_recordings(
     pairs += [(*pair, held) for pair in product(whole, others)]
     for one, again, said in pairs:
         if same(one, again):
-            raise LogError("twice", again.source, said)
+            raise again.log.fault("twice", said)
     for log in (one.log for one in whole):
         period = wanted.period
         if isinstance(log, Log) and period and log.duration < period * (1.0 - 1e-3):
-            raise LogError(
+            raise log.fault(
                 "too short",
-                log.source,
                 f"period: {period:g} s given, but it lasts {log.duration:g} s; give the time "
                 "after which the motion repeats, or none",
             )
@@ -108,7 +106,7 @@ def check_payload(fit: Sequence[Recording]) -> None:
     elif all(head.payload is None for head in heads):
         said = f"{NO_COLUMN}, or identify without the payload"
     if said:
-        raise LogError("no payload", fit[0].source, said)
+        raise fit[0].log.fault("no payload", said)
 
 
 def preprocessing_for(
@@ -226,9 +224,8 @@ def check_motion(
     rank = model.base.rank
     names = ", ".join(hidden) if len(hidden) < rank else "all"
     cause = left_over(estimate, preprocessing)
-    raise LogError(
+    raise first.log.fault(
         "too little motion",
-        first.source,
         f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
         f"({names}), their standard deviations are larger than their usual size; "
         f"{'mend that, or ' if cause else ''}move faster and along all coordinates, as the motion "
@@ -255,9 +252,8 @@ def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) ->
         why = ": as they are, the machine would have negative inertia or friction"
     if fault.equivalents:
         why += f" (as well explained: {'; or '.join(fault.equivalents)})"
-    raise LogError(
+    raise one.log.fault(
         "columns",
-        one.source,
         f"{fault.message()}{why}; "
         + (
             "correct gravity in the machine's file"

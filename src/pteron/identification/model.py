@@ -80,7 +80,9 @@ class Terms:
 class Term(NamedTuple):
     """One value beside the base parameters: its kind, name and unit."""
 
-    kind: Literal["coulomb", "viscous", "offset", "passive", "rotor", "payload", "stribeck"]
+    kind: Literal[
+        "coulomb", "viscous", "offset", "passive", "rotor", "payload", "stribeck", "further"
+    ]
     name: str
     letter: str
     subscript: str
@@ -350,37 +352,28 @@ def diagonal(values: Array) -> Array:
     return np.asarray(values[..., None] * np.eye(values.shape[-1]))
 
 
-@dataclass(frozen=True)
-class ExtendedModel:
-    """A model with so many columns more; `matrix` returns all of them (R, n, p + count)."""
+@dataclass(frozen=True, kw_only=True)
+class ExtendedModel(Model):
+    """A model with so many columns more, which have no units and numbers for names.
 
-    model: Model
+    `whole` returns all columns (R, n, p + count) at states.
+    """
+
     count: int
-    matrix: Callable[[States], Array]
+    whole: Callable[[States], Array]
 
-    @property
-    def robot(self) -> Manipulator:
-        """The machine."""
-        return self.model.robot
+    @cached_property
+    def kept_terms(self) -> tuple[Term, ...]:
+        """The terms of the model, and the further ones."""
+        further = (Term("further", str(k), "", "", "") for k in range(self.count))
+        return (*super().kept_terms, *further)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the values; those of further columns are numbers."""
-        return (*self.model.names, *map(str, range(self.count)))
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Units of the values; further columns have none."""
-        return (*self.model.units, *("",) * self.count)
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """Kinds of the values, as `Model.kinds`."""
-        return (*self.model.kinds, *("further",) * self.count)
+    def matrix(self, states: States) -> Array:
+        """Return all columns (R, n, p + count)."""
+        return self.whole(states)
 
 
-def extended(model: Model, count: int, columns: Callable[[States], Array]) -> ExtendedModel:
-    """Return a model with further columns (R, n, count) at states."""
-    return ExtendedModel(
-        model, count, lambda states: np.concatenate([model.matrix(states), columns(states)], -1)
-    )
+def extended(model: Model, count: int, whole: Callable[[States], Array]) -> Model:
+    """Return a model with `count` further columns, for `whole` columns (R, n, p + count)."""
+    about = model.base, model.terms, model.joins, model.speeds
+    return ExtendedModel(*about, count=count, whole=whole)

@@ -13,7 +13,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.identification.errors import LogError
+from pteron.identification.errors import OfLog
 from pteron.identification.logs import Log
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
@@ -56,7 +56,7 @@ _ROWS = ("matrix", "forces", "time", "gain", "payload")
 
 
 @dataclass(frozen=True)
-class Observations:
+class Observations(OfLog):
     """Rows of F = W beta, after the parallel filter.
 
     Rows are divided by the filter's gain for white noise: what a fit leaves of the forces has the
@@ -243,9 +243,8 @@ def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
     parts = [log.part(start, stop) for start, stop in log.phases]
     whole = [part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)]
     if not whole:
-        raise LogError(
+        raise log.fault(
             "too short",
-            log.source,
             f"no stretch with one payload lasts its period of {fit.period:g} s; record longer, or "
             'choose derivatives "central"',
         )

@@ -348,9 +348,8 @@ def _observed(
     seen = (observations.gain > 0.0).any(axis=1)
     for phase, called in ((0, "without payload"), (1, "with payload")):
         if not (seen & ((observations.payload != 0) == phase)).any():
-            raise LogError(
+            raise logs[phase * (len(logs) - 1)].fault(
                 "too short",
-                logs[phase * (len(logs) - 1)].source,
                 f"no samples {called} are left between the filters' edges; record that phase "
                 "longer",
             )
@@ -366,7 +365,7 @@ def _check_phases(log: Log) -> None:
     if phases:
         which = "one without payload" if phases[0] else "one where a payload is carried"
         said = f"its payload column has phase {phases[0]} only, 0 and 1 are expected; add {which}"
-    raise LogError("no payload", log.source, f"{said}, or give two logs")
+    raise log.fault("no payload", f"{said}, or give two logs")
 
 
 def _in_phase(log: Log, phase: int) -> Log:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
 from pteron.identification.consistency import Consistency
 from pteron.identification.consistency.bodies import bodies_of
@@ -134,10 +135,8 @@ def plausibility_warnings(
 def friction_below_zero(model: Model, observations: Observations, fit: Estimate) -> tuple[str, ...]:
     """Return a sentence on friction that is below zero by more than its interval; none else."""
     high = fit.intervals()[1]
-    effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
-    size = np.sqrt((observations.forces**2).mean(axis=0))
-    felt = (effect > _FELT * size[:, None]).any(axis=0)
-    chosen = np.flatnonzero(np.isin(model.kinds, _FRICTION) & (high < 0.0) & felt)
+    felt = (high < 0.0) & _felt(observations, fit, _FELT)
+    chosen = np.flatnonzero(np.isin(model.kinds, _FRICTION) & felt)
     if not len(chosen):
         return ()
     told = ", ".join(
@@ -242,11 +241,16 @@ def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
     Directions of motion in which kinetic energy is negative, and joints that friction pushes, with
     more than 5 % of the forces.
     """
+    pushed = np.isin(model.kinds, _POSITIVE) & (fit.values < -_CERTAIN * fit.deviations)
+    pushed &= _felt(observations, fit, _PUSHED)
+    return _negative_directions(model, fit.values, fit.covariance) + int(pushed.sum())
+
+
+def _felt(observations: Observations, fit: Estimate, share: float) -> NDArray[np.bool_]:
+    """Return which values (p,) make more than a share of the forces at an actuator."""
     effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
     size = np.sqrt((observations.forces**2).mean(axis=0))
-    pushed = np.isin(model.kinds, _POSITIVE) & (fit.values < -_CERTAIN * fit.deviations)
-    pushed &= (effect > _PUSHED * size[:, None]).any(axis=0)
-    return _negative_directions(model, fit.values, fit.covariance) + int(pushed.sum())
+    return np.asarray((effect > share * size[:, None]).any(axis=0))
 
 
 def _negative_directions(model: Model, values: Array, covariance: Array) -> int:

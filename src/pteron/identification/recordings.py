@@ -172,11 +172,9 @@ def _since(time: Array) -> Array:
         return since
     ticks = np.r_[0.0, np.cumsum(np.round(steps / np.median(steps)))]
     step = float(since[-1] / ticks[-1])
-    for digits in range(1, 17):
-        rounded = float(f"{step:.{digits}g}")
-        if abs(rounded - step) * ticks[-1] <= rounding:
-            step = rounded
-            break
+    rounded = (float(f"{step:.{digits}g}") for digits in range(1, 17))
+    roundest = (one for one in rounded if abs(one - step) * ticks[-1] <= rounding)
+    step = next(roundest, step)
     steady: Array = ticks * step
     return steady if np.abs(since - steady).max() <= _ROUNDINGS * rounding else since
 

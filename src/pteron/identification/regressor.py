@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.errors import DataError, ModelError
 from pteron.identification.checked_regressor import checked_observations, finite
 from pteron.identification.errors import LogError
@@ -152,10 +153,8 @@ def estimate(
             used=counting[0] if counting else None,
             place="held_out",
         )
-        if check.actuators != whole.actuators:
-            raise DataError(
-                f"held_out: forces of {check.actuators} actuators given, {whole.actuators} expected"
-            )
+        told = f"forces of {check.actuators} actuators"
+        expect(check.actuators == whole.actuators, "held_out", told, whole.actuators)
     found = reduced(fit) if reduce else None
     if found is not None:
         fit, check = fit.columns(found.kept), check.columns(found.kept)
@@ -163,11 +162,9 @@ def estimate(
     def alike(numbers: ArrayLike) -> Observations:
         """Return instruments as observations of the samples that are fitted."""
         given = finite(numbers, "instruments")
-        if given.size != whole.matrix.size:
-            raise DataError(
-                f"instruments: shape {given.shape} given, that of the regressor, "
-                f"{whole.matrix.shape}, expected"
-            )
+        wanted = f"that of the regressor, {whole.matrix.shape},"
+        fits = given.size == whole.matrix.size
+        expect(fits, "instruments", f"shape {given.shape}", wanted)
         part = replace(whole, matrix=given.reshape(whole.matrix.shape)).part(slice(len(fit.time)))
         return part if found is None else part.columns(found.kept)
 

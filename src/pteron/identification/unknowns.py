@@ -169,7 +169,7 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
     def columns(states: States) -> Array:
         rates = states.joint_rates[..., None]
         falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
-        return np.asarray(np.sign(rates) * falls)
+        return np.concatenate([model.matrix(states), np.sign(rates) * falls], axis=-1)
 
     rows = observe(extended(model, _COLUMNS, columns))
     plain = rows.columns(range(p))
@@ -234,11 +234,11 @@ def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int6
 def _slopes(
     model: Model, seen: NDArray[np.int64], values: Array, late: bool, states: States
 ) -> Array:
-    """Return columns (R, n, k): how friction changes with the logarithms of speeds, by its size.
+    """Return a model's columns, and how friction changes with speeds' logarithms, by its size.
 
     And, where forces are late, how those of a fit change with the delay, but for dry friction.
     """
-    rates = states.joint_rates
+    rates, matrix = states.joint_rates, model.matrix(states)
     found = np.zeros((*rates.shape, len(seen) + late))
     if len(seen):
         square = (rates[:, seen] / np.asarray(model.stribeck_speeds)[seen]) ** 2
@@ -246,6 +246,6 @@ def _slopes(
         found[:, seen, np.arange(len(seen))] = slope
     if late:
         dry = np.isin(model.kinds, ("coulomb", "stribeck"))
-        smooth = model.matrix(states) @ np.where(dry, 0.0, values)
+        smooth = matrix @ np.where(dry, 0.0, values)
         found[..., -1] = -np.gradient(smooth, states.time, axis=0, edge_order=2)
-    return found
+    return np.concatenate([matrix, found], axis=-1)

@@ -68,6 +68,14 @@ _HIDDEN: dict[str, tuple[str, str]] = {
 }
 """Faults that a log may hide: the reason, and a remedy."""
 
+_STEPS = (
+    "Look at the residuals over time and speed: what repeats there is a missing term, such as "
+    "friction in the passive joints (--joints each).",
+    "Friction of joints explains little of the error: look at the drive gains, the geometry and "
+    "the signs of forces and joints.",
+)
+"""Remedies for an error beyond the noise, where friction explains some of it and where little."""
+
 _MANY = 100.0
 """Multiple from which no digits are told."""
 
@@ -101,13 +109,11 @@ def verdict_of(
         found.reasons += one.reasons
         found.steps += one.steps
     if repeats:
-        found.reasons.append(
+        found.add(
             "What was held out repeats the motion that was fitted: it tells of noise and drift, "
-            "less of other motions."
-        )
-        found.steps.append(
+            "less of other motions.",
             "Record another motion, such as a pick-and-place cycle, and hold it out (--held-out): "
-            "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv."
+            "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv.",
         )
     return found.verdict()
 
@@ -163,48 +169,38 @@ def _of_prediction(prediction: Prediction) -> Opinion:
     found = Opinion()
     drowned = int(np.argmax(prediction.robust_nrms))
     if not (prediction.robust_nrms <= DROWNED).all():
-        found.grade = "not trustworthy"
-        found.reasons.append(
+        found.add(
             f"The forces of actuator {drowned + 1} are not explained: what is left of them is "
-            f"{prediction.robust_nrms[drowned]:.0f} % of what was measured."
-        )
-        found.steps.append(
-            "Look for what else acts on the forces, or move faster than their noise."
+            f"{prediction.robust_nrms[drowned]:.0f} % of what was measured.",
+            "Look for what else acts on the forces, or move faster than their noise.",
+            grade="not trustworthy",
         )
     elif ratio[worst] > AT_THE_FLOOR:
         found.grade = _graded(float(missed[worst]), SMALL)
-    found.reasons.append(
+    found.add(
         f"{prediction.source}: held-out NRMS of {percentages(prediction.nrms)} where noise alone "
         f"makes {percentages(prediction.floor)}."
     )
     if (share := float(prediction.outliers.max())) > 0.0:
-        found.reasons.append(
+        found.add(
             f"{prediction.source}: up to {100.0 * share:.2g} % of a force's samples stand out; "
-            f"without them the NRMS is {percentages(prediction.robust_nrms)}, which is what counts."
+            f"without them the NRMS is {percentages(prediction.robust_nrms)}, which is what "
+            "counts.",
+            "Forces stand out: --estimator huber counts such samples less.",
         )
-        found.steps.append("Forces stand out: --estimator huber counts such samples less.")
     if found.grade == "trustworthy" and ratio[worst] > AT_THE_FLOOR:
-        found.reasons.append(
+        found.add(
             f"The error of actuator {worst + 1} is {times(ratio[worst])} the noise: the model "
             f"misses {percentages([missed[worst]], 1)} of its force beyond it; up to {SMALL:g} % "
             "is trusted."
         )
     elif found.grade != "trustworthy":
-        found.reasons.append(
-            f"Actuator {worst + 1} is the worst: the model misses {missed[worst]:.1f} % of its "
-            f"force beyond the noise; up to {SMALL:g} % is trusted, above {LARGE:g} % not."
-        )
         friction = prediction.nrms_without_friction[worst] - prediction.nrms[worst]
-        if friction < 0.1 * prediction.nrms_without_friction[worst]:
-            found.steps.append(
-                "Friction of joints explains little of the error: look at the drive gains, "
-                "the geometry and the signs of forces and joints."
-            )
-        else:
-            found.steps.append(
-                "Look at the residuals over time and speed: what repeats there is a missing "
-                "term, such as friction in the passive joints (--joints each)."
-            )
+        found.add(
+            f"Actuator {worst + 1} is the worst: the model misses {missed[worst]:.1f} % of its "
+            f"force beyond the noise; up to {SMALL:g} % is trusted, above {LARGE:g} % not.",
+            _STEPS[bool(friction < 0.1 * prediction.nrms_without_friction[worst])],
+        )
     return found
 
 
@@ -213,26 +209,23 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
     if shown.matters:
         found.grade = "usable with care"
     if shown.understates:
-        found.reasons.append("The stated errors of the values do not allow for that.")
+        found.add("The stated errors of the values do not allow for that.")
     if not shown.tried:
-        found.grade = "usable with care"
-        found.reasons.append(f"Fault isolation was not run: {shown.why_not}.")
+        found.add(f"Fault isolation was not run: {shown.why_not}.", grade="usable with care")
     elif not shown.faults:
-        found.reasons.append(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
+        found.add(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
     for fault in shown.hidden:
-        reason, step = _HIDDEN[fault]
-        found.reasons.append(reason)
-        found.steps.append(step)
+        found.add(*_HIDDEN[fault])
     if np.isnan(shown.off).any():
         return found
     worst = int(np.argmax(shown.off))
     off = float(shown.off[worst])
-    found.lower(_graded(off, CYCLE))
-    found.reasons.append(
+    found.add(
         f"A pick-and-place cycle as fast as this motion is expected to be up to "
         f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
-        "not."
+        "not.",
+        grade=_graded(off, CYCLE),
     )
     if found.grade != "trustworthy" and shown.uncertain[worst] > shown.spoiled[worst]:
         found.steps.append(

@@ -10,7 +10,7 @@ import numpy as np
 
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import JOINED, OWN
-from pteron.equations.machine import Machine, State
+from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import inverse_dynamics
 from pteron.kernels import Array, Port, bare, count_operations, program
 from pteron.kernels.graph import graph_of
@@ -130,14 +130,12 @@ class _Model:
             base = ca.SX.sym("base", len(kept))
             given = ca.SX(len(self.machine.parameters), 1)
             given[list(kept)] = base
+            known = self.machine, self.state, given
             self.known[kept] = min(
-                self._operations(base, inverse_dynamics(*self._of(given), carried=carried))
+                self._operations(base, inverse_dynamics(*known, carried=carried))
                 for carried in (True, False)
             )
         return self.known[kept]
-
-    def _of(self, given: Expression) -> tuple[Machine, State, Expression]:
-        return self.machine, self.state, given
 
     def _operations(self, base: Expression, forces: Expression) -> int:
         """Count what depends on the state; what depends on base parameters alone is done once."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,38 +26,51 @@ _ACCELERATION = 9.81
 """m/s^2: that of the random motions, so that inertia weighs about as much as gravity."""
 
 
+_Gap = tuple[float, float]
+"""The smallest value kept, and the largest one dropped."""
+
+
+class _Scaled(NamedTuple):
+    """Regressors at random states, stacked (R, columns), with columns of length 1."""
+
+    matrix: Array
+    lengths: Array
+    """Of the columns as they were; infinite for one that does nothing."""
+    states: int
+
+
 def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
     """Return the grouping from the singular value decomposition (Gautier's, the paper's method).
 
     The null vectors are the right singular vectors of vanishing values. Columns are dropped, those
     least preferred first, as long as the null vectors' entries at them stay independent.
     """
-    matrix, scale, states = _scaled_regressor(robot, sharing, seed)
-    _, values, vectors = np.linalg.svd(matrix, full_matrices=True)
-    values = np.pad(values, (0, matrix.shape[1] - len(values)))
+    scaled = _scaled_regressor(robot, sharing, seed)
+    _, values, vectors = np.linalg.svd(scaled.matrix, full_matrices=True)
+    values = np.pad(values, (0, scaled.matrix.shape[1] - len(values)))
     rank = int((values > _TOLERANCE * values[0]).sum())
     null = vectors[rank:].T
     dropped = independent(null.T, list(reversed(order)), len(order) - rank)[0]
     kept = sorted(set(order) - set(dropped))
     shares = -np.linalg.solve(null[dropped].T, null[kept].T).T if dropped else np.empty((rank, 0))
     gap = values[rank - 1] / values[0], np.max(values[rank:], initial=0.0) / values[0]
-    return _grouping("svd", kept, dropped, shares, matrix, scale, states, gap)
+    return _grouping("svd", kept, dropped, shares, scaled, gap)
 
 
 def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
     """Return the grouping from a QR decomposition with the columns in the order of preference."""
-    matrix, scale, states = _scaled_regressor(robot, sharing, seed)
-    kept, norms = independent(matrix, order)
+    scaled = _scaled_regressor(robot, sharing, seed)
+    kept, norms = independent(scaled.matrix, order)
     kept = sorted(kept)
     dropped = [column for column in order if column not in kept]
-    shares = _least_squares(matrix, kept, dropped)
+    shares = _least_squares(scaled, kept, dropped)
     gap = min(norms[k] for k in kept), max((norms[k] for k in dropped), default=0.0)
-    return _grouping("qr", kept, dropped, shares, matrix, scale, states, gap)
+    return _grouping("qr", kept, dropped, shares, scaled, gap)
 
 
 def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRank:
     """Return the rank that the singular values of the scaled regressor show."""
-    values = np.linalg.svd(_scaled_regressor(robot, sharing, seed)[0], compute_uv=False)
+    values = np.linalg.svd(_scaled_regressor(robot, sharing, seed).matrix, compute_uv=False)
     relative = values / values[0]
     kept = relative > _TOLERANCE
     return NumericalRank(
@@ -65,21 +79,19 @@ def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRa
 
 
 def fitted_shares(
-    robot: Manipulator, sharing: Array, kept: Sequence[int], dropped: Sequence[int], seed: int
+    robot: Manipulator, sharing: Array, kept: list[int], dropped: list[int], seed: int
 ) -> Shares:
     """Return the shares of columns known to depend on the kept ones, by least squares."""
-    matrix, scale, _ = _scaled_regressor(robot, sharing, seed)
-    shares = _least_squares(matrix, list(kept), list(dropped))
-    return _given(list(kept), list(dropped), shares, scale)
+    scaled = _scaled_regressor(robot, sharing, seed)
+    return _given(kept, dropped, _least_squares(scaled, kept, dropped), scaled)
 
 
-def _least_squares(matrix: Array, kept: list[int], dropped: list[int]) -> Array:
-    shares = np.linalg.lstsq(matrix[:, kept], matrix[:, dropped], rcond=None)[0]
+def _least_squares(scaled: _Scaled, kept: list[int], dropped: list[int]) -> Array:
+    shares = np.linalg.lstsq(scaled.matrix[:, kept], scaled.matrix[:, dropped], rcond=None)[0]
     return np.asarray(shares, dtype=float)
 
 
-def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Array, Array, int]:
-    """Return regressors at random states, stacked, columns scaled to length 1; the lengths."""
+def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> _Scaled:
     rng = np.random.default_rng(seed)
     states = _STATES_PER_COLUMN * sharing.shape[1]
     # Six forces on one body are hardly ever as far from singular as three or four may be.
@@ -99,7 +111,7 @@ def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Ar
     powers = np.array([p.length_power for p in parameter_data(robot)])
     extent = scale * size ** (powers @ sharing / sharing.sum(axis=0))
     scale = np.where(extent > _TOLERANCE * extent.max(), scale, np.inf)
-    return stacked / scale, scale, states
+    return _Scaled(stacked / scale, scale, states)
 
 
 def independent(
@@ -125,32 +137,26 @@ def independent(
 
 
 def _grouping(
-    method: str,
-    kept: list[int],
-    dropped: list[int],
-    shares: Array,
-    matrix: Array,
-    scale: Array,
-    states: int,
-    gap: tuple[float, float],
+    method: str, kept: list[int], dropped: list[int], shares: Array, scaled: _Scaled, gap: _Gap
 ) -> Grouping:
-    """Assemble the grouping; `gap` is the smallest value kept and the largest one dropped."""
-    misfit = matrix[:, dropped] - matrix[:, kept] @ shares
+    """Assemble the grouping."""
+    misfit = scaled.matrix[:, dropped] - scaled.matrix[:, kept] @ shares
     certificate = NumericalCertificate(
         method=method,
         rank=len(kept),
-        columns=matrix.shape[1],
-        states=states,
+        columns=scaled.matrix.shape[1],
+        states=scaled.states,
         tolerance=_TOLERANCE,
         smallest_kept=float(gap[0]),
         largest_dropped=float(gap[1]),
         residual=float(np.abs(misfit).max(initial=0.0)),
     )
-    return Grouping(tuple(kept), _given(kept, dropped, shares, scale), certificate)
+    return Grouping(tuple(kept), _given(kept, dropped, shares, scaled), certificate)
 
 
-def _given(kept: list[int], dropped: list[int], shares: Array, scale: Array) -> Shares:
+def _given(kept: list[int], dropped: list[int], shares: Array, scaled: _Scaled) -> Shares:
     """Undo the scaling of the columns; shares that are rounding only are left out."""
+    scale = scaled.lengths
     return {
         column: {
             k: float(shares[i, j] * scale[column] / scale[k])

@@ -145,9 +145,9 @@ class BaseParameters:
         """The shares in symbols of the geometry, each leg with its own."""
         if not self.shared_symbols:
             return self._symbolic
-        from pteron.reduction.symbols import values_by_leg  # SymPy
+        from pteron.reduction.symbols import named_values  # SymPy
 
-        return self._in_symbols(values_by_leg(exact_geometry(self.robot)))
+        return self._in_symbols(named_values(exact_geometry(self.robot), shared=False))
 
     def _in_symbols(self, named: dict[str, Any]) -> Shares:
         if not isinstance(self.certificate, ExactCertificate):

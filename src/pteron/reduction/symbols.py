@@ -15,28 +15,22 @@ from pteron.reduction.surds import Surd
 from pteron.reduction.transfers import Transfer
 
 
-def named_values(geometry: ExactGeometry) -> dict[str, Any]:
+def named_values(geometry: ExactGeometry, *, shared: bool = True) -> dict[str, Any]:
     """Return the value of each geometric symbol: a SymPy symbol, minus one, or zero.
 
     Values that agree but for their sign share the symbol of the first leg that has them, so that
-    relations which hold because of it are seen.
+    relations which hold because of it are seen; where they are not `shared`, each has its own.
     """
     named: dict[str, Any] = {}
-    first: dict[Fraction, tuple[str, Surd]] = {}
+    first: dict[Fraction | str, tuple[str, Surd]] = {}
     for name, value in geometry.symbols().items():
         if value.q == 0:
             named[name] = Integer(0)
             continue
-        bearer, held = first.setdefault(value.square, (name, value))
+        bearer, held = first.setdefault(value.square if shared else name, (name, value))
         sign = 1 if (held.q > 0) == (value.q > 0) else -1
         named[name] = sign * Symbol(bearer)
     return named
-
-
-def values_by_leg(geometry: ExactGeometry) -> dict[str, Any]:
-    """Return a symbol of its own for each geometric symbol, or zero: equal values share none."""
-    values = geometry.symbols().items()
-    return {name: Integer(0) if value.q == 0 else Symbol(name) for name, value in values}
 
 
 def algebraic_values(geometry: ExactGeometry) -> dict[str, Any]:

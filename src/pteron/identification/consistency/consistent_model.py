@@ -9,6 +9,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect
 from pteron.errors import DataError, ModelError
 from pteron.identification.consistency.bodies import (
     Bodies,
@@ -122,8 +123,7 @@ def consistent_model(
             f"base: made for {base.robot.name}, which has other parameters than {robot.name}"
         )
     vector = np.asarray(values, dtype=float)
-    if vector.shape != (base.rank,):
-        raise DataError(f"values: shape {vector.shape} given, ({base.rank},) expected")
+    expect(vector.shape == (base.rank,), "values", f"shape {vector.shape}", f"({base.rank},)")
     if not np.isfinite(vector).all():
         raise DataError("values: not all are finite numbers; identify the parameters again")
     root = None if covariance is None else _square_root(covariance, base.rank)
@@ -222,8 +222,8 @@ def consistent_model(
 def _square_root(covariance: ArrayLike, rank: int) -> Array:
     """Return the lower triangular square root of a covariance (rank, rank), after checking it."""
     matrix = np.asarray(covariance, dtype=float)
-    if matrix.shape != (rank, rank):
-        raise DataError(f"covariance: shape {matrix.shape} given, ({rank}, {rank}) expected")
+    wanted = rank, rank
+    expect(matrix.shape == wanted, "covariance", f"shape {matrix.shape}", wanted)
     deviations = np.sqrt(np.abs(np.diag(matrix)))
     if not np.isfinite(matrix).all() or (np.diag(matrix) <= 0.0).any():
         raise DataError("covariance: every variance must be a positive, finite number")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from statistics import NormalDist
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
@@ -171,12 +171,20 @@ def residuals_of(observations: Observations, values: Array) -> Array:
     return np.asarray(observations.forces - observations.matrix @ values)
 
 
-class Search(NamedTuple):
+@dataclass
+class Search:
     """An estimator's search: its method, how many iterations it took, and whether it settled."""
 
     method: str
     iterations: int = 1
     converged: bool = True
+
+    def steps(self, most: int) -> Iterator[None]:
+        """Count iterations, `most` of them or until one says that the search has converged."""
+        for self.iterations in range(1, most + 1):
+            yield
+            if self.converged:
+                return
 
 
 def estimate_of(

@@ -72,9 +72,9 @@ def instrumental(
     factor = qr_factor(observations).check_seen()
     values = factor.values()
     noise = actuator_noise(observations, values)
-    converged = False
-    for iteration in range(1, iterations + 1):
-        if callable(instruments) or iteration == 1:
+    search = Search("instrumental")
+    for _ in search.steps(iterations):
+        if callable(instruments) or search.iterations == 1:
             found = instruments(values) if callable(instruments) else instruments
             both, z, apart = _together(observations, found, mutual=mutual)
             qr_factor(replace(both, matrix=z)).check_seen()
@@ -84,11 +84,10 @@ def instrumental(
         before, noise = noise, actuator_noise(both, values)
         size = np.sqrt(np.maximum(np.diag(factor.inverse()), np.finfo(float).tiny))
         settled = np.abs(noise / before - 1.0).max() < _SETTLED
-        converged = bool(settled and (np.abs(values - earlier) <= _SETTLED * size).all())
-        if converged:
-            break
-    how, weights = Search("instrumental", iteration, converged), 1.0 / before
-    return estimate_of(how, both, factor, values, weights=weights, inverse=inverse, instruments=z)
+        still = (np.abs(values - earlier) <= _SETTLED * size).all()
+        search.converged = bool(settled and still)
+    solved, weights = (search, both, factor, values), 1.0 / before
+    return estimate_of(*solved, weights=weights, inverse=inverse, instruments=z)
 
 
 def halves(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pteron.errors import DataError
+from pteron.arguments import expect
 from pteron.identification.estimators.estimate import Estimate, Search, estimate_of, residuals_of
 from pteron.identification.estimators.qr import actuator_factors, qr_factor
 from pteron.identification.observation import Observations
@@ -35,9 +35,8 @@ def ordinary(observations: Observations) -> Estimate:
         If the observations do not determine the values.
     """
     factor = qr_factor(observations).check_seen()
-    weights = np.ones(observations.actuators)
-    how = Search("ordinary")
-    return estimate_of(how, observations, factor, factor.values(), weights=weights)
+    weights, search = np.ones(observations.actuators), Search("ordinary")
+    return estimate_of(search, observations, factor, factor.values(), weights=weights)
 
 
 def weighted(
@@ -65,16 +64,13 @@ def weighted(
     triangles = triangles or actuator_factors(observations)
     factor = qr_factor(triangles).check_seen()
     noise = actuator_noise(observations, factor.values())
-    converged = False
-    for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
+    search = Search("weighted")
+    for _ in search.steps(iterations):
         factor = qr_factor(triangles, 1.0 / noise)
         values = factor.values()
         before, noise = noise, actuator_noise(observations, values)
-        converged = bool(np.abs(noise / before - 1.0).max() < _SETTLED_NOISE)
-        if converged:
-            break
-    how = Search("weighted", iteration, converged)
-    return estimate_of(how, observations, factor, values, weights=1.0 / before)
+        search.converged = bool(np.abs(noise / before - 1.0).max() < _SETTLED_NOISE)
+    return estimate_of(search, observations, factor, values, weights=1.0 / before)
 
 
 def huber(
@@ -100,12 +96,11 @@ def huber(
     DataError
         If the observations do not determine the values, or the threshold is not positive.
     """
-    if not threshold > 0.0:
-        raise DataError(f"threshold: {threshold} given, a number above 0 expected")
+    expect(threshold > 0.0, "threshold", threshold, "a number above 0")
     factor = qr_factor(observations).check_seen()
     values = factor.values()
-    converged = False
-    for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
+    search = Search("huber")
+    for _ in search.steps(iterations):
         rest = residuals_of(observations, values)
         scale = median_noise(observations, rest)
         # An actuator without equations has a scale all the same.
@@ -114,9 +109,7 @@ def huber(
         factor = qr_factor(observations, np.sqrt(reduction) / scale)
         before, values = values, factor.values()
         change = factor.scale * np.abs(values - before)
-        converged = bool(change.max() <= _SETTLED_VALUES * np.sqrt(observations.rows))
-        if converged:
-            break
+        search.converged = bool(change.max() <= _SETTLED_VALUES * np.sqrt(observations.rows))
     plain = qr_factor(observations, 1.0 / scale)
     standard = residuals_of(observations, values) / scale
     pull = np.clip(standard, -threshold, threshold)
@@ -125,8 +118,8 @@ def huber(
     used = observations.gain > 0.0
     slope = float((np.abs(standard)[used] < threshold).mean())
     spent = 1.0 + len(values) / observations.rows * (1.0 - slope) / slope
-    how, pull = Search("huber", iteration, converged), spent * pull / slope
-    return estimate_of(how, observations, plain, values, weights=1.0 / scale, pull=pull)
+    pull = spent * pull / slope
+    return estimate_of(search, observations, plain, values, weights=1.0 / scale, pull=pull)
 
 
 def actuator_noise(observations: Observations, values: Array) -> Array:

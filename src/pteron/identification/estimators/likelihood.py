@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.identification.errors import LogError
 from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
 from pteron.identification.estimators.least_squares import weighted
 from pteron.identification.estimators.qr import qr_factor
@@ -75,9 +74,8 @@ def maximum_likelihood(
     curve = preprocessing.differentiator.curve(log)
     measured = curve.coefficients
     if measured.size > _MOST:
-        raise LogError(
+        raise log.fault(
             "too large",
-            log.source,
             f"its motion has {measured.size} coefficients, more than the {_MOST} that maximum "
             "likelihood fits at once; give a part of the log",
         )
@@ -89,10 +87,10 @@ def maximum_likelihood(
     # known without a model, and they are not to be followed closer than that.
     least = np.maximum(preprocessing.force_noise, _LEAST_NOISE * estimate.noise.max())
     noise = np.maximum(estimate.noise, least)
-    converged = False
-    for iteration in range(1, iterations + 1):
+    search = Search(_NAME)
+    for _ in search.steps(iterations):
         observations = _sampled(model, log, curve, preprocessing)
-        if iteration <= _RENEWED:
+        if search.iterations <= _RENEWED:
             used, start = observations.gain, preprocessing.start
             slopes = _slopes(model, values, log, curve, used, start)
         # Linearised about the present motion
@@ -118,26 +116,23 @@ def maximum_likelihood(
         spent = 1.0 - len(values) / observations.rows
         noise = np.sqrt((left**2).sum(axis=0) / np.maximum(observations.used, 1) / spent)
         noise = np.maximum(noise, least)
-        converged = bool((np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all())
-        if converged:
-            break
+        search.converged = bool((np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all())
     # The values' own part of the forces: what the motion could do as well is taken out of it.
     moved = solved[:, :-1]
     own = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
     observations = _sampled(model, log, curve, preprocessing)
     beside, factor = moved.T @ (information @ moved), qr_factor(observations, 1.0 / noise)
-    how, weights = Search(_NAME, iteration, converged), 1.0 / noise
-    found = how, observations, factor, values
+    found, weights = (search, observations, factor, values), 1.0 / noise
     return estimate_of(*found, weights=weights, inverse=inverse, instruments=own, beside=beside)
 
 
 def _check(log: Log) -> None:
     advice = "to maximum likelihood, or choose another estimator"
     if len(log.segments) > 1:
-        raise LogError("gap", log.source, f"has gaps; give a part without one {advice}")
+        raise log.fault("gap", f"has gaps; give a part without one {advice}")
     if log.payload is not None and np.ptp(log.payload) > 0:
         said = f"the payload changes; give a part with one payload {advice}"
-        raise LogError("no payload", log.source, said)
+        raise log.fault("no payload", said)
 
 
 def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing) -> Observations:

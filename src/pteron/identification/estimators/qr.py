@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.identification.errors import LogError
+from pteron.identification.errors import OfLog
 from pteron.identification.observation import Observations, triangle
 from pteron.kernels import Array
 
@@ -26,7 +26,7 @@ _PLAIN = 1e5
 
 
 @dataclass(frozen=True)
-class QrFactor:
+class QrFactor(OfLog):
     """The triangular factor R of [W F], regressor and forces, W's columns scaled to length 1."""
 
     factor: Array
@@ -72,9 +72,8 @@ class QrFactor:
     def check_seen(self) -> QrFactor:
         """Return it, or raise a LogError that names the values that observations leave open."""
         if self.degrees <= 0:
-            raise LogError(
+            raise self.fault(
                 "too short",
-                self.source,
                 f"{self.rows} equations are left after filters and edges, more than "
                 f"{len(self.names)} are needed; record longer, or choose a higher band",
             )
@@ -83,9 +82,8 @@ class QrFactor:
         concerned = (np.abs(unseen) > _TAKES_PART).any(axis=0) | (self.scale == 0.0)
         if concerned.any():
             names = [name for name, flag in zip(self.names, concerned, strict=True) if flag]
-            raise LogError(
+            raise self.fault(
                 "too little motion",
-                self.source,
                 f"too little motion: {len(names)} of {len(self.names)} values cannot be seen "
                 f"({', '.join(names)}); move all coordinates at once, such as along a trajectory "
                 "of pteron excite",

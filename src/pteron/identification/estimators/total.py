@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pteron.identification.errors import LogError
 from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.estimators.qr import qr_factor
@@ -98,15 +97,14 @@ def total(
     stack = np.column_stack([factor.factor * factor.scale, factor.image])
     stack = np.vstack([stack, np.r_[np.zeros(p), np.sqrt(factor.rest)]])
     upper = np.asarray(np.linalg.qr(stack[:, [*order, p]], mode="r"))
-    forces, converged = 1.0, False
+    forces, search = 1.0, Search("total")
     values = np.empty(p)
-    for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
+    for _ in search.steps(iterations):
         found = smallest_corrections(upper, exact, np.r_[errors[order[exact:]], forces])
         sizes = found.sizes
         if found.share < 1e-12 or (len(sizes) > 1 and sizes[-1] >= sizes[-2]):
-            raise LogError(
+            raise observations.fault(
                 "too little motion",
-                observations.source,
                 "total least squares: noise explains all there is; record a livelier motion",
             )
         values[order] = found.values
@@ -114,19 +112,16 @@ def total(
         # The residuals hold the noise of the columns as well as that of the forces.
         left = factor.rest + ((factor.image - factor.factor @ (factor.scale * values)) ** 2).sum()
         variance = left / factor.degrees
-        converged = given is None or variance == 0.0
-        if not converged:
+        search.converged = given is None or variance == 0.0
+        if not search.converged:
             before, forces = forces, np.sqrt(max(variance - through, _LEAST_SHARE * variance))
-            converged = bool(abs(forces / before - 1.0) < _SETTLED)
-        if converged:
-            break
+            search.converged = bool(abs(forces / before - 1.0) < _SETTLED)
     # The normal equations without the bias of the columns' noise, least^2 times its variance.
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)
     normal = normal - float(sizes[-1] ** 2) * np.diag(errors**2)
     lengths = np.outer(factor.scale, factor.scale)
     inverse = np.linalg.inv(normal / lengths) / lengths
-    how = Search("total", iteration, converged)
-    return estimate_of(how, observations, factor, values, weights=1.0 / noise, inverse=inverse)
+    return estimate_of(search, observations, factor, values, weights=1.0 / noise, inverse=inverse)
 
 
 def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed: Seed = 0) -> Array:

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.arguments import expect_one_of
+from pteron.arguments import expect, expect_one_of
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
 from pteron.identification.signals.states import FullMotion, home_mode
@@ -79,8 +79,7 @@ class FourierMotion:
                 'space: "joints" given, but direct kinematics of '
                 f'{self.robot.name} has no closed form; choose "platform"'
             )
-        if not 0.0 < self.period < np.inf:
-            raise DataError(f"period: {self.period} s given, a number above 0 expected")
+        expect(0.0 < self.period < np.inf, "period", f"{self.period} s", "a number above 0")
         n = self.robot.freedom
         for name in ("center", "cosines", "sines"):
             object.__setattr__(self, name, as_array(getattr(self, name), name, (n,)).copy())
@@ -172,6 +171,6 @@ class FourierMotion:
 
 def _times(time: ArrayLike) -> Array:
     times = as_array(time, "time", ())
-    if times.ndim != 1 or not np.isfinite(times).all():
-        raise DataError(f"time: shape {times.shape} given, finite numbers of shape (T,) expected")
+    fits = times.ndim == 1 and np.isfinite(times).all()
+    expect(fits, "time", f"shape {times.shape}", "finite numbers of shape (T,)")
     return times

@@ -10,7 +10,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 import polars as pl
 
-from pteron.arguments import expect_one_of, expect_to_fit
+from pteron.arguments import expect, expect_one_of, expect_to_fit
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, shown
 from pteron.identification.excitation.movement import Movement
@@ -160,12 +160,9 @@ class Layout:
 
 def check_sampling(period: float, rate: float, periods: int) -> None:
     """Refuse, before any work, a period and samples a second that give no table."""
-    if not 0.0 < period < np.inf:
-        raise DataError(f"period: {period} s given, a number above 0 expected")
-    if not 0.0 < rate < np.inf:
-        raise DataError(f"rate: {rate} given, samples a second above 0 expected")
-    if periods < 1:
-        raise DataError(f"periods: {periods} given, 1 or more expected")
+    expect(0.0 < period < np.inf, "period", f"{period} s", "a number above 0")
+    expect(0.0 < rate < np.inf, "rate", rate, "samples a second above 0")
+    expect(periods >= 1, "periods", periods, "1 or more")
     count = periods * period * rate
     if not 0.5 < count <= _MOST_SAMPLES:
         raise DataError(

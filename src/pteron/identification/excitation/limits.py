@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.identification.signals.states import home
 from pteron.kernels import Array
@@ -120,13 +121,11 @@ class Limits:
                 continue
             several = isinstance(given, list | tuple | np.ndarray)
             values = tuple(_number(name, value) for value in (given if several else (given,)))
-            if not values or min(values) <= 0.0:
-                raise DataError(f"limits: {name} {given} given, numbers above 0 expected")
+            expect(min(values, default=0.0) > 0.0, "limits", f"{name} {given}", "numbers above 0")
             object.__setattr__(self, name, values if several else values[0])
         for name, (fits, expected) in _SHARES.items():
             value = _number(name, getattr(self, name))
-            if not fits(value):
-                raise DataError(f"limits: {name} {value:g} given, {expected} expected")
+            expect(fits(value), "limits", f"{name} {value:g}", expected)
 
 
 def per_joint(limits: Limits, name: str, robot: Manipulator) -> Array:
@@ -172,6 +171,6 @@ def _number(name: str, value: object) -> float:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise DataError(f"limits: {name} {value!r} given, a number expected") from None
-    if not math.isfinite(number) and (name, number) != ("force", math.inf):
-        raise DataError(f"limits: {name} {number} given, a finite number expected")
+    sound = math.isfinite(number) or (name, number) == ("force", math.inf)
+    expect(sound, "limits", f"{name} {number}", "a finite number")
     return number

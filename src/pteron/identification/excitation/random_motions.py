@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pteron.arguments import expect_to_fit
-from pteron.errors import DataError, ModelError
+from pteron.arguments import expect, expect_to_fit
+from pteron.errors import ModelError
 from pteron.identification.excitation.fourier import FourierMotion, Space
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import check_rest, relative_margins
@@ -100,8 +100,7 @@ def random_excitation(
     """
     robot = as_manipulator(robot)
     limits = limits or Limits.of(robot)
-    if harmonics < 1:
-        raise DataError(f"harmonics: {harmonics} given, 1 or more expected")
+    expect(harmonics >= 1, "harmonics", harmonics, "1 or more")
     # Sines and cosines of all harmonics at the samples of a look.
     expect_to_fit("harmonics", harmonics, 2.0 * _FINE * harmonics * harmonics)
     rng = np.random.default_rng(seed)

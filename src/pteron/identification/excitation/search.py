@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-from pteron.arguments import expect_one_of
+from pteron.arguments import expect, expect_one_of
 from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import (
     Conditioning,
@@ -148,7 +148,10 @@ def optimal_excitation(
     """
     robot = as_manipulator(robot)
     limits = limits or Limits.of(robot)
-    _check(criterion, starts, draws, seconds)
+    expect_one_of(get_args(Criterion), criterion=criterion)
+    for name, value in (("starts", starts), ("draws", draws)):
+        expect(value >= 1, name, value, "1 or more")
+    expect(0.0 < seconds < math.inf, "seconds", seconds, "a number above 0")
     base = base or base_parameters(robot)
     motion: dict[str, Any] = {"space": space, "harmonics": harmonics, "period": period}
     motion["limits"] = limits
@@ -274,12 +277,3 @@ class _Search:
         how = self.criterion, best.conditioning, random.conditioning, left, lead, starts
         ended = len(self.drawn), seed, seconds, interrupted
         return Excitation(best.motion, limits, *how, *ended)
-
-
-def _check(criterion: str, starts: int, draws: int, seconds: float) -> None:
-    expect_one_of(get_args(Criterion), criterion=criterion)
-    for name, value in (("starts", starts), ("draws", draws)):
-        if value < 1:
-            raise DataError(f"{name}: {value} given, 1 or more expected")
-    if not 0.0 < seconds < math.inf:
-        raise DataError(f"seconds: {seconds} given, a number above 0 expected")

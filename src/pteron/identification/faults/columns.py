@@ -16,7 +16,7 @@ import numpy as np
 from pteron.equations.friction import passive_joints
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
-from pteron.identification.model import ExtendedModel, Model, diagonal
+from pteron.identification.model import Model, diagonal, extended
 from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
@@ -199,10 +199,10 @@ class FaultColumns:
         return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @property
-    def whole(self) -> ExtendedModel:
+    def whole(self) -> Model:
         """The model with all columns behind its own."""
         count = self.places[-1].stop - len(self.model.names)
-        return ExtendedModel(self.model, count, self.matrix)
+        return extended(self.model, count, self.matrix)
 
     def motion(self, states: States, along: Array, stride: int = 1) -> FittedMotion:
         """Return the motion that columns are made of, at times `along` (R,)."""

@@ -69,8 +69,8 @@ class FoundFault:
         The mixtures of its columns that are seen.
     sizes, deviations : array, shape (k,)
         Factors of its columns, and their standard deviations.
-    chance : float
-        Probability that they seem so large by chance.
+    statistic, chance : float
+        Wald's, and the probability that they seem so large by chance.
     fit : Estimate
         The fit.
     likely : float
@@ -83,6 +83,7 @@ class FoundFault:
     mix: Array
     sizes: Array
     deviations: Array
+    statistic: float
     chance: float
     fit: Estimate
     likely: float = 1.0
@@ -108,20 +109,17 @@ def searched(
         for k, family in enumerate(model.families):
             if family not in wanted or family.name in (one.family.name for one in found):
                 continue
-            one, statistic = _taken_in(model, observations, triangles, found, k)
+            one = _taken_in(model, observations, triangles, found, k)
             if one is not None and one.chance < _CHANCE and _is_possible(one, model):
-                clear.append((statistic, one))
-        best = max((statistic for statistic, _ in clear), default=0.0)
+                clear.append(one)
+        best = max((one.statistic for one in clear), default=0.0)
         first = first or best
         # What is left beside a clear fault may be its own shape, which no column has exactly.
         if not best > _BESIDE * first:
             break
         # Of those that explain as much, the one of fewest sizes.
-        _, one = min(
-            (item for item in clear if item[0] >= _AS_WELL * best),
-            key=lambda item: (len(item[1].sizes), -item[0]),
-        )
-        found.append(one)
+        as_well = [one for one in clear if one.statistic >= _AS_WELL * best]
+        found.append(min(as_well, key=lambda one: (len(one.sizes), -one.statistic)))
     return plain, found
 
 
@@ -155,8 +153,8 @@ def _taken_in(
     triangles: Observations,
     before: Sequence[FoundFault],
     k: int,
-) -> tuple[FoundFault | None, float]:
-    """Return a family, by its place, as it is seen beside those before it; and Wald's statistic.
+) -> FoundFault | None:
+    """Return a family, by its place, as it is seen beside those before it; None if it is not.
 
     Mixtures of its columns that are at right angles to the model's and to each other are tried
     together. Those whose sizes are clear are then kept, and fitted alone: the others are noise.
@@ -173,7 +171,7 @@ def _taken_in(
     mix = right[seen > _SEEN].T / lengths[:, None]
     q = mix.shape[1]
     if q == 0 or observations.rows < _ENOUGH * (p + q):
-        return None, 0.0
+        return None
 
     def fitted(mix: Array) -> tuple[Estimate, Array, Array]:
         """Return the fit with these mixtures, their sizes, and the sizes' covariance."""
@@ -203,8 +201,8 @@ def _taken_in(
     variances = np.einsum("ij,jk,ik->i", mix, covariance, mix)
     deviations = np.sqrt(np.maximum(variances, 0.0))
     usual = _likely(size, covariance, mix, model) if family.unit == "m" else 1.0
-    one = FoundFault(family, mix, mix @ size, deviations, chance, fit, usual, tuple(others))
-    return one, statistic
+    seen_as = mix, mix @ size, deviations, statistic, chance
+    return FoundFault(family, *seen_as, fit, usual, tuple(others))
 
 
 def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:

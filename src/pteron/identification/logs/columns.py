@@ -95,8 +95,8 @@ def check_names(repeated: Mapping[str, str], source: str) -> None:
             raise _twice(name, source)
 
 
-class RepeatedTimes:
-    """The columns of times beside the first, of the same name, where each channel has its own.
+def repeated_times(repeated: Mapping[str, str], columns: Columns, source: str) -> tuple[str, ...]:
+    """Return the columns of times beside the first, of its name, where each channel has its own.
 
     `repeated` are the names that a file has more than once, as they are told apart.
 
@@ -105,29 +105,25 @@ class RepeatedTimes:
     DataError
         If another column that is used has its name twice.
     """
+    used = [name for group in columns[1:5] for name in group.names]
+    for name in repeated.values():
+        if name in used:
+            raise _twice(name, source)
+    return tuple(new for new, name in repeated.items() if name in columns.time.names)
 
-    def __init__(self, repeated: Mapping[str, str], columns: Columns, source: str) -> None:
-        times = columns.time.names
-        used = [name for group in columns[1:5] for name in group.names]
-        for name in repeated.values():
-            if name in used:
-                raise _twice(name, source)
-        self.names = tuple(new for new, name in repeated.items() if name in times)
-        self._first = times[0]
 
-    def check(self, table: Table) -> None:
-        """Raise a `DataError` where a channel was sampled at another time than the first."""
-        first = self._first
-        for name in self.names:
-            apart = (table.frame[name] != table.frame[first]).fill_null(value=True)
-            if apart.any():
-                row = int(np.argmax(apart.to_numpy()))
-                one, other = (shown(str(table.frame[key][row])) for key in (first, name))
-                raise DataError(
-                    f"{table.place(row)}: its channels were not sampled at one time: {first} is "
-                    f"{one}, {name} is {other}; record all channels with one sample time, or "
-                    "export them with one time column"
-                )
+def check_times(table: Table, first: str, others: Sequence[str]) -> None:
+    """Raise a `DataError` where a channel was sampled at another time than the first."""
+    for name in others:
+        apart = (table.frame[name] != table.frame[first]).fill_null(value=True)
+        if apart.any():
+            row = int(np.argmax(apart.to_numpy()))
+            one, other = (shown(str(table.frame[key][row])) for key in (first, name))
+            raise DataError(
+                f"{table.place(row)}: its channels were not sampled at one time: {first} is "
+                f"{one}, {name} is {other}; record all channels with one sample time, or "
+                "export them with one time column"
+            )
 
 
 def as_read(
@@ -136,11 +132,11 @@ def as_read(
     columns: Columns,
     description: Description,
     clock: Clock,
-    again: RepeatedTimes,
+    again: Sequence[str],
 ) -> tuple[Finding, ...]:
     """Return how a file was read, in one finding, where that is neither documented nor declared.
 
-    `found` is what is unlike a plain CSV file.
+    `found` is what is unlike a plain CSV file, `again` are the `repeated_times`.
     """
     parts = list(found)
     time = columns.time.in_words("time")
@@ -150,8 +146,8 @@ def as_read(
         time = f"{time.removesuffix(' in s')} in {clock.unit} (guessed from its size)"
     if columns.time.told or clock.guessed or (clock.format and not description.time_format):
         parts.append(time)
-    if again.names:
-        parts.append(f"{len(again.names) + 1} equal columns of times")
+    if again:
+        parts.append(f"{len(again) + 1} equal columns of times")
     groups = {"joints": columns.joints, "forces": columns.forces, "pose": columns.pose}
     parts += [group.in_words(noun) for noun, group in groups.items() if group.told]
     if not parts:

@@ -81,9 +81,7 @@ def _pairs(given: Any) -> Any:
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Factor = Annotated[Number, AfterValidator(_not_zero)]
 Two = tuple[Number, Number]
-
 Three = tuple[Number, Number, Number]
-
 Six = tuple[Number, Number, Number, Number, Number, Number]
 Pair = Annotated[Two, AfterValidator(_rising)]
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
@@ -269,7 +267,7 @@ class Description:
         return given
 
     @model_validator(mode="after")
-    def _apart(self) -> Description:
+    def _agrees(self) -> Description:
         named = [self.time_column, self.payload_column]
         for several in (self.joint_columns, self.force_columns, self.pose_columns):
             named += several or ()
@@ -281,10 +279,6 @@ class Description:
             raise ValueError(f"motion.end: {self.end:g} s is not behind motion.start")
         if self.period is None and (self.start is not None or self.end is not None):
             raise ValueError("motion.start, motion.end: are of a periodic part; give its period")
-        return self
-
-    @model_validator(mode="after")
-    def _one_clock(self) -> Description:
         if self.time_unit is not None and self.time_format is not None:
             raise ValueError("time.format: times as text have no unit; give unit or format")
         return self

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
+from pteron.identification.errors import OfLog
 from pteron.identification.logs.description import Description
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.legs.reading import Reading
@@ -69,7 +70,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Log:
+class Log(OfLog):
     """Samples of a motion, or a part of them; the arrays are not copied and not to be changed.
 
     Parameters

@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError, shown
+from pteron.identification.errors import OfLog
 from pteron.identification.logs.at_motor import joint_factors
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.clock import Clock, find_clock
 from pteron.identification.logs.columns import (
-    RepeatedTimes,
     as_read,
     check_names,
+    check_times,
     find_columns,
+    repeated_times,
 )
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.description_file import (
@@ -54,7 +56,7 @@ _PER_METRE = {"mm": 1e3, "um": 1e6}
 Values = NDArray[np.float64]
 
 
-class LogFile:
+class LogFile(OfLog):
     """A log that is open for reading; each pass over its pieces reads the file anew.
 
     Attributes
@@ -93,7 +95,7 @@ class LogFile:
         self._groups = (c.joints, c.forces, c.pose, c.payload)
         self._factors = joint_factors(c.joints, robot, source)
         self._names = tuple(name for group in self._groups for name in group.names)
-        self._again = RepeatedTimes(file.repeated, c, source)
+        self._again = repeated_times(file.repeated, c, source)
         self._bounds = joint_bounds(robot), pose_bounds(robot)
         self._mass: float | None = None
         self._clock, self._step = self._usual_step()
@@ -197,8 +199,8 @@ class LogFile:
         held: list[Values] = []
         count = 0
         clock = self._clock.fresh()
-        for table in self._file.tables((*clock.columns, *self._names, *self._again.names)):
-            self._again.check(table)
+        for table in self._file.tables((*clock.columns, *self._names, *self._again)):
+            check_times(table, self._columns.time.names[0], self._again)
             held.append(np.column_stack([clock.seconds(table), table.numbers(self._names)]))
             count += len(table)
             while count >= rows:

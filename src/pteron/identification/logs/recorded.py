@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.errors import LogError
 from pteron.identification.logs.log import Log, gaps
 from pteron.identification.logs.spikes import LONGEST
 
@@ -62,9 +61,8 @@ def check_recorded(log: Log) -> None:
         if len(force) > 1 and np.ptp(force) <= _TIES * np.abs(force).max(initial=0.0)
     ]
     if still:
-        raise LogError(
+        raise log.fault(
             "constant",
-            log.source,
             f"{'; '.join(still)}: no force of a drive that moves a machine; look at the channel, "
             "and record it again, or correct which columns are read",
         )
@@ -78,9 +76,8 @@ def check_recorded(log: Log) -> None:
                 f"{name} jumps by {size:.4g} {unit}{turn} at row {row + log.first_row + 1}"
             )
     if wraps:
-        raise LogError(
+        raise log.fault(
             "wrapped",
-            log.source,
             f"{'; '.join(wraps)}: an encoder that wraps; unwrap it, such as with "
             "numpy.unwrap(joint, period=...), and identify that",
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from pteron.errors import DataError, shown
@@ -47,7 +46,6 @@ class Group(NamedTuple):
         return f"{noun} {listed(self.names)} in {unit}"
 
 
-@dataclass
 class ColumnSearch(ColumnNames):
     """The search for the columns of a log."""
 

@@ -56,10 +56,8 @@ def joint_spikes(values: Values) -> Mask:
     A group jumps away from the motion within one sample, at most `LONGEST` samples later back onto
     it, each time by far more than the joint moves in a sample.
     """
-    if len(values) < 2 * _WINDOW:
-        return np.zeros(len(values), dtype=bool)
-    steps = np.diff(values)
-    nearby = scipy.ndimage.median_filter(np.abs(steps), _WINDOW, mode="nearest")
+    steps = np.abs(np.diff(values))
+    nearby = scipy.ndimage.median_filter(steps, _WINDOW, mode="nearest")
     return _groups(values, _SHARE_OF_JOINT, _FASTER * nearby)
 
 
@@ -69,8 +67,6 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     Forces may jump where an acceleration does, as in an emergency stop, and where friction turns
     with the joint itself: the motion (T, n) says so, in which `own` is the joint of this force.
     """
-    if len(values) < 2 * _WINDOW:
-        return np.zeros(len(values), dtype=bool)
     found = _groups(values, _SHARE_OF_FORCE, 0.0)
     if not found.any():
         return found
@@ -129,14 +125,16 @@ def _pushes(steps: Values, length: int) -> Values:
 
 
 def _groups(values: Values, share: float, least: Values | float) -> Mask:
-    """Return the samples between a jump and the jump back."""
+    """Return the samples between a jump and the jump back; none of so few that none is usual."""
+    found = np.zeros(len(values), dtype=bool)
+    if len(values) < 2 * _WINDOW:
+        return found
     steps = np.diff(values)
     jumps = steps - scipy.ndimage.median_filter(steps, _WINDOW, mode="nearest")
     usual = _USUAL * float(np.percentile(np.abs(jumps), 95.0))
     large = np.abs(jumps) > np.maximum(
         max(usual, share * np.ptp(np.percentile(values, _SPAN))), least
     )
-    found = np.zeros(len(values), dtype=bool)
     places = np.flatnonzero(large)
     i = 0
     while i < len(places):

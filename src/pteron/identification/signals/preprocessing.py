@@ -7,9 +7,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from pteron.arguments import expect_one_of
+from pteron.arguments import expect, expect_one_of
 from pteron.errors import DataError
-from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.identification.signals.derivatives import (
     CentralDifferences,
@@ -118,12 +117,10 @@ class Processing:
             expect_one_of(get_args(Derivatives), derivatives=self.derivatives)
         for name in ("cutoff", "band", "period"):
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise DataError(f"{name}: {value} given, a number above 0 expected")
-        if not 0.0 <= self.slow < 1.0:
-            raise DataError(f"slow: {self.slow} given, a share from 0 to below 1 expected")
-        if self.delay not in (None, "auto") and not abs(float(self.delay)) <= LATEST:
-            raise DataError(f'delay: {self.delay} s given, at most {LATEST:g} s or "auto" expected')
+            expect(value is None or 0.0 < value < np.inf, name, value, "a number above 0")
+        expect(0.0 <= self.slow < 1.0, "slow", self.slow, "a share from 0 to below 1")
+        small = self.delay in (None, "auto") or abs(float(self.delay)) <= LATEST
+        expect(small, "delay", f"{self.delay} s", f'at most {LATEST:g} s or "auto"')
 
 
 @dataclass(frozen=True)
@@ -295,16 +292,14 @@ def _longest_part(log: Log) -> Log:
 def _checked_series(log: Log, period: float | None) -> FittedSeries:
     """Return the series of the positions; refuse a period that is not that of the motion."""
     if period is None:
-        raise LogError(
+        raise log.fault(
             "no period",
-            log.source,
             'derivatives "periodic" needs the period; declare it under [motion] in the log\'s '
             "description, or give period",
         )
     if log.duration < period * (1.0 - 1e-3):
-        raise LogError(
+        raise log.fault(
             "too short",
-            log.source,
             f"lasts {log.duration:g} s, less than its period of {period:g} s; record a whole "
             'period, or choose derivatives "central"',
         )
@@ -312,9 +307,8 @@ def _checked_series(log: Log, period: float | None) -> FittedSeries:
     span = np.ptp(log.joints, axis=0)
     worst = int(np.argmax(series.noise / span))
     if series.noise[worst] > _REPEATS * span[worst]:
-        raise LogError(
+        raise log.fault(
             "not repeating",
-            log.source,
             f"does not repeat after its period of {period:g} s: {log.joint_names[worst]} "
             f"is {series.noise[worst]:.2g} (rms, m or rad) off; correct the "
             "period in the log's description, or leave it out",
