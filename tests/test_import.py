@@ -236,8 +236,9 @@ def known():
     for path in sorted(PACKAGE.rglob("*")):
         name = path.relative_to(PACKAGE).as_posix()
         above = path.suffix in (".py", ".j2", ".js") and name.split("/")[0] not in SEAM
-        if above:
-            code = code_of(path)
+        text = path.read_text(encoding="utf-8") if above else ""
+        if any(re.search(pattern, text) for pattern in KNOWLEDGE.values()):
+            code = code_of(path)  # it takes a while
             for what, pattern in KNOWLEDGE.items():
                 words = sorted({match[0] for match in re.finditer(pattern, code)})
                 if words:
