@@ -20,6 +20,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Path, line_path, there_and_back
 from pteron.motion.trajectories.time_polynomials import polynomial
+from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
 
 _DIRECTIONS = 4
@@ -101,9 +102,13 @@ class Places:
 
     @cached_property
     def states(self) -> Curve:
-        """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s."""
-        curve = _timed(self.path, np.linspace(0.0, 1.0, self.samples))
-        return self.moved(*curve)
+        """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s.
+
+        It goes from rest to rest by quintics, all of the same greatest acceleration.
+        """
+        spans = np.sqrt(np.diff(self.path.rests)).tolist()
+        timed = timed_path(self.path, spans, [polynomial("quintic")] * len(spans))
+        return self.moved(*timed.curve(np.linspace(0.0, 1.0, self.samples)))
 
     def moved(self, *curve: Array) -> Curve:
         """Return poses of the tool (K, m) and two derivatives as P's (B, K, m), at all places."""
@@ -171,8 +176,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
     ways = np.vstack([np.zeros_like(steps), np.diag(steps), -np.diag(steps)])
     for k, way in product(chosen, (-1.0, 0.0, 1.0) if cycle.anywhere else (0.0,)):
         turn = float(cycle.turns[k] + way * part * np.pi / _DIRECTIONS)
-        turned = path.copy()
-        turned[:, :2] = path[:, :2] @ _plane(np.array([turn]))[0].T
+        turned = _turned(path, turn)
         limits[:, :count] = (
             (-half - turned.min(axis=0))[:count],
             (half - turned.max(axis=0))[:count],
@@ -194,6 +198,11 @@ def _plane(turns: Array) -> Array:
     return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
 
 
+def _turned(path: Array, turn: float) -> Array:
+    """Return places (K, 3) turned about the upright."""
+    return np.column_stack([path[:, :2] @ _plane(np.array([turn]))[0].T, path[:, 2]])
+
+
 def _fitting(
     job: Job, robot: Manipulator, poses: Array, anywhere: bool
 ) -> Iterator[tuple[Array, float]]:
@@ -204,8 +213,7 @@ def _fitting(
     own = poses[:, count:]
     around = list(_angles(job, robot, own)) if anywhere and own.size else [np.zeros(own.shape[1])]
     for turn in directions:
-        turned = path.copy()
-        turned[:, :2] = path[:, :2] @ _plane(np.array([turn]))[0].T
+        turned = _turned(path, turn)
         low, high = -half - turned.min(axis=0), half - turned.max(axis=0)
         ends = [
             sorted({a, b}) if b > a else [0.5 * (a + b)] for a, b in zip(low, high, strict=True)
@@ -239,16 +247,3 @@ def _holds(job: Job, half: Array, points: Array) -> bool:
     if space.radius is not None:
         inside &= (np.linalg.norm(points[:, :2], axis=1) <= space.radius + INSIDE).all()
     return bool(inside)
-
-
-def _timed(path: Path, times: Array) -> tuple[Array, Array, Array]:
-    """Return states (K, m) at times (K,) of 0 to 1: quintics between rests."""
-    ends = np.array(path.rests)
-    spans = np.sqrt(np.diff(ends))
-    knots = np.concatenate([[0.0], np.cumsum(spans) / spans.sum()])
-    j = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(spans) - 1)
-    span, length = np.diff(knots)[j], np.diff(ends)[j]
-    share, rate, gain = polynomial("quintic")((times - knots[j]) / span)
-    pose, first, second = path.at(ends[j] + length * share)
-    speed, rise = (length * rate / span)[:, None], (length * gain / span**2)[:, None]
-    return pose, first * speed, second * speed**2 + first * rise
