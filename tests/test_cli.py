@@ -1029,7 +1029,8 @@ def test_an_interruption_is_quiet(monkeypatch: pytest.MonkeyPatch):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
 @pytest.mark.parametrize(
-    "module", gated(["pteron", "numpy", "typer", "pteron.dynamics", "polars"], ["pteron", "typer"])
+    "module",
+    gated(["pteron", "numpy", "typer", "pteron.dynamics", "pteron.kernels"], ["pteron", "typer"]),
 )
 def test_an_interruption_while_modules_are_loaded_is_quiet(module: str):
     script = (

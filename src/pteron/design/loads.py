@@ -32,6 +32,11 @@ _PEAK = 10.0 / sqrt(3.0)
 """Greatest acceleration of a quintic from rest to rest over its length and inverse squared time."""
 
 
+def listed(given: Any) -> Any:
+    """Return what may be one name or several as a list."""
+    return [given] if isinstance(given, str) else given
+
+
 def _numbers(given: Any) -> Any:
     return [given] if isinstance(given, int | float) else given
 

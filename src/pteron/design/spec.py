@@ -18,6 +18,7 @@ from pteron.design.loads import (
     MotorsTable,
     PayloadTable,
     Positive,
+    listed,
 )
 from pteron.design.quantities import known
 from pteron.errors import DataError, shown
@@ -33,10 +34,6 @@ Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
 """Least value of a measure that is 1 at best."""
 
 
-def _listed(given: Any) -> Any:
-    return [given] if isinstance(given, str) else given
-
-
 def _rising(pair: tuple[float, float]) -> tuple[float, float]:
     low, high = pair
     if not low < high:
@@ -47,7 +44,7 @@ def _rising(pair: tuple[float, float]) -> tuple[float, float]:
 class VariableTable(Table):
     """`[[variables]]`: numbers of the robot's file that move as one."""
 
-    moves: Annotated[tuple[str, ...], BeforeValidator(_listed), Field(min_length=1)] = key(
+    moves: Annotated[tuple[str, ...], BeforeValidator(listed), Field(min_length=1)] = key(
         'paths such as "legs[1,3].platform_point" or "-legs[2].guide_point.x"'
     )
     range: Two = key("least and greatest value")
