@@ -15,7 +15,7 @@ from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion import Fit, Motion, Motor, Sizing
+from pteron.motion import Fit, Motion, Motor, Sizing, limits_of
 from pteron.motion.sizing.motor_choice import fit_at, serving_span
 
 _RATES = np.array([1.0, 2.0, 3.0])
@@ -46,8 +46,8 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
         ]
     )
     rest, line, square = np.tensordot(np.linalg.inv(np.vander(_RATES, 3, True)), forces, axes=1)
-    drives = [leg.drive or Drive() for leg in robot.legs]
-    most = np.array([drive.max_force or inf for drive in drives])
+    limits = limits_of(robot)
+    most = limits.force
     for i in np.flatnonzero((np.abs(rest) > most).any(axis=0)):
         raise ModelError(
             f"leg {i + 1}: its drive gives {most[i]:g}, but it takes {np.abs(rest[:, i]).max():.4g}"
@@ -55,9 +55,8 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
         )
     rates = [_first_root(side * square, side * line, side * rest - most) for side in (1.0, -1.0)]
     speeds = np.abs(joint_rates(robot, motion.pose, motion.velocity).actuated).max(axis=0)
-    limits = np.array([drive.max_speed or inf for drive in drives])
     with np.errstate(divide="ignore"):
-        rate = min(*(float(part.min()) for part in rates), float((limits / speeds).min()))
+        rate = min(*(float(part.min()) for part in rates), float((limits.speed / speeds).min()))
     if not np.isfinite(rate):
         raise ModelError("cycle_time: no limit of a drive is met, however fast the cycle is")
     return motion.duration / rate

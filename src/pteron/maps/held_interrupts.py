@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 from threading import current_thread, main_thread
 
 
@@ -14,7 +13,8 @@ def held_interrupts() -> Iterator[None]:
     """Hold Ctrl-C back: here for so long, in processes that are started meanwhile for good.
 
     A process imports for seconds before it can be told to ignore it, and one that is broken off
-    while it is started complains.
+    while it is started complains. Python's tracker of resources unblocks signals as it starts: it
+    must run before, as it does once there is a pool of processes.
     """
     heard: list[int] = []
     usual = signal.getsignal(signal.SIGINT)
@@ -24,8 +24,6 @@ def held_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
     masks = hasattr(signal, "pthread_sigmask")
     if masks:
-        # Where that starts with the first process, it unblocks what was blocked.
-        resource_tracker.ensure_running()
         held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

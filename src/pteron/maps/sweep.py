@@ -16,6 +16,7 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from importlib.metadata import version
 from itertools import islice
+from multiprocessing import resource_tracker
 from typing import Any, Protocol, TypeVar
 
 from pteron.errors import DataError, PteronError
@@ -234,6 +235,8 @@ def _quiet() -> Iterator[None]:
 def local_workers(count: int | None) -> Any:
     """Return a cluster of processes of this computer."""
     cluster = _distributed().LocalCluster
+    if os.name == "posix":
+        resource_tracker.ensure_running()
     with held_interrupts():
         # One thread each: its kernels then share no lock with another's.
         return cluster(
