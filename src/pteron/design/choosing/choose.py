@@ -19,7 +19,6 @@ from pteron.design.choosing.drives import GEARBOXES, MOTORS, Options, read_lists
 from pteron.design.choosing.job import Job
 from pteron.design.choosing.kinds import Kind, fitting_kinds
 from pteron.design.choosing.rating import Case
-from pteron.design.choosing.samples import half_sides
 from pteron.design.choosing.search import search_kind
 from pteron.design.processes import Pool
 from pteron.errors import DataError, PteronError
@@ -169,7 +168,7 @@ def cases_of(job: Job) -> dict[str, Case]:
             '"rated_power"'
         )
     names = [name for name in names if _driven(name, options, job)]
-    needed = 2.0 * float(half_sides(job).max())
+    needed = 2.0 * float(job.workspace.half.max())
     tool = job.payload.tool
     kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
     found = {kind.name: Case(job, kind, options) for kind in kinds}
