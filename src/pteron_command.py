@@ -44,6 +44,9 @@ def main() -> None:
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+        # `python -m` ends by the signal, whatever the exit code, where the last text that was
+        # executed, as dataclasses do, was interrupted.
+        exec("")
         # What is left is freed with the process: Python need not look for cycles in it as it ends.
         gc.freeze()
 

@@ -1031,7 +1031,8 @@ def test_an_interruption_is_quiet(monkeypatch: pytest.MonkeyPatch):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
 @pytest.mark.parametrize(
-    "module", gated(["pteron", "numpy", "typer", "pteron.dynamics", "polars"], ["pteron", "typer"])
+    "module",
+    gated(["pteron", "numpy", "typer", "pteron.dynamics", "pteron.kernels"], ["pteron", "typer"]),
 )
 def test_an_interruption_while_modules_are_loaded_is_quiet(module: str):
     script = (
@@ -1044,6 +1045,28 @@ def test_an_interruption_while_modules_are_loaded_is_quiet(module: str):
     )
     command = [sys.executable, "-c", script + PROGRAM[-1], "forces", "tripteron", "--pose", "0,0,0"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", "Interrupted\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
+def test_an_interruption_of_text_that_is_executed_has_its_exit_code(tmp_path: Path):
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\n"
+        "text = 'import os, signal\\nos.kill(os.getpid(), signal.SIGINT)\\nprint()'\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *more):\n"
+        "        if name == 'pteron.dynamics':\n"
+        "            exec(text)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+    )
+    paths = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    result = subprocess.run(
+        [sys.executable, "-m", "pteron", "forces", "tripteron", "--pose", "0,0,0"],
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "Interrupted\n")
 
 

@@ -1,14 +1,23 @@
 """Searches for a design: what they ask, what they find, what is proved of it, and going on."""
 
 import json
+import os
 import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
+import tomlkit
 from mechanisms import CATALOG, CLIENTS
 from test_cli import done, refused, run
+from threadpoolctl import threadpool_limits
 
 import pteron
 from pteron.design import (
@@ -186,10 +195,13 @@ def test_what_the_points_miss_goes_back_to_the_search():
     assert 0.9 * design.cube.edge < proved_cube(design).edge < 0.9999 * design.cube.edge
 
 
-def test_every_design_of_a_front_is_proved(found):
+@pytest.mark.parametrize("threads", [1, 2])
+def test_every_design_of_a_front_is_proved(found, threads):
+    """Also in a process whose linear algebra adds up in another order than the search's."""
     front, _ = found
     for k, edge in enumerate(front.table["cube"]):
-        told = proved(Design(front.task, front.robot(k)))
+        with threadpool_limits(threads):
+            told = proved(Design(front.task, front.robot(k)))
         assert told.cube.edge == edge == told.design.cube.edge
         ends = (told.cube.center + side * edge for side in (-0.5, 0.5))
         box = Box(*((*end.tolist(), 0.0) for end in ends))
@@ -520,3 +532,37 @@ def test_the_margin_of_a_motor_is_the_most_at_any_ratio():
         for share, fits in ((0.999, True), (1.001, False)):
             chosen = choose(found, [motor], margin=share * one.margin)
             assert next(fit for fit in chosen if fit.leg == one.leg).fits == fits
+
+
+@CLIENTS
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc here")
+@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize("kind", [["--workers", "2"], ["--workers", "2", "--sweep", "2000"]])
+def test_ctrl_c_while_workers_begin_is_one_line(tmp_path, kind, whole):
+    """They import for seconds, and hear the terminal's Ctrl-C as the command does."""
+
+    def alive():
+        """Return the processes of the command's session that have not ended."""
+        found = []
+        for file in Path("/proc").glob("[0-9]*/stat"):
+            with suppress(OSError):
+                state, _, _, session = file.read_text().rpartition(")")[2].split()[:4]
+                if session == str(process.pid) and state != "Z":
+                    found.append(int(file.parent.name))
+        return found
+
+    (tmp_path / "search.toml").write_text(tomlkit.dumps(spec_of().model_dump(exclude_none=True)))
+    given = [sys.executable, "-m", "pteron", "design", "search.toml", "--out", "out", *kind]
+    process = subprocess.Popen(
+        given, stderr=subprocess.PIPE, text=True, cwd=tmp_path, start_new_session=True
+    )
+    while len(alive()) < 3:  # the command, what keeps track of its resources, and a worker
+        assert process.poll() is None
+        time.sleep(0.02)
+    (os.killpg if whole else os.kill)(process.pid, signal.SIGINT)
+    _, told = process.communicate(timeout=100)
+    assert (process.returncode, told) == (130, "Interrupted\n")
+    end = time.monotonic() + 20.0  # what keeps track of its resources ends after it
+    while alive() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not alive()

@@ -593,6 +593,17 @@ def test_an_interrupt_in_a_callback_of_a_weak_reference_gets_through():
         raise ImportError("initialization failed") from KeyboardInterrupt()
 
 
+def test_an_error_that_an_extension_makes_of_an_interrupt_is_an_interrupt():
+    def build():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ValueError("a part could not be built") from None
+
+    with pytest.raises(KeyboardInterrupt), insistent_interrupts():
+        build()
+
+
 # Files ---------------------------------------------------------------------------------------
 
 

@@ -147,6 +147,25 @@ def parsed_list(text: str | None, what: str) -> list[float] | None:
     return parsed_numbers([text], ["a number"] * max(1, len(words)), what)
 
 
+def split_numbers(
+    option: str, text: str, between: str, count: int | None, expected: str
+) -> tuple[float, ...]:
+    """Return the numbers in an option's text, `count` of them if that is given.
+
+    Raises
+    ------
+    DataError
+        If it has others, or none: it says what is expected.
+    """
+    try:
+        found = tuple(float(part) for part in text.split(between))
+    except ValueError:
+        found = ()
+    if not found or (count is not None and len(found) != count):
+        raise DataError(f"{option}: {text!r} given, {expected}")
+    return found
+
+
 def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = False) -> Manipulator:
     """Load a machine, in the working mode that `elbows` says, such as ``++-+``.
 

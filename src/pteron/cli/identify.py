@@ -7,7 +7,7 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
-from pteron.cli.arguments import Machine, load_robot
+from pteron.cli.arguments import Machine, load_robot, split_numbers
 from pteron.cli.progress import Times, spinner, stages
 from pteron.cli.result import Result
 from pteron.cli.terminal import (
@@ -145,24 +145,15 @@ def identify(
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
     if text in (None, "auto"):
         return "auto" if text else None
-    try:
-        return tuple(float(part) for part in str(text).split(","))
-    except ValueError:
-        raise DataError(
-            f"--stribeck: {text!r} given, a speed in m/s or rad/s expected, or one for each joint, "
-            "such as 0.02,0.03, or auto"
-        ) from None
+    each = "a speed in m/s or rad/s expected, or one for each joint, such as 0.02,0.03, or auto"
+    return split_numbers("--stribeck", str(text), ",", None, each)
 
 
 def _delay(text: str | None) -> float | Literal["auto"] | None:
     if text in (None, "auto"):
         return "auto" if text else None
-    try:
-        return float(str(text))
-    except ValueError:
-        raise DataError(
-            f"--delay: {text!r} given, seconds expected, such as 0.003, or auto"
-        ) from None
+    expected = "seconds expected, such as 0.003, or auto"
+    return split_numbers("--delay", str(text), ",", 1, expected)[0]
 
 
 def _terms(

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from typer import Exit
 
-from pteron.cli.arguments import load_robot, signs
+from pteron.cli.arguments import load_robot, signs, split_numbers
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import complain, plain, show, table, warn, write
-from pteron.errors import DataError, ModelError, OutputError, PteronError
+from pteron.errors import ModelError, OutputError, PteronError
 from pteron.json_values import picked
 
 if TYPE_CHECKING:
@@ -28,6 +28,9 @@ _LOOSE = (
     "every pose (constraint singularity): do legs share their hinges?"
 )
 """A warning of `pteron check`."""
+
+_LIMITS = "LOW:HIGH expected, such as -0.3:0.3"
+"""The form of `--limits`."""
 
 _FAULTY = 2
 """Exit code for a faulty file."""
@@ -106,7 +109,7 @@ def new(
         "platform_radius": platform_radius,
         "crank": crank,
         "rod": rod,
-        "limits": _interval(limits),
+        "limits": None if limits is None else split_numbers("--limits", limits, ":", 2, _LIMITS),
         "stock": _stocks(mass_from),
         "platform_mass": platform_mass,
     }
@@ -121,16 +124,6 @@ def new(
         return Result(data, partial(write, text))
     told = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
     return Result(data, [told, *map(plain, kept(load(kind), given))])
-
-
-def _interval(text: str | None) -> tuple[float, float] | None:
-    if text is None:
-        return None
-    try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
-        raise DataError(f"--limits: {text!r} given, LOW:HIGH expected, such as -0.3:0.3") from None
-    return low, high
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:

@@ -242,7 +242,7 @@ def _show(
         _powers(found),
         *_rotors(found),
         *_energy(found),
-        *([motors_table(found.robot, fits)] if fits else []),
+        *motors_table(found.robot, fits),
         *common_table(found.robot, common),
         *_verdict(found, fits, asked.margin),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -15,8 +15,8 @@ from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion import Motion, Motor, Sizing
-from pteron.motion.sizing.gearing import torques
+from pteron.motion import Fit, Motion, Motor, Sizing, limits_of
+from pteron.motion.sizing.motor_choice import fit_at, serving_span
 
 _RATES = np.array([1.0, 2.0, 3.0])
 """Rates at which forces are evaluated: they are quadratic in the rate."""
@@ -46,8 +46,8 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
         ]
     )
     rest, line, square = np.tensordot(np.linalg.inv(np.vander(_RATES, 3, True)), forces, axes=1)
-    drives = [leg.drive or Drive() for leg in robot.legs]
-    most = np.array([drive.max_force or inf for drive in drives])
+    limits = limits_of(robot)
+    most = limits.force
     for i in np.flatnonzero((np.abs(rest) > most).any(axis=0)):
         raise ModelError(
             f"leg {i + 1}: its drive gives {most[i]:g}, but it takes {np.abs(rest[:, i]).max():.4g}"
@@ -55,9 +55,8 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
         )
     rates = [_first_root(side * square, side * line, side * rest - most) for side in (1.0, -1.0)]
     speeds = np.abs(joint_rates(robot, motion.pose, motion.velocity).actuated).max(axis=0)
-    limits = np.array([drive.max_speed or inf for drive in drives])
     with np.errstate(divide="ignore"):
-        rate = min(*(float(part.min()) for part in rates), float((limits / speeds).min()))
+        rate = min(*(float(part.min()) for part in rates), float((limits.speed / speeds).min()))
     if not np.isfinite(rate):
         raise ModelError("cycle_time: no limit of a drive is met, however fast the cycle is")
     return motion.duration / rate
@@ -78,53 +77,34 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
     return np.where(np.isfinite(found) & (found > 0.0), found, inf)
 
 
-@dataclass(frozen=True)
-class MotorMargin:
-    """A motor at a joint, at the ratio where its margin is greatest: from 1 on it serves."""
+def _at_its_best(sizing: Sizing, leg: int, motor: Motor) -> Fit:
+    """Return a motor at the ratio where its margin is greatest: from 1 on it serves.
 
-    leg: int
-    motor: Motor
-    ratio: float
-    margin: float
-    scarcest: str
+    Each limit allows an interval of ratios, so that the least of their margins has one maximum.
+    """
+    span, fastest = serving_span(sizing, leg, motor, 1.0), float(sizing.peak_speeds[leg - 1])
 
-    @classmethod
-    def of(cls, sizing: Sizing, leg: int, motor: Motor) -> MotorMargin:
-        """Return the margin that a motor has in a cycle, at any ratio.
+    def at(log_ratio: float) -> Fit:
+        return fit_at(sizing, leg, motor, span, float(np.exp(log_ratio)))
 
-        Each limit allows an interval of ratios, so that the least of their margins has one maximum.
-        """
-        fastest = float(sizing.peak_speeds[leg - 1])
-
-        def margins(ratio: float) -> dict[str, float]:
-            rms, peak = torques(sizing, leg, ratio, motor.rotor_inertia)
-            return {
-                "rated torque": motor.rated_torque / rms if rms else inf,
-                "peak torque": motor.peak_torque / peak if peak else inf,
-                "speed": motor.max_speed / (ratio * fastest) if fastest else inf,
-            }
-
-        middle = np.log(motor.max_speed / fastest if fastest else 1.0)
-        found = scipy.optimize.minimize_scalar(
-            lambda log_ratio: -np.log(min(margins(np.exp(log_ratio)).values())),
-            bounds=(middle - _DECADES * np.log(10.0), middle + np.log(10.0)),
-            method="bounded",
-            options={"xatol": 1e-6},
-        )
-        ratio = float(np.exp(found.x))
-        known = margins(ratio)
-        scarcest = min(known, key=known.__getitem__)
-        return cls(leg, motor, ratio, known[scarcest], scarcest)
+    middle = np.log(motor.max_speed / fastest if fastest else 1.0)
+    found = scipy.optimize.minimize_scalar(
+        lambda log_ratio: -np.log(at(log_ratio).margin),
+        bounds=(middle - _DECADES * np.log(10.0), middle + np.log(10.0)),
+        method="bounded",
+        options={"xatol": 1e-6},
+    )
+    return at(found.x)
 
 
-def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[MotorMargin]:
+def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[Fit]:
     """Return a motor of a list for each joint: the smallest whose margin is enough.
 
     Where none is, the one with the greatest margin.
     """
     found = []
     for leg in range(1, sizing.robot.joint_count + 1):
-        fits = [MotorMargin.of(sizing, leg, one) for one in motors]
+        fits = [_at_its_best(sizing, leg, one) for one in motors]
         serving = [fit for fit in fits if fit.margin >= enough]
         found.append(
             min(serving, key=lambda fit: fit.motor.rated_torque * fit.motor.max_speed)

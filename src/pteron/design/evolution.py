@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -22,22 +20,6 @@ def non_dominated(costs: Array) -> NDArray[np.int_]:
     sorting = _pymoo("util.nds.non_dominated_sorting").NonDominatedSorting()
     found = sorting.do(costs, only_non_dominated_front=True)
     return np.sort(np.asarray(found, dtype=int))
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Let linear algebra use one thread: several add up in another order, so that bits differ.
-
-    Dask's workers do so by themselves. Without threadpoolctl, of the extra `design`, the number of
-    threads stays that of the environment (OPENBLAS_NUM_THREADS).
-    """
-    try:
-        from threadpoolctl import threadpool_limits
-    except ImportError:
-        yield
-        return
-    with threadpool_limits(1):
-        yield
 
 
 class Evolution:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from pteron.bodies.inertia import inertia_count
-from pteron.bodies.tables import Number, Six, Table, Three
+from pteron.bodies.tables import Number, Six, Table, Three, key
 from pteron.indices import ALUMINIUM, STEEL, Elasticity, Section, Tolerances
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -32,6 +32,11 @@ _PEAK = 10.0 / sqrt(3.0)
 """Greatest acceleration of a quintic from rest to rest over its length and inverse squared time."""
 
 
+def listed(given: Any) -> Any:
+    """Return what may be one name or several as a list."""
+    return [given] if isinstance(given, str) else given
+
+
 def _numbers(given: Any) -> Any:
     return [given] if isinstance(given, int | float) else given
 
@@ -49,12 +54,12 @@ Each = Annotated[tuple[Least, ...], BeforeValidator(_numbers), Field(min_length=
 class PayloadTable(Table):
     """`[payload]`: what the platform carries."""
 
-    mass: Least = Field(0.0, description="kg")
-    center: Three | None = Field(
-        None, description="its centre of mass in the platform's frame, m; the tool if left out"
+    mass: Least = key("kg", 0.0)
+    center: Three | None = key(
+        "its centre of mass in the platform's frame, m; the tool if left out", None
     )
-    inertia: Annotated[Number | Six, BeforeValidator(_one_or_six)] = Field(
-        0.0, description="about its centre of mass, kg m^2: one number, or the tensor's six"
+    inertia: Annotated[Number | Six, BeforeValidator(_one_or_six)] = key(
+        "about its centre of mass, kg m^2: one number, or the tensor's six", 0.0
     )
 
     def on(self, robot: Manipulator) -> Manipulator:
@@ -68,24 +73,18 @@ class PayloadTable(Table):
 class CycleTable(Table):
     """`[[cycles]]`: a motion along lines through points, or the standard pick-and-place."""
 
-    points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] | None = Field(
-        None, description="of the tool, from the workspace's middle, m; angles may follow, rad"
+    points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] | None = key(
+        "of the tool, from the workspace's middle, m; angles may follow, rad", None
     )
-    times: tuple[Number, ...] | None = Field(
-        None, description="when it rests at each of them, s, from 0"
+    times: tuple[Number, ...] | None = key("when it rests at each of them, s, from 0", None)
+    duration: Positive | None = key(
+        "of the whole, s; left out, what [motion] acceleration gives", None
     )
-    duration: Positive | None = Field(
-        None, description="of the whole, s; left out, what [motion] acceleration gives"
-    )
-    corner: Least = Field(0.0, description="metres from a point at which it leaves its lines")
-    scale: Positive | None = Field(
-        None, description="of the standard pick-and-place, in place of points"
-    )
-    direction: Three | None = Field(None, description="where that goes across")
-    dwell: Least = Field(0.0, description="rest after it, s")
-    anywhere: bool = Field(
-        False, description="whether loads count at all its places and turns in the workspace"
-    )
+    corner: Least = key("metres from a point at which it leaves its lines", 0.0)
+    scale: Positive | None = key("of the standard pick-and-place, in place of points", None)
+    direction: Three | None = key("where that goes across", None)
+    dwell: Least = key("rest after it, s", 0.0)
+    anywhere: bool = key("whether loads count at all its places and turns in the workspace", False)
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -146,11 +145,11 @@ class CycleTable(Table):
 class ErrorsTable(Table):
     """`[errors]`: what the machine's accuracy is worked out from, each to either side."""
 
-    encoder: Each = Field((0.0,), description="errors of the joints, m or rad")
-    backlash: Each = Field((0.0,), description="whole play of the drives at their joints, m or rad")
-    point: Least = Field(0.0, description="tolerance of every joint's place, m")
-    length: Least = Field(0.0, description="of every link's length, m")
-    angle: Least = Field(0.0, description="of every axis, rad")
+    encoder: Each = key("errors of the joints, m or rad", (0.0,))
+    backlash: Each = key("whole play of the drives at their joints, m or rad", (0.0,))
+    point: Least = key("tolerance of every joint's place, m", 0.0)
+    length: Least = key("of every link's length, m", 0.0)
+    angle: Least = key("of every axis, rad", 0.0)
 
     @property
     def tolerances(self) -> Tolerances:
@@ -162,9 +161,9 @@ class ErrorsTable(Table):
 class SectionTable(Table):
     """A link's section: a round tube, a rod, or a square tube, of steel or aluminium."""
 
-    diameter: Positive | None = Field(None, description="of a round one, m")
-    side: Positive | None = Field(None, description="of a square one, m")
-    wall: Positive | None = Field(None, description="m; left out, a round one is full")
+    diameter: Positive | None = key("of a round one, m", None)
+    side: Positive | None = key("of a square one, m", None)
+    wall: Positive | None = key("m; left out, a round one is full", None)
     material: Literal["steel", "aluminium"] = "steel"
 
     @model_validator(mode="after")
@@ -189,13 +188,13 @@ class SectionTable(Table):
 class ElasticityTable(Table):
     """`[elasticity]`: what gives way under a force on the tool; what is left out is rigid."""
 
-    force: Positive | None = Field(None, description="on the tool, in any direction, N")
-    actuators: Annotated[tuple[Positive, ...], BeforeValidator(_numbers)] | None = Field(
-        None, description="stiffness of the drives at their joints, N/m or N m/rad"
+    force: Positive | None = key("on the tool, in any direction, N", None)
+    actuators: Annotated[tuple[Positive, ...], BeforeValidator(_numbers)] | None = key(
+        "stiffness of the drives at their joints, N/m or N m/rad", None
     )
-    upper: SectionTable | None = Field(None, description="of upper links or cranks")
-    lower: SectionTable | None = Field(None, description="of lower links or rods")
-    rod_distance: Positive | None = Field(None, description="of a pair of rods, m")
+    upper: SectionTable | None = key("of upper links or cranks", None)
+    lower: SectionTable | None = key("of lower links or rods", None)
+    rod_distance: Positive | None = key("of a pair of rods, m", None)
 
     @model_validator(mode="after")
     def _some(self) -> Self:
@@ -214,4 +213,4 @@ class ElasticityTable(Table):
 class MotorsTable(Table):
     """`[motors]`: the motors to choose from, for `motor_margin`."""
 
-    file: str = Field(description="a CSV, Parquet or TOML file beside this one")
+    file: str = key("a CSV, Parquet or TOML file beside this one")

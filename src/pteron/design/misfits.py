@@ -13,6 +13,7 @@ from pteron.errors import PteronError
 from pteron.indices import INDICES
 from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator
+from pteron.motion import limits_of
 
 
 def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
@@ -53,8 +54,7 @@ def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
     for name in sorted(asked & INDICES.keys()):
         if INDICES[name].turning and not robot.platform.angles:
             yield f"{name}: about turning, but the platform of {robot.name} does not turn"
-    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
-    if "drive_load" in asked and not any(d.max_force or d.max_speed for d in drives):
+    if "drive_load" in asked and not _limited(robot):
         yield f"drive_load: no drive of {robot.name} has max_force or max_speed; ask for force"
     named = [o.quantity for o in spec.objectives]
     for name in sorted({name for name in named if named.count(name) > 1}):
@@ -73,6 +73,12 @@ _NEEDS = {
 """Tables that quantities need."""
 
 
+def _limited(robot: Manipulator) -> bool:
+    """Say whether a drive of a machine has limits."""
+    limits = limits_of(robot)
+    return bool(np.isfinite([limits.force, limits.speed]).any())
+
+
 def _missing(spec: Spec, robot: Manipulator, asked: set[str]) -> Iterator[str]:
     """Yield what quantities need and the file does not have."""
     for name, table in _NEEDS.items():
@@ -83,8 +89,7 @@ def _missing(spec: Spec, robot: Manipulator, asked: set[str]) -> Iterator[str]:
     moving = sorted(name for name in asked if name.startswith("cycle_") or name == "motor_margin")
     if moving and not spec.cycles:
         yield f"{', '.join(moving)}: needs [[cycles]], a motion to drive"
-    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
-    if "cycle_time" in asked and not any(d.max_force or d.max_speed for d in drives):
+    if "cycle_time" in asked and not _limited(robot):
         yield (
             f"cycle_time: no drive of {robot.name} has max_force or max_speed in its file, which "
             "say how fast it can be"

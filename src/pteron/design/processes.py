@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
-from multiprocessing.process import BaseProcess
 from threading import Thread
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pteron.errors import PteronError
+from pteron.maps.held_interrupts import held_interrupts
 
 if TYPE_CHECKING:
     import polars as pl
@@ -22,11 +22,52 @@ if TYPE_CHECKING:
 
 _Job = TypeVar("_Job")
 
+_LOOK = 0.2
+"""Seconds after which a wait looks for Ctrl-C."""
+
+
+class Pool(ProcessPoolExecutor):
+    """Processes that leave Ctrl-C to this one, and end with it or where the work is broken off.
+
+    Each calls `begin` with what is given before its first job.
+    """
+
+    def __init__(self, workers: int, begin: Callable[..., None], *given: Any) -> None:
+        super().__init__(workers, get_context("spawn"), _begun, (begin, *given))
+        self._others = set(active_children())
+
+    def submit(self, function: Any, /, *given: Any, **named: Any) -> Future[Any]:
+        """Give the processes a call, and start one where none is free."""
+        with held_interrupts():
+            return super().submit(function, *given, **named)
+
+    def __exit__(self, kind: Any, *error: Any) -> bool | None:
+        """End the processes, at once where the work is broken off."""
+        if kind is not None:
+            for process in set(active_children()) - self._others:
+                process.terminate()
+        return super().__exit__(kind, *error)
+
+
+def _begun(begin: Callable[..., None], *given: Any) -> None:
+    """Begin a process, which ends with the one that asked, and ignores Ctrl-C as what it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+    begin(*given)
+
+
+def _end_with_parent() -> None:
+    """End this process when that which asked has ended, even if it was killed."""
+    parent = parent_process()
+    assert parent is not None  # this one was spawned
+    parent.join()
+    os._exit(1)
+
 
 class Processes:
     """Processes that hold the task of a search, and return tables of its designs."""
 
-    def __init__(self, pool: ProcessPoolExecutor) -> None:
+    def __init__(self, pool: Pool) -> None:
         self._pool = pool
 
     def tables(
@@ -50,7 +91,7 @@ def _table(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
     import polars as pl
 
     try:
-        found: pl.DataFrame = pl.concat([one.result() for one in pending], rechunk=True)
+        found: pl.DataFrame = pl.concat(map(_result, pending), rechunk=True)
     except BrokenProcessPool:
         raise PteronError(
             "a process that did a part of the work was ended: is there enough memory? what is "
@@ -59,40 +100,21 @@ def _table(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
     return found
 
 
+def _result(pending: Future[pl.DataFrame]) -> pl.DataFrame:
+    # Polars, once imported, lets a wait without end go on through Ctrl-C.
+    while not wait([pending], _LOOK).done:
+        pass
+    return pending.result()
+
+
 @contextmanager
 def processes(task: Task, workers: int) -> Iterator[Processes | None]:
     """Yield so many processes for a task; None where one is asked for, which is this one."""
     if workers < 2:
         yield None
         return
-    context, others = get_context("spawn"), set(active_children())
-    with ProcessPoolExecutor(workers, context, _begin, (task,)) as pool, ended_with(others):
+    with Pool(workers, _begin, task) as pool:
         yield Processes(pool)
-
-
-@contextmanager
-def ended_with(others: set[BaseProcess]) -> Iterator[None]:
-    """End the processes that were started since, where the work is broken off."""
-    try:
-        yield
-    except BaseException:
-        for process in set(active_children()) - others:
-            process.terminate()
-        raise
-
-
-def begin_process() -> None:
-    """Let this process, which was spawned, leave Ctrl-C to the one that asked, and end with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End this process when that which asked has ended, even if it was killed."""
-    parent = parent_process()
-    assert parent is not None  # this one was spawned
-    parent.join()
-    os._exit(1)
 
 
 _task: Any = None
@@ -101,7 +123,6 @@ _task: Any = None
 def _begin(task: Task) -> None:
     global _task
     _task = task
-    begin_process()
 
 
 def _in_process(function: Callable[[Task, Sequence[_Job]], pl.DataFrame], job: _Job) -> Any:

@@ -15,8 +15,8 @@ from pteron.design.worst_cases import worst_position_errors
 from pteron.errors import shown
 from pteron.indices import INDICES, Index, stiffness
 from pteron.kernels import Array
-from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.motion import limits_of
 from pteron.workspace import clearance
 
 Cover = Literal["machine", "proved", "lattice", "places", "fine", "directions", "bound", "cycles"]
@@ -120,10 +120,9 @@ def _stroke(design: Any) -> float:
 
 def _drive_load(design: Any, poses: Array) -> Array:
     """Return the greatest share of what drives can do, force or speed."""
-    drives = [leg.drive or Drive() for leg in design.robot.legs]
-    forces = design.forces(poses) / [drive.max_force or np.inf for drive in drives]
-    speeds = design.speeds(poses) / [drive.max_speed or np.inf for drive in drives]
-    return np.asarray(np.maximum(forces, speeds).max(axis=-1))
+    limits = limits_of(design.robot)
+    shares = design.forces(poses) / limits.force, design.speeds(poses) / limits.speed
+    return np.asarray(np.maximum(*shares).max(axis=-1))
 
 
 def _stiffness(design: Any, poses: Array) -> Array:

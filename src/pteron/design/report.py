@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pteron.design.cycle_loads import MotorMargin, best_motors
+from pteron.design.cycle_loads import best_motors
 from pteron.design.design import Design
 from pteron.design.differences import (
     Change,
@@ -22,6 +22,7 @@ from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
+from pteron.motion import Fit
 
 if TYPE_CHECKING:
     import polars as pl
@@ -99,7 +100,7 @@ class ReportedDesign(Proved):
         return lines
 
 
-def _motor_words(fit: MotorMargin) -> str:
+def _motor_words(fit: Fit) -> str:
     return (
         f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.4g} can do "
         f"{fit.margin:.3g} times what it must, least in {fit.scarcest}"

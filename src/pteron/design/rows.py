@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.design.design import Design
-from pteron.design.evolution import one_thread
 from pteron.design.proofs import proved
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.errors import ModelError
+from pteron.kernels.one_thread import one_thread
 
 if TYPE_CHECKING:
     import polars as pl

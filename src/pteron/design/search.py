@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pteron.design.evolution import Evolution, one_thread
+from pteron.design.evolution import Evolution
 from pteron.design.front import Front, Proofs
 from pteron.design.processes import Processes, processes
 from pteron.design.refine import refined
@@ -26,6 +26,7 @@ from pteron.design.spec import Spec
 from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
+from pteron.kernels.one_thread import one_thread
 from pteron.maps import TableStore, sweep
 from pteron.shapes import Workers
 

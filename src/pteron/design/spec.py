@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
-from pteron.bodies.tables import Count, Number, Table, Two
+from pteron.bodies.tables import Count, Number, Table, Two, key
 from pteron.design.loads import (
     CycleTable,
     ElasticityTable,
@@ -18,6 +18,7 @@ from pteron.design.loads import (
     MotorsTable,
     PayloadTable,
     Positive,
+    listed,
 )
 from pteron.design.quantities import known
 from pteron.errors import DataError, shown
@@ -33,10 +34,6 @@ Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
 """Least value of a measure that is 1 at best."""
 
 
-def _listed(given: Any) -> Any:
-    return [given] if isinstance(given, str) else given
-
-
 def _rising(pair: tuple[float, float]) -> tuple[float, float]:
     low, high = pair
     if not low < high:
@@ -47,17 +44,17 @@ def _rising(pair: tuple[float, float]) -> tuple[float, float]:
 class VariableTable(Table):
     """`[[variables]]`: numbers of the robot's file that move as one."""
 
-    moves: Annotated[tuple[str, ...], BeforeValidator(_listed), Field(min_length=1)] = Field(
-        description='paths such as "legs[1,3].platform_point" or "-legs[2].guide_point.x"'
+    moves: Annotated[tuple[str, ...], BeforeValidator(listed), Field(min_length=1)] = key(
+        'paths such as "legs[1,3].platform_point" or "-legs[2].guide_point.x"'
     )
-    range: Two = Field(description="least and greatest value")
-    by: Literal["value", "factor", "offset"] = Field(
-        "value",
-        description="whether the numbers get the value, their start times it, or their start and "
+    range: Two = key("least and greatest value")
+    by: Literal["value", "factor", "offset"] = key(
+        "whether the numbers get the value, their start times it, or their start and "
         "it; a minus before a path turns the value's sign",
+        "value",
     )
-    each: bool = Field(False, description="whether every leg has a variable of its own")
-    name: str | None = Field(None, description="what tables call it; its first path if left out")
+    each: bool = key("whether every leg has a variable of its own", False)
+    name: str | None = key("what tables call it; its first path if left out", None)
 
     _rises = field_validator("range")(_rising)
 
@@ -69,18 +66,18 @@ class WorkspaceTable(Table):
     machine has most to spare.
     """
 
-    low: tuple[Number, ...] | None = Field(None, description="a box's least x, y, z, m")
-    high: tuple[Number, ...] | None = Field(None, description="a box's greatest x, y, z, m")
-    sides: tuple[Positive, ...] | None = Field(None, description="of a box, in place of these, m")
-    center: tuple[Number, ...] | None = Field(
-        None, description="of a box of sides, a cube or a cylinder, m; left out, it floats"
+    low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
+    high: tuple[Number, ...] | None = key("a box's greatest x, y, z, m", None)
+    sides: tuple[Positive, ...] | None = key("of a box, in place of these, m", None)
+    center: tuple[Number, ...] | None = key(
+        "of a box of sides, a cube or a cylinder, m; left out, it floats", None
     )
-    edge: Positive | None = Field(None, description="of a cube, m")
-    radius: Positive | None = Field(None, description="of a cylinder, m")
-    height: Positive | None = Field(None, description="of a cylinder, m")
-    axis: Literal["x", "y", "z"] = Field("z", description="of a cylinder")
-    samples: Annotated[int, Field(ge=2, le=41, strict=True)] = Field(
-        5, description="poses along each of its sides"
+    edge: Positive | None = key("of a cube, m", None)
+    radius: Positive | None = key("of a cylinder, m", None)
+    height: Positive | None = key("of a cylinder, m", None)
+    axis: Literal["x", "y", "z"] = key("of a cylinder", "z")
+    samples: Annotated[int, Field(ge=2, le=41, strict=True)] = key(
+        "poses along each of its sides", 5
     )
 
     @model_validator(mode="after")
@@ -149,24 +146,22 @@ class WorkspaceTable(Table):
 class FloorsTable(Table):
     """`[floors]`: least measures of the poses of the workspace, or of the cube."""
 
-    type_i: Floor = Field(0.05, description="type-I measure of every leg; 0: it need only reach")
-    type_ii: Floor = Field(
-        0.01, description="type-II measure of the machine; 0: it does not matter"
-    )
+    type_i: Floor = key("type-I measure of every leg; 0: it need only reach", 0.05)
+    type_ii: Floor = key("type-II measure of the machine; 0: it does not matter", 0.01)
 
 
 class MotionTable(Table):
     """`[motion]`: the motion, in every direction, by which drives are judged."""
 
-    speed: Positive = Field(1.0, description="of P in any direction, m/s")
-    acceleration: Positive = Field(10.0, description="of P in any direction, m/s^2")
+    speed: Positive = key("of P in any direction, m/s", 1.0)
+    acceleration: Positive = key("of P in any direction, m/s^2", 10.0)
 
 
 class ObjectiveTable(Table):
     """`[[objectives]]`: one quantity that is to be small, or large."""
 
-    maximise: Annotated[str, Field()] | None = Field(None, description="a quantity")
-    minimise: Annotated[str, Field()] | None = Field(None, description="a quantity")
+    maximise: Annotated[str, Field()] | None = key("a quantity", None)
+    minimise: Annotated[str, Field()] | None = key("a quantity", None)
 
     @field_validator("maximise", "minimise")
     @classmethod
@@ -233,26 +228,26 @@ class RequirementTable(Table):
 class SearchTable(Table):
     """`[search]`: size, length and seed of the search."""
 
-    population: Annotated[int, Field(ge=4, strict=True)] = Field(40, description="designs kept")
-    generations: Count = Field(25, description="how many")
-    refined: Annotated[int, Field(ge=0, strict=True)] = Field(
-        4, description="designs of each generation that are improved by gradients"
+    population: Annotated[int, Field(ge=4, strict=True)] = key("designs kept", 40)
+    generations: Count = key("how many", 25)
+    refined: Annotated[int, Field(ge=0, strict=True)] = key(
+        "designs of each generation that are improved by gradients", 4
     )
-    seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of all chance")
+    seed: Annotated[int, Field(ge=0, strict=True)] = key("of all chance", 0)
 
 
 class Spec(Table):
     """A search for a design, as its file has it."""
 
-    robot: str = Field(description="the machine to begin with: a catalog name or a TOML file")
-    pose: tuple[Number, ...] | None = Field(
-        None, description="its orientation is the cube's; all zero if left out"
+    robot: str = key("the machine to begin with: a catalog name or a TOML file")
+    pose: tuple[Number, ...] | None = key(
+        "its orientation is the cube's; all zero if left out", None
     )
-    angles: tuple[Number, ...] | None = Field(
-        None, description="several angles that workspace and cube must allow, rad"
+    angles: tuple[Number, ...] | None = key(
+        "several angles that workspace and cube must allow, rad", None
     )
-    masses: Literal["per length", "kept"] = Field(
-        "per length", description="what a link's inertia does when its length changes"
+    masses: Literal["per length", "kept"] = key(
+        "what a link's inertia does when its length changes", "per length"
     )
     variables: Annotated[list[VariableTable], Field(min_length=1)]
     objectives: Annotated[list[ObjectiveTable], Field(min_length=1)]

@@ -202,14 +202,18 @@ def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Man
 
 
 def _cut(robot: Manipulator, key: str, stock: Stock) -> Manipulator:
-    legs, found = [], False
-    for leg in robot.legs:
-        bodies = dict(leg.bodies)
-        for letter, (own, low, high, _) in leg.extents.items():
-            if own == key:
-                count = getattr(leg, "rods", 1) if key == "lower" else 1
-                bodies[letter], found = stock.link(type(bodies[letter]), low, high, count), True
-        legs.append(leg.with_bodies(bodies))
-    if not found:
+    cut = [cut_links(leg, {key: stock}) for leg in robot.legs]
+    if not any(cut):
         raise ModelError(f"{key}: no link of {robot.name}; upper or lower, which its legs have")
-    return _of_legs(robot, legs)
+    pairs = zip(robot.legs, cut, strict=True)
+    return _of_legs(robot, (leg.with_bodies({**leg.bodies, **links}) for leg, links in pairs))
+
+
+def cut_links(leg: Any, stocks: Mapping[str, Stock]) -> dict[str, Any]:
+    """Return the bodies of those links of a leg that are cut from stock, given by their key."""
+    rods = {"lower": getattr(leg, "rods", 1)}
+    return {
+        letter: stocks[key].link(type(leg.bodies[letter]), low, high, rods.get(key, 1))
+        for letter, (key, low, high, _) in leg.extents.items()
+        if key in stocks
+    }

@@ -16,10 +16,12 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from importlib.metadata import version
 from itertools import islice
+from multiprocessing import resource_tracker
 from typing import Any, Protocol, TypeVar
 
 from pteron.errors import DataError, PteronError
 from pteron.extras import of_extra
+from pteron.maps.held_interrupts import held_interrupts
 from pteron.shapes import Workers
 
 _Chunk = TypeVar("_Chunk")
@@ -232,10 +234,17 @@ def _quiet() -> Iterator[None]:
 
 def local_workers(count: int | None) -> Any:
     """Return a cluster of processes of this computer."""
-    # One thread each: its kernels then share no lock with another's.
-    return _distributed().LocalCluster(
-        n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
-    )
+    cluster = _distributed().LocalCluster
+    if os.name == "posix":
+        resource_tracker.ensure_running()
+    with held_interrupts():
+        # One thread each: its kernels then share no lock with another's.
+        return cluster(
+            n_workers=count,
+            threads_per_worker=1,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        )
 
 
 @contextmanager

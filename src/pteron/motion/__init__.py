@@ -30,7 +30,6 @@ if TYPE_CHECKING:
         simulate_many as simulate_many,
     )
     from pteron.motion.sizing.common_choice import (
-        CommonFit as CommonFit,
         alike_legs as alike_legs,
         choose_common as choose_common,
     )
@@ -41,7 +40,11 @@ if TYPE_CHECKING:
     )
     from pteron.motion.sizing.drive_margins import DriveMargin as DriveMargin
     from pteron.motion.sizing.gearing import Span as Span
-    from pteron.motion.sizing.motor_choice import Fit as Fit, choose as choose
+    from pteron.motion.sizing.motor_choice import (
+        CommonFit as CommonFit,
+        Fit as Fit,
+        choose as choose,
+    )
     from pteron.motion.sizing.motors import Motor as Motor, read_motors as read_motors
     from pteron.motion.sizing.places import Place as Place, placed as placed
     from pteron.motion.sizing.size import size as size

@@ -1,10 +1,22 @@
-"""Boxes of poses cut in two, for searches and proofs by branch and bound."""
+"""Boxes of poses cut in two, and poses of which some coordinates vary."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from pteron.kernels import Array
+
+
+def varied(pose: Array, values: Array, where: Any = None) -> Array:
+    """Return poses (..., m) with values (..., k) for some coordinates, the others as in a pose.
+
+    `where` says for which, such as their indices (k,); by default they are the first.
+    """
+    found = np.broadcast_to(pose, (*values.shape[:-1], pose.shape[-1])).copy()
+    found[..., slice(values.shape[-1]) if where is None else where] = values
+    return found
 
 
 def halved(boxes: Array, sizes: Array | float = 1.0) -> Array:

@@ -17,6 +17,8 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 from pteron.kernels.bisection import bisected
+from pteron.kernels.one_thread import one_thread
+from pteron.workspace.boxes import varied
 from pteron.workspace.lattice_minima import failing_between
 from pteron.workspace.samples import Samples, Shape, lattice
 from pteron.workspace.smooth_conditions import SmoothConditions
@@ -118,7 +120,7 @@ class Program:
             _, places = self.on_lattice(geometry, axes, fixed)
             at = (places - center) / (0.5 * edge)
             units.append(at[self.shape.gauge(at) <= 1.0])
-            poses.append(_turned(np.zeros_like(units[-1]), fixed))
+            poses.append(varied(fixed, np.zeros_like(units[-1])))
         every = np.concatenate(units)
         return Samples(np.concatenate(poses), every, np.ones(len(every)))
 
@@ -132,12 +134,12 @@ class Program:
         count = len(axes)
 
         def slopes(places: Array) -> tuple[Array, Array]:
-            poses = _turned(places, fixed)
+            poses = varied(fixed, places)
             rows, slopes = self.conditions.slopes(geometry, poses, self.side)
             return rows, slopes[..., :count]
 
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        rows = self.conditions.rows(geometry, _turned(grid, fixed), self.side)
+        rows = self.conditions.rows(geometry, varied(fixed, grid), self.side)
         known = self.failing if self.failing is not None else self.orientations[:0]
         known = known[(known[:, count:] == fixed[count:]).all(axis=1)]
         fails = self.conditions.rows(geometry, known, self.side) > _ROUNDING
@@ -145,6 +147,7 @@ class Program:
         return rows, np.concatenate([failing_between(slopes, axes, rows), known])
 
 
+@one_thread()
 def improved(program: Program, samples: Samples, dense: Samples) -> Array:
     """Return unknowns of a smaller objective, which keep the conditions at all samples.
 
@@ -152,7 +155,8 @@ def improved(program: Program, samples: Samples, dense: Samples) -> Array:
     kept, so that what it has reached can always be used.
 
     Conditions are asked at `samples` at first, and the solution is tested at `dense`. It is the
-    start where that does not keep the conditions itself.
+    start where that does not keep the conditions itself. The same is found whatever the number of
+    threads: a proof of it can be done again.
     """
     everywhere, good = samples.joined(dense), program.start
     if not program.keeps(everywhere, good):
@@ -175,13 +179,6 @@ def improved(program: Program, samples: Samples, dense: Samples) -> Array:
         if length > _FULL and gain < _GAIN * abs(float(program.objective @ good)):
             break
     return good
-
-
-def _turned(positions: Array, fixed: Array) -> Array:
-    """Return poses (..., m) at positions (..., k), the other coordinates those of a pose."""
-    count = positions.shape[-1]
-    rest = np.broadcast_to(fixed[count:], (*positions.shape[:-1], len(fixed) - count))
-    return np.concatenate([positions, rest], axis=-1)
 
 
 def _feasible_step(program: Program, samples: Samples, good: Array, z: Array) -> float:

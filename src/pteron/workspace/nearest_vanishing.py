@@ -18,7 +18,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
-from pteron.workspace.boxes import halved
+from pteron.workspace.boxes import halved, varied
 from pteron.workspace.vanishing import Vanishing
 
 SINGULAR = 1e-10
@@ -157,9 +157,8 @@ class Search:
         return length, np.sqrt(np.where(most > 0.0, most, 1.0))
 
     def _pose(self, state: Array) -> Array:
-        found = np.broadcast_to(self.at, (*state.shape[:-1], len(self.at))).copy()
-        found[..., self.moving] += self._sizes[0] * state[..., : len(self.moving)]
-        return found
+        ways = self._sizes[0] * state[..., : len(self.moving)]
+        return varied(self.at, self.at[self.moving] + ways, self.moving)
 
     def _length(self, state: Array) -> float:
         return self._sizes[0] * float(np.linalg.norm(state[: len(self.moving)]))
@@ -306,9 +305,7 @@ class Search:
 
     def _whole(self, boxes: Array) -> Array:
         """Return boxes (B, 2, m) of poses."""
-        found = np.broadcast_to(self.at, (len(boxes), 2, len(self.at))).copy()
-        found[:, :, self.moving] = boxes
-        return found
+        return varied(self.at, boxes, self.moving)
 
     def _distances(self, boxes: Array) -> Array:
         """Return how far the nearest places of boxes (B, 2, k) are."""

@@ -18,7 +18,7 @@ from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
-from pteron.workspace.boxes import halved
+from pteron.workspace.boxes import halved, varied
 from pteron.workspace.conditions import Condition, IntervalTest, conditions, interval_test
 from pteron.workspace.enclosing import enclosing_box
 from pteron.workspace.volume import expect_places
@@ -89,7 +89,7 @@ class Paving:
 
     def corners(self, boxes: Array) -> tuple[Array, Array]:
         """Return least and greatest poses (B, m), each, of boxes (B, 2, k)."""
-        return _whole(self.box, np.flatnonzero(self.box[0] < self.box[1]), boxes)
+        return _corners(self.box, np.flatnonzero(self.box[0] < self.box[1]), boxes)
 
     def boundary_of(self, condition: Condition) -> Array:
         """Return the boxes (B, 2, k) of the boundary in which a condition is all that is undecided.
@@ -271,7 +271,7 @@ def _refined(
             part, still = left[start : start + _SLICE], open_[start : start + _SLICE]
             if not first:
                 part, still = halved(part), np.repeat(still, 2)
-            outside, still = test(*_whole(box, moving, part), still)
+            outside, still = test(*_corners(box, moving, part), still)
             sure = (still == 0) & ~outside
             found.append(part[sure])
             kept.append(part[~sure & ~outside])
@@ -288,8 +288,6 @@ def _refined(
     return np.concatenate(found), left, True
 
 
-def _whole(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, Array]:
+def _corners(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, Array]:
     """Return the corners (B, m), each, of boxes (B, 2, k) of the coordinates that vary."""
-    low, high = (np.repeat(corner[None], len(boxes), axis=0) for corner in box)
-    low[:, moving], high[:, moving] = boxes[:, 0], boxes[:, 1]
-    return low, high
+    return varied(box[0], boxes[:, 0], moving), varied(box[1], boxes[:, 1], moving)

@@ -14,6 +14,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
+from pteron.workspace.boxes import varied
 from pteron.workspace.volume import bounding_box
 
 REACHABLE = 0
@@ -67,10 +68,7 @@ class ReachSlice:
     @property
     def poses(self) -> Array:
         """The poses of the grid, shape (B, A, m), m and rad."""
-        found = np.broadcast_to(self.center, (*self.status.shape, len(self.center))).copy()
-        i, j = self.places
-        found[..., i], found[..., j] = self.first, self.second[:, None]
-        return found
+        return _grid(self.center, self.places, self.first, self.second)
 
 
 def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
@@ -159,13 +157,14 @@ def reach_slice(
         extent = (float(low[i]), float(high[i]), float(low[j]), float(high[j]))
     first = np.linspace(extent[0], extent[1], points)
     second = np.linspace(extent[2], extent[3], points)
-    poses = np.broadcast_to(pose, (points, points, robot.freedom)).copy()
-    poses[..., i] = first
-    poses[..., j] = second[:, None]
-
+    poses = _grid(pose, (i, j), first, second)
     leg_margins = numeric(robot, "reach")(poses)[0]
     status, margin, _ = numeric(robot, "standing")(poses)
     return ReachSlice(plane, pose, first, second, status.astype(int), margin, leg_margins, (i, j))
+
+
+def _grid(center: Array, places: tuple[int, int], first: Array, second: Array) -> Array:
+    return varied(center, np.stack(np.meshgrid(first, second), axis=-1), list(places))
 
 
 def reached(cut: ReachSlice) -> tuple[float, float, float, float]:

@@ -15,6 +15,7 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike, Seed
+from pteron.workspace.boxes import varied
 from pteron.workspace.margins import distance_to_limits
 
 _SAMPLES = 20_000
@@ -128,8 +129,7 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
 
     def depths(p: Array) -> Array:
         """Return how far inside every bound positions are, m."""
-        at = np.broadcast_to(given, (*p.shape[:-1], len(given))).copy()
-        at[..., :count] = p
+        at = varied(given, p)
         limits = distance_to_limits(robot, at)
         return np.concatenate([numeric(robot, "reach")(at)[0], np.minimum(limits, _FAR)], axis=-1)
 
@@ -254,9 +254,8 @@ def reach_volume(
     expect_to_fit("count", count, 4.0 * count * robot.freedom)
     given = checked_one(robot, pose, "pose")
     box = bounding_box(robot, given)
-    poses = np.tile(given, (count, 1))
     size = (count, len(box[0]))
-    poses[:, : size[1]] = np.random.default_rng(seed).uniform(box[0], box[1], size)
+    poses = varied(given, np.random.default_rng(seed).uniform(box[0], box[1], size))
     margin = numeric(robot, "reach")(poses)[0]
     share = float((np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0).mean())
     whole = float(np.prod(box[1] - box[0]))

@@ -244,13 +244,8 @@ def _reached(
     cycle, k = place
     path = _Moved(cycle.at(np.array([k])), one.middle)
     # Drives are left what the margin asks for.
-    share = case.job.motors.margin
-    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
-    limits = limits_of(
-        robot,
-        force=[(d.max_force or np.inf) / share for d in drives],
-        speed=[(d.max_speed or np.inf) / share for d in drives],
-    )
+    share, own = case.job.motors.margin, limits_of(robot)
+    limits = replace(own, force=own.force / share, speed=own.speed / share)
     with suppress(PteronError):  # TOPP-RA is an extra
         return {"shortest_time": time_optimal(robot, path, limits).duration}
     return {}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import active_children, get_context
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,12 @@ from pteron.design.choosing.drives import GEARBOXES, MOTORS, Options, read_lists
 from pteron.design.choosing.job import Job
 from pteron.design.choosing.kinds import Kind, fitting_kinds
 from pteron.design.choosing.rating import Case
-from pteron.design.choosing.samples import half_sides
 from pteron.design.choosing.search import search_kind
-from pteron.design.evolution import one_thread
-from pteron.design.processes import begin_process, ended_with
+from pteron.design.processes import Pool
 from pteron.errors import DataError, PteronError
 from pteron.json_values import json_ready
 from pteron.kernels.kept import EQUATIONS, name_of
+from pteron.kernels.one_thread import one_thread
 from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
 
@@ -169,7 +168,7 @@ def cases_of(job: Job) -> dict[str, Case]:
             '"rated_power"'
         )
     names = [name for name in names if _driven(name, options, job)]
-    needed = 2.0 * float(half_sides(job).max())
+    needed = 2.0 * float(job.workspace.half.max())
     tool = job.payload.tool
     kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
     found = {kind.name: Case(job, kind, options) for kind in kinds}
@@ -206,9 +205,8 @@ def _searched(
         for name, case in cases.items():
             yield name, _candidate(case, partial(tell, name))
         return
-    context, others = get_context("spawn"), set(active_children())
-    done = context.Array("d", len(cases))
-    with ProcessPoolExecutor(workers, context, _begin, (done,)) as pool, ended_with(others):
+    done = get_context("spawn").Array("d", len(cases))
+    with Pool(workers, _begin, done) as pool:
         jobs = {
             pool.submit(_in_process, case, k): name for k, (name, case) in enumerate(cases.items())
         }
@@ -228,7 +226,6 @@ _shares: Any = None
 def _begin(shares: Any) -> None:
     global _shares
     _shares = shares
-    begin_process()
 
 
 def _in_process(case: Case, k: int) -> Candidate:

@@ -14,12 +14,13 @@ import numpy as np
 
 from pteron.design.choosing.job import Job
 from pteron.design.choosing.job_tables import CycleTable
-from pteron.design.choosing.samples import INSIDE, half_sides, of_platform, shifted, tilts, wide
+from pteron.design.choosing.samples import INSIDE, of_platform, shifted, tilts, wide
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Path, line_path, there_and_back
 from pteron.motion.trajectories.time_polynomials import polynomial
+from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
 
 _DIRECTIONS = 4
@@ -101,9 +102,13 @@ class Places:
 
     @cached_property
     def states(self) -> Curve:
-        """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s."""
-        curve = _timed(self.path, np.linspace(0.0, 1.0, self.samples))
-        return self.moved(*curve)
+        """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s.
+
+        It goes from rest to rest by quintics, all of the same greatest acceleration.
+        """
+        spans = np.sqrt(np.diff(self.path.rests)).tolist()
+        timed = timed_path(self.path, spans, [polynomial("quintic")] * len(spans))
+        return self.moved(*timed.curve(np.linspace(0.0, 1.0, self.samples)))
 
     def moved(self, *curve: Array) -> Curve:
         """Return poses of the tool (K, m) and two derivatives as P's (B, K, m), at all places."""
@@ -142,7 +147,7 @@ def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
     kept = list(_fitting(job, robot, poses, cycle.anywhere))
     if not kept:
         size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(wide(given[:, : job.lengths]), axis=0))
-        room = " x ".join(f"{2e3 * x:.0f}" for x in half_sides(job))
+        room = " x ".join(f"{2e3 * x:.0f}" for x in job.workspace.half)
         where = "" if cycle.anywhere else " where it is (anywhere = false)"
         raise DataError(
             f"cycles[{k}]: {size} mm does not fit into the workspace of {room} mm{where}"
@@ -158,7 +163,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
     A neighbour is turned by a part of the angle between directions, or shifted by that part of
     half the workspace or of the range of turns.
     """
-    half, count = half_sides(job), len(cycle.robot.platform.lengths)
+    half, count = job.workspace.half, len(cycle.robot.platform.lengths)
     poses = cycle.path.at(np.linspace(0.0, cycle.path.length, _IN_CYCLE))[0]
     path, last, found = wide(poses[:, :count]), poses[:, -1], []
     limits = np.full((2, cycle.robot.freedom), np.nan)
@@ -171,8 +176,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
     ways = np.vstack([np.zeros_like(steps), np.diag(steps), -np.diag(steps)])
     for k, way in product(chosen, (-1.0, 0.0, 1.0) if cycle.anywhere else (0.0,)):
         turn = float(cycle.turns[k] + way * part * np.pi / _DIRECTIONS)
-        turned = path.copy()
-        turned[:, :2] = path[:, :2] @ _plane(np.array([turn]))[0].T
+        turned = _turned(path, turn)
         limits[:, :count] = (
             (-half - turned.min(axis=0))[:count],
             (half - turned.max(axis=0))[:count],
@@ -181,8 +185,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
             continue
         shifts = cycle.shifts[k] + (ways if cycle.anywhere else 0.0 * ways[:1])
         for shift in np.unique(np.fmax(np.fmin(shifts, limits[1]), limits[0]), axis=0):
-            shares = (s for s in _SHARES if _holds(job, half, turned + s * wide([shift[:count]])))
-            if (share := next(shares, None)) is not None:
+            if (share := _share(job, turned, wide([shift[:count]])[0])) is not None:
                 found.append((np.append(share * shift[:count], shift[count:]), turn))
     return replace(
         cycle, shifts=np.array([s for s, _ in found]), turns=np.array([t for _, t in found])
@@ -194,30 +197,31 @@ def _plane(turns: Array) -> Array:
     return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
 
 
+def _turned(path: Array, turn: float) -> Array:
+    """Return places (K, 3) turned about the upright."""
+    return np.column_stack([path[:, :2] @ _plane(np.array([turn]))[0].T, path[:, 2]])
+
+
 def _fitting(
     job: Job, robot: Manipulator, poses: Array, anywhere: bool
 ) -> Iterator[tuple[Array, float]]:
     """Yield shifts (m,) and turns of a path (K, m): its outermost places in the workspace."""
-    half, count = half_sides(job), len(robot.platform.lengths)
+    half, count = job.workspace.half, len(robot.platform.lengths)
     path = wide(poses[:, :count])
     directions = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS if anywhere else [0.0]
     own = poses[:, count:]
     around = list(_angles(job, robot, own)) if anywhere and own.size else [np.zeros(own.shape[1])]
     for turn in directions:
-        turned = path.copy()
-        turned[:, :2] = path[:, :2] @ _plane(np.array([turn]))[0].T
+        turned = _turned(path, turn)
         low, high = -half - turned.min(axis=0), half - turned.max(axis=0)
         ends = [
             sorted({a, b}) if b > a else [0.5 * (a + b)] for a, b in zip(low, high, strict=True)
         ]
         shifts = np.array(list(product(*ends))) if anywhere else np.zeros((1, 3))
         for shift in shifts:
-            # Of a cylinder the corner of its box is outside: as far towards it as can be.
-            for share in _SHARES:
-                if _holds(job, half, turned + share * shift):
-                    place = (share * shift)[:count]
-                    yield from ((np.append(place, angles), float(turn)) for angles in around)
-                    break
+            if (share := _share(job, turned, shift)) is not None:
+                place = (share * shift)[:count]
+                yield from ((np.append(place, angles), float(turn)) for angles in around)
 
 
 def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
@@ -233,22 +237,17 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
         yield from shifted(own, float(end))
 
 
-def _holds(job: Job, half: Array, points: Array) -> bool:
-    space = job.workspace
-    inside = (np.abs(points) <= half + INSIDE).all()
-    if space.radius is not None:
-        inside &= (np.linalg.norm(points[:, :2], axis=1) <= space.radius + INSIDE).all()
-    return bool(inside)
+def _share(job: Job, path: Array, shift: Array) -> float | None:
+    """Return how much of a shift a path (K, 3) can go and stay in the workspace; None for nothing.
 
-
-def _timed(path: Path, times: Array) -> tuple[Array, Array, Array]:
-    """Return states (K, m) at times (K,) of 0 to 1: quintics between rests."""
-    ends = np.array(path.rests)
-    spans = np.sqrt(np.diff(ends))
-    knots = np.concatenate([[0.0], np.cumsum(spans) / spans.sum()])
-    j = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(spans) - 1)
-    span, length = np.diff(knots)[j], np.diff(ends)[j]
-    share, rate, gain = polynomial("quintic")((times - knots[j]) / span)
-    pose, first, second = path.at(ends[j] + length * share)
-    speed, rise = (length * rate / span)[:, None], (length * gain / span**2)[:, None]
-    return pose, first * speed, second * speed**2 + first * rise
+    Of a cylinder the corner of its box is outside: it goes as far towards it as can be.
+    """
+    space, half = job.workspace, job.workspace.half
+    for share in _SHARES:
+        points = path + share * shift
+        inside = (np.abs(points) <= half + INSIDE).all()
+        if space.radius is not None:
+            inside &= (np.linalg.norm(points[:, :2], axis=1) <= space.radius + INSIDE).all()
+        if inside:
+            return float(share)
+    return None

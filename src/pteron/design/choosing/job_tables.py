@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, Table, Three, Two, key
-from pteron.design.loads import Least, PayloadTable, Positive
+from pteron.design.loads import Least, PayloadTable, Positive, listed
 from pteron.design.spec import Floor
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -25,10 +25,6 @@ _LEANS = 1.5
 
 _TURNS = 7.0
 """Radians from which on a turn was probably given in degrees."""
-
-
-def _listed(given: Any) -> Any:
-    return [given] if isinstance(given, str) else given
 
 
 def _near(given: Any) -> Any:
@@ -58,7 +54,7 @@ def _near_points(given: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     return given
 
 
-Names = Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)]
+Names = Annotated[list[str], BeforeValidator(listed), Field(min_length=1)]
 """One name, or some."""
 
 Near = Annotated[Positive, AfterValidator(_near)]

@@ -16,7 +16,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, Radii, load
-from pteron.manipulator.dimensions import Stock
+from pteron.manipulator.dimensions import Stock, cut_links
 from pteron.toml import told
 from pteron.workspace import home_pose
 
@@ -223,11 +223,7 @@ def _bodies(
         found[letter] = body.of_values(grown)
         if slides(leg) and letter == "p":
             found[letter] = body.of_values([links.carriage] + [0.0] * (len(grown) - 1))
-        key, low, high, _ = leg.extents.get(letter, ("", 0.0, 0.0, ""))
-        if key in stocks:
-            count = getattr(leg, "rods", 1) if key == "lower" else 1
-            found[letter] = stocks[key].link(type(body), low, high, count)
-    return found
+    return found | cut_links(leg, stocks)
 
 
 def fitting_kinds(asked: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:

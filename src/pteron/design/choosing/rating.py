@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from pteron.design.choosing.cycles import Places, cycles_of
-from pteron.design.choosing.drives import JointLoads, Option, Options
+from pteron.design.choosing.drives import JointLoads, Option, Options, power
 from pteron.design.choosing.job import OBJECTIVES, Job
 from pteron.design.choosing.kinds import Kind, slides
 from pteron.design.choosing.room import Room
-from pteron.design.choosing.samples import about_the_worst, half_sides, sample_poses
+from pteron.design.choosing.samples import about_the_worst, sample_poses
 from pteron.design.choosing.tool import (
     compliance_with,
     compliances,
@@ -119,7 +119,7 @@ class Case:
         states = (c.states[0].reshape(-1, kind.robot.freedom) for c in self.every_cycle)
         self.between = np.vstack([self.poses[:0], *(states if job.workspace.poses else ())])
         self.visited = np.vstack([self.poses, self.between])
-        self.half = half_sides(job)
+        self.half = job.workspace.half
         self.room = Room(job, kind.robot)
 
     @cached_property
@@ -269,9 +269,7 @@ class Case:
         friction = np.array([option.drive.coulomb for option in found.options])
         found.figures |= {
             "price": float(sum(o.price for o in found.options)),
-            "rated_power": float(
-                sum(o.motor.rated_torque * o.motor.max_speed for o in found.options)
-            ),
+            "rated_power": float(sum(map(power, found.options))),
             "moving_mass": moving_mass(found.robot),
             "energy": self._energy([float((w + way @ friction).max()) for w, way in work]),
             "cycle_time": given.get("time", 0.0),

@@ -71,7 +71,7 @@ def about_the_worst(
     places = _places(job, robot, along)
     values = values_of(_poses_at(job, robot, places))
     steps = np.zeros(robot.freedom)
-    steps[:count] = half_sides(job)[:count] / (along - 1)
+    steps[:count] = job.workspace.half[:count] / (along - 1)
     if space.tilt is not None:
         steps[count : count + 2] = 0.5 * space.tilt
     if space.turn is not None and space.directions is None:
@@ -103,7 +103,7 @@ def _ways(steps: Array, count: int) -> Array:
 
 def _into(job: Job, places: Array, count: int) -> Array:
     """Return places (N, m) brought into the workspace where they are outside."""
-    space, half, found = job.workspace, half_sides(job)[:count], places.copy()
+    space, half, found = job.workspace, job.workspace.half[:count], places.copy()
     if space.poses is None:
         found[:, :count] = np.clip(found[:, :count], -half, half)
     if space.radius is not None:
@@ -149,11 +149,6 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     return found
 
 
-def half_sides(job: Job) -> Array:
-    """Return half the sides (3,) of the box about the workspace, m."""
-    return job.workspace.half
-
-
 def wide(rows: object) -> Array:
     """Return rows of two or three numbers with three."""
     found = np.asarray(rows, dtype=float)
@@ -161,7 +156,7 @@ def wide(rows: object) -> Array:
 
 
 def _positions(job: Job, along: int) -> Array:
-    space, half = job.workspace, half_sides(job)
+    space, half = job.workspace, job.workspace.half
     if space.poses is not None:
         given = wide(space.poses)
         return np.asarray(given - 0.5 * (given.min(axis=0) + given.max(axis=0)))

@@ -4,61 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-import scipy  # type: ignore[import-untyped]
-
-from pteron.arguments import expect
 from pteron.legs import LegKind
 from pteron.manipulator import RobotLike, as_manipulator
-from pteron.motion.sizing.drive_loads import HOLDING, Sizing, best_ratio, mean_squares
-from pteron.motion.sizing.gearing import Span
-from pteron.motion.sizing.motor_choice import (
-    Fit,
-    fast_span,
-    fit_at,
-    order,
-    serving_span,
-)
+from pteron.motion.sizing.drive_loads import Sizing
+from pteron.motion.sizing.motor_choice import CommonFit, suited
 from pteron.motion.sizing.motors import Motor
 
 _ALIKE = 1e-2
 """Relative difference of dimensions up to which legs are alike: more than those of one drawing
 have when they are built and measured."""
-
-_SAME = 1e-9
-"""Relative difference below which ratios are the same."""
-
-
-@dataclass(frozen=True)
-class CommonFit:
-    """A motor at several legs over a cycle, behind the same ratio at each.
-
-    Attributes
-    ----------
-    legs : tuple of int
-        From 1.
-    motor : Motor
-        The motor.
-    span : Span
-        The ratios at which it serves at all of them.
-    ratio : float
-        The one among them at which the largest of the legs' root mean square torques is least,
-        rad/m or rad/rad.
-    fits : tuple of Fit
-        The motor at each leg, at this ratio.
-    """
-
-    legs: tuple[int, ...]
-    motor: Motor
-    span: Span
-    ratio: float
-    fits: tuple[Fit, ...]
-
-    @property
-    def worst(self) -> Fit:
-        """The leg where its least margin is smallest."""
-        return min(self.fits, key=lambda fit: fit.margin)
 
 
 def alike_legs(robot: RobotLike) -> tuple[tuple[int, ...], ...]:
@@ -141,46 +96,4 @@ def choose_common(
     >>> fit.legs, round(fit.ratio)
     ((1, 2, 3), 295)
     """
-    expect(1.0 <= margin < math.inf, "margin", margin, "a number of 1 or more")
-    found = []
-    for legs in alike_legs(sizing.robot):
-        fits = [_common(sizing, legs, motor, margin) for motor in motors]
-        found += sorted(fits, key=lambda one: order(one.motor, one.span, one.worst.margin))
-    return tuple(found)
-
-
-def _common(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> CommonFit:
-    span = fast = Span(0.0, math.inf)
-    for leg in legs:
-        fast = fast.within(fast_span(sizing, leg, motor, margin))
-        span = span.within(serving_span(sizing, leg, motor, margin))
-    least, greatest = span if span else fast
-    ratio = min(max(_best_ratio(sizing, legs, motor.rotor_inertia), least), greatest)
-    if not math.isfinite(ratio):  # the joints only hold: any ratio from the least on serves
-        ratio = least or 1.0
-    fits = tuple(fit_at(sizing, leg, motor, span, ratio) for leg in legs)
-    return CommonFit(legs, motor, span, ratio, fits)
-
-
-def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> float:
-    """Return the ratio at which the largest root mean square torque of all legs is least."""
-    own = [best_ratio(sizing, leg, rotor_inertia) for leg in legs]
-    moving = [ratio for ratio in own if math.isfinite(ratio)]
-    if not moving:
-        return math.inf
-    least, most = min(moving), max(moving)
-    if len(moving) < len(own):  # where a leg only holds, more is better
-        most *= HOLDING
-    if most - least <= _SAME * most:
-        return most
-
-    def largest(log: float) -> float:
-        ratio = math.exp(log)
-        return max(float(mean_squares(sizing, leg, ratio, rotor_inertia).max()) for leg in legs)
-
-    # The largest of convex functions of i^2, which all fall before these bounds and rise behind.
-    bounds = math.log(least), math.log(most)
-    found = scipy.optimize.minimize_scalar(
-        largest, bounds=bounds, method="bounded", options={"xatol": _SAME}
-    )
-    return math.exp(found.x)
+    return tuple(suited(sizing, alike_legs(sizing.robot), motors, margin))

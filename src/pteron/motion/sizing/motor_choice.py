@@ -1,4 +1,4 @@
-"""`choose`: which motors of a list can drive each joint of a cycle, their ratios and margins."""
+"""`choose`: which motors of a list can drive joints in a cycle, their ratios and margins."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 
 from pteron.arguments import expect
-from pteron.motion.sizing.drive_loads import Sizing, best_ratio
+from pteron.motion.sizing.drive_loads import HOLDING, Sizing, best_ratio, mean_squares
 from pteron.motion.sizing.gearing import Span, peak_span, rated_span, speed_span, torques
 from pteron.motion.sizing.motors import Motor
+
+_SAME = 1e-9
+"""Relative difference below which ratios are the same."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,37 @@ class Fit:
         }
 
 
+@dataclass(frozen=True)
+class CommonFit:
+    """A motor at several legs over a cycle, behind the same ratio at each.
+
+    Attributes
+    ----------
+    legs : tuple of int
+        From 1.
+    motor : Motor
+        The motor.
+    span : Span
+        The ratios at which it serves at all of them.
+    ratio : float
+        The one among them at which the largest of the legs' root mean square torques is least,
+        rad/m or rad/rad.
+    fits : tuple of Fit
+        The motor at each leg, at this ratio.
+    """
+
+    legs: tuple[int, ...]
+    motor: Motor
+    span: Span
+    ratio: float
+    fits: tuple[Fit, ...]
+
+    @property
+    def worst(self) -> Fit:
+        """The leg where its least margin is smallest."""
+        return min(self.fits, key=lambda fit: fit.margin)
+
+
 def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[Fit, ...]:
     """Return how each motor suits each joint: first what serves, the smallest motor before others.
 
@@ -109,39 +144,72 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
     >>> fit.fits, round(fit.ratio), round(fit.rated_margin, 1)
     (True, 295, 2.1)
     """
+    alone = [(leg,) for leg in range(1, sizing.robot.joint_count + 1)]
+    return tuple(one.fits[0] for one in suited(sizing, alone, motors, margin))
+
+
+def suited(
+    sizing: Sizing, groups: Sequence[tuple[int, ...]], motors: Sequence[Motor], margin: float
+) -> list[CommonFit]:
+    """Return how each motor suits each group of legs, with one ratio for all of a group.
+
+    What serves comes first in a group, the smallest motor before others; then what comes nearest.
+    """
     expect(1.0 <= margin < math.inf, "margin", margin, "a number of 1 or more")
-    found = []
-    for leg in range(1, sizing.robot.joint_count + 1):
-        fits = [_fit(sizing, leg, motor, margin) for motor in motors]
-        found += sorted(fits, key=lambda fit: order(fit.motor, fit.span, fit.margin))
-    return tuple(found)
+    found: list[CommonFit] = []
+    for legs in groups:
+        found += sorted((_fit(sizing, legs, motor, margin) for motor in motors), key=_order)
+    return found
 
 
-def order(motor: Motor, span: Span, margin: float) -> tuple[bool, float]:
-    """Return the sort key of a motor that serves at these ratios, or comes so near."""
-    return not span, motor.rated_torque * motor.max_speed if span else -margin
+def _order(one: CommonFit) -> tuple[bool, float]:
+    size = one.motor.rated_torque * one.motor.max_speed
+    return not one.span, size if one.span else -one.worst.margin
 
 
-def fast_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
-    """Return the ratios that a motor's speed allows."""
-    return speed_span(sizing, leg, motor.max_speed / margin)
+def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> CommonFit:
+    span = fast = Span(0.0, math.inf)
+    for leg in legs:
+        fast = fast.within(speed_span(sizing, leg, motor.max_speed / margin))
+        span = span.within(serving_span(sizing, leg, motor, margin))
+    least, greatest = span if span else fast
+    ratio = min(max(_best_ratio(sizing, legs, motor.rotor_inertia), least), greatest)
+    if not math.isfinite(ratio):  # the joints only hold: any ratio from the least on serves
+        ratio = least or 1.0
+    fits = tuple(fit_at(sizing, leg, motor, span, ratio) for leg in legs)
+    return CommonFit(legs, motor, span, ratio, fits)
 
 
 def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
     """Return the ratios at which a motor keeps its speed and its torques."""
     rotor = motor.rotor_inertia
-    fast = fast_span(sizing, leg, motor, margin)
-    span = fast.within(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
+    span = speed_span(sizing, leg, motor.max_speed / margin)
+    span = span.within(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
     return span.within(peak_span(sizing, leg, rotor, motor.peak_torque / margin))
 
 
-def _fit(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Fit:
-    span = serving_span(sizing, leg, motor, margin)
-    least, greatest = span if span else fast_span(sizing, leg, motor, margin)
-    ratio = min(max(best_ratio(sizing, leg, motor.rotor_inertia), least), greatest)
-    if not math.isfinite(ratio):  # the joint only holds: any ratio from the least on serves
-        ratio = least or 1.0
-    return fit_at(sizing, leg, motor, span, ratio)
+def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> float:
+    """Return the ratio at which the largest root mean square torque of all legs is least."""
+    own = [best_ratio(sizing, leg, rotor_inertia) for leg in legs]
+    moving = [ratio for ratio in own if math.isfinite(ratio)]
+    if not moving:
+        return math.inf
+    least, most = min(moving), max(moving)
+    if len(moving) < len(own):  # where a leg only holds, more is better
+        most *= HOLDING
+    if most - least <= _SAME * most:
+        return most
+
+    def largest(log: float) -> float:
+        ratio = math.exp(log)
+        return max(float(mean_squares(sizing, leg, ratio, rotor_inertia).max()) for leg in legs)
+
+    # The largest of convex functions of i^2, which all fall before these bounds and rise behind.
+    bounds = math.log(least), math.log(most)
+    found = scipy.optimize.minimize_scalar(
+        largest, bounds=bounds, method="bounded", options={"xatol": _SAME}
+    )
+    return math.exp(found.x)
 
 
 def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> Fit:
