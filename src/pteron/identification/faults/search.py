@@ -26,7 +26,8 @@ _SEEN = 1e-3
 counts."""
 
 _AS_WELL = 0.7
-"""Share of the clearest fault's statistic with which one of fewer sizes is taken in its place."""
+"""Share of the clearest fault's statistic with which one of fewer sizes is taken in its place. Of
+an exact one all must be explained but what noise makes."""
 
 _CLEAR = 3.0
 """Standard deviations of a mixture's size from which it is more than noise."""
@@ -117,8 +118,12 @@ def searched(
         if not best > _BESIDE * first:
             break
         # Of those that explain as much, the one of fewest sizes.
+        clearest = max(clear, key=lambda item: item[0])[1]
+        as_well = _AS_WELL * best
+        if clearest.family.exact:
+            as_well = best - float(scipy.stats.chi2.isf(_CHANCE, clearest.mix.shape[1]))
         _, one = min(
-            (item for item in clear if item[0] >= _AS_WELL * best),
+            (item for item in clear if item[0] >= as_well),
             key=lambda item: (len(item[1].sizes), -item[0]),
         )
         found.append(one)
