@@ -66,6 +66,14 @@ class DriveKind:
         own = [("current", "change")] * any(self.lag) + [("bristle", "yield")] * any(self.lugre)
         return (*(bends if self.bends else ()), *own)
 
+    def parts(self, states: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Return the parts of states (..., Y) by name: `pose`, `velocity` and those of `more`."""
+        n, names = len(self.elastic), [name for name, _ in self.more]
+        m = (states.shape[-1] - n * len(names)) // 2
+        found = {"pose": states[..., :m], "velocity": states[..., m : 2 * m]}
+        starts = range(2 * m, states.shape[-1], n)
+        return found | {name: states[..., k : k + n] for name, k in zip(names, starts, strict=True)}
+
     @property
     def plain(self) -> bool:
         """Whether they are rigid and give at once what they are asked for."""

@@ -1,11 +1,32 @@
-"""The forces that motors give: those asked for, within their curves and windings at a speed."""
+"""The forces that motors give: those asked for within their limits at a speed, or the currents'."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from pteron.equations.transmissions import DriveKind
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+
+
+def given_forces(
+    robot: Manipulator, forces: Array, motor_rates: Array, currents: Array | None
+) -> Array:
+    """Return the forces (..., n) that motors give, of what their drives are told to give.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    forces : array, shape (..., n)
+        What its drives are told, within their `max_force`, N or N m.
+    motor_rates : array, shape (..., n)
+        Rates of the motors, counted at the joints.
+    currents : array, shape (..., n), or None
+        Forces of the currents, where some lag.
+    """
+    found = within_motors(robot, forces, motor_rates)
+    return found if currents is None else np.where(DriveKind.of(robot).lag, currents, found)
 
 
 def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Array:
