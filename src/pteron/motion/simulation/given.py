@@ -6,6 +6,7 @@ import numpy as np
 
 from pteron.equations.transmissions import DriveKind
 from pteron.kernels import Array
+from pteron.legs.motor_limits import within_motor
 from pteron.manipulator import Manipulator
 
 
@@ -43,14 +44,6 @@ def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Arra
     """
     found = np.array(forces, dtype=float)
     for i, leg in enumerate(robot.legs):
-        drive, rates = leg.drive, motor_rates[..., i]
-        if drive and drive.curve:
-            speeds, most = np.array(drive.curve).T
-            most = np.interp(np.abs(rates), speeds, most)
-            found[..., i] = np.clip(found[..., i], -most, most)
-        if drive and drive.winding:
-            winding, gear = drive.winding, abs(drive.gear)
-            stall = gear * winding.torque_constant * winding.voltage / winding.resistance
-            back = (gear * winding.torque_constant) ** 2 / winding.resistance * rates
-            found[..., i] = np.clip(found[..., i], -stall - back, stall - back)
+        if leg.drive:
+            found[..., i] = within_motor(leg.drive, found[..., i], motor_rates[..., i])
     return found
