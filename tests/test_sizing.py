@@ -437,6 +437,9 @@ def test_a_motor_that_gives_too_little_at_a_speed_is_told_with_its_place():
         f"{one.most:.4g} N (curve)"
     )
     assert overloads(robot, found.forces, found.speeds) == (told,)
+    legs[1] = replace(legs[1], drive=pteron.legs.Drive(curve=((0.0, force), (0.5 * speed, 0.0))))
+    none = overloads(replace(bare, legs=tuple(legs)), found.forces, found.speeds)
+    assert none[0].endswith("its drive gives 0 N (curve)")
     here = Place(tuple(cycle("quadrupteron-oblique").pose.mean(axis=0)))
     places = size(robot, cycle("quadrupteron-oblique"), places=[here])
     assert str(here) in places.overloads[0]

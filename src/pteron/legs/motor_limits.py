@@ -69,7 +69,8 @@ def motor_peak(drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.floa
     forces, rates = np.broadcast_arrays(forces, rates)
     side = np.where(forces < 0.0, -1.0, 1.0)
     most = np.maximum(side * within_motor(drive, side * np.inf, rates), 0.0)
-    shares = np.abs(forces) / np.maximum(most, np.finfo(float).tiny)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(forces == 0.0, 0.0, np.abs(forces) / most)
     at = int(np.nan_to_num(shares, nan=-1.0, posinf=np.inf).argmax())
     return MotorPeak(abs(float(forces.flat[at])), float(most.flat[at]), at)
 
