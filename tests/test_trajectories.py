@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
+from pteron.controllers import ComputedTorque
 from pteron.legs.motor_limits import speed_lines
 from pteron.motion import (
     FourierSeries,
@@ -30,6 +31,7 @@ from pteron.motion import (
     point_to_point,
     replay,
     shortest,
+    simulate,
     there_and_back,
     time_optimal,
     with_payload,
@@ -487,6 +489,20 @@ def test_no_motion_asks_more_than_the_motor_gives_at_its_speed(name):
     rates, _, forces = sides(robot, Motion(np.linspace(0.0, 1.0, 1001), *fast), finer=1)
     most = np.interp(np.abs(rates[:, 0]), *np.array(robot.legs[0].drive.curve).T)
     assert told[1].share == pytest.approx((np.abs(forces[:, 0]) / most).max(), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", gated(ASKED, ["random PRR 0"]))
+def test_a_plan_leaves_a_simulated_motor_within_what_it_gives(name):
+    """A controller that follows the plan asks for no more; 1.3 times as fast it does."""
+    robot, cycle = with_motors(name)
+    path = cycle_path(cycle)
+    planned = along(robot, path, duration=1.03 * along(robot, path).duration)
+    parts = planned.pose, 1.3 * planned.velocity, 1.3**2 * planned.acceleration
+    for motion, kept in ((planned, True), (Motion(planned.time / 1.3, *parts), False)):
+        found = simulate(robot, motion, ComputedTorque(), limits=False)
+        assert found.stopped is None
+        assert (found.saturated == 0.0).all() == kept
+        assert (np.abs(found.error).max() < 1e-4) == kept
 
 
 def test_a_hollow_curve_is_kept_by_less_and_a_time_that_it_allows_is_not_refused():
