@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from logs_of_motions import log_of
 from mechanisms import CLIENTS, gated
+from scipy.interpolate import make_interp_spline
 from test_faults import RATE, brisk, clean, found, late_by, noisy
 
 import pteron
@@ -189,6 +190,28 @@ def test_a_slow_clock_is_named_where_weight_tells_it(name):
     assert result.verdict.grade != "trustworthy"
 
 
+@pytest.mark.parametrize("name", gated(["3-rpr", "stewart"], ["3-rpr"]))
+def test_rotors_that_the_model_lacks_are_named_and_no_slow_clock_is_taken_for_them(name):
+    """A ram turns with its leg: no other value takes in a motor's inertia, as a slider's mass does.
+
+    Seen as weight that is too small for the inertia, it was called a clock that runs fast.
+    """
+    robot, log, _ = clean(name)
+    curve = make_interp_spline(log.time, log.joints, k=7)
+    growth = curve(log.time, 2)
+    inertia = 0.5 * log.forces.std(axis=0) / growth.std(axis=0)
+    result = found(robot, noisy(replace(log, forces=log.forces + inertia * growth)))
+    first = result.fault_isolation.faults[0]
+    assert first.fault == "rotors"
+    assert first.matters
+    np.testing.assert_allclose(first.sizes, inertia, atol=5.0 * first.deviations.max())
+    assert "--rotors adds it" in first.message
+    with_them = found(robot, noisy(log), terms=Terms(rotors=True))
+    assert "rotors" not in with_them.fault_isolation.tried
+    slow = found(robot, noisy(replace(log, time=0.97 * log.time)))
+    assert "rotors" not in {one.fault for one in slow.fault_isolation.faults}
+
+
 def test_rotors_heavier_than_what_is_there_are_not_trusted():
     robot, log, _ = clean("delta")
     about = Description(rotor_inertia=(5e-4,) * 3, ratio=(50.0,) * 3)
@@ -297,6 +320,19 @@ def test_forces_held_from_sample_to_sample_are_no_fault_and_spoil_no_value(name)
     true = np.r_[result.model.base.values(robot), friction.values]
     off, spoiled = (np.abs(one.estimate.values - true) for one in (result, left_in))
     assert off.max() < 0.02 * spoiled.max()
+
+
+def test_half_a_sample_that_noise_shows_as_a_little_more_is_taken_out_all_the_same():
+    """0.6 of a sample, two tenths uncertain, was called a delay, and lowered the grade."""
+    robot, log, _ = held("delta")
+    size = 0.08 * np.sqrt((log.forces**2).mean(axis=0))
+    noise = size * np.random.default_rng(2).normal(size=log.forces.shape)
+    log = replace(log, forces=log.forces + noise)
+    left_in = found(robot, log, processing=Processing(delay=0.0))
+    assert left_in.fault_isolation.faults[0].sizes[0] * RATE == pytest.approx(-0.633, abs=0.01)
+    result = found(robot, log)
+    assert result.unknowns.delay < 0.0
+    assert not result.fault_isolation.faults
 
 
 @pytest.mark.parametrize("name", gated(["delta", "par4"], ["delta"]))

@@ -261,7 +261,7 @@ def test_every_family_names_its_columns():
     robot = machine("par4")
     model = identification_model(robot)
     values = np.ones(len(model.names))
-    columns = FaultColumns(model, values, np.ones(4), 0.0, 1.0, families_of(robot))
+    columns = FaultColumns(model, values, np.ones(4), 0.0, 1.0, families_of(model))
     whole = columns.whole
     assert len(whole.names) == len(whole.units) == len(whole.kinds)
     assert columns.places[-1].stop == len(whole.names)

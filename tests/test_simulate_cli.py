@@ -1,6 +1,7 @@
 """`pteron simulate` as a person and a program use it."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
+from pteron.motion import pick_and_place
 
 
 def run(*arguments, code=0):
@@ -80,6 +82,41 @@ def test_a_payload_that_overloads_the_drives_is_refused(weak):
     data = json.loads(anyway.stdout)
     assert data["drives"][2]["at_its_limit"] > 0.5
     assert data["drives"][2]["peak_force"] == 36.0
+
+
+@CLIENTS
+def test_a_motor_that_gives_too_little_at_speed_is_told_by_every_command(tmp_path):
+    """Its greatest force and speed are enough, each by itself."""
+    robot, file, table = pteron.load("five-bar"), tmp_path / "motor.toml", tmp_path / "fast.csv"
+    motion = pick_and_place(robot)
+    rates = np.abs(pteron.kinematics.joint_rates(robot, motion.pose, motion.velocity).actuated)
+    forces = np.abs(pteron.inverse_dynamics(robot, motion.pose, motion.velocity,
+                                            motion.acceleration))  # fmt: skip
+    most = 0.6 * (forces[:, 0] / forces[:, 0].max() + rates[:, 0] / rates[:, 0].max()).max()
+    curve = ((0.0, most * forces[:, 0].max()), (most * rates[:, 0].max(), 0.0))
+    drive = pteron.legs.Drive(curve=curve)
+    pteron.save(replace(robot, legs=(replace(robot.legs[0], drive=drive), robot.legs[1])), file)
+    told = "leg 1: the motion takes .* at a speed at which its drive gives .* N m .curve."
+
+    def said(*line, code):
+        found = CliRunner().invoke(app, [*map(str, line)])
+        assert found.exit_code == code, found.output
+        return found, " ".join(found.stderr.split())
+
+    said("cycle", "five-bar", "--duration", motion.duration, "--out", table, code=0)
+    assert re.search(told, said("simulate", file, "--cycle", table, code=2)[1])
+    sized = said("size", file, "--within", "here", "--cycle", table, code=1)
+    assert re.search(told, " ".join(sized[0].output.split()))
+    found, noted = said("cycle", file, "--table", table, code=0)
+    assert re.search(r"leg 1 takes .* N m, its limit at that speed is", noted)
+    assert "torque at speed" in found.stdout
+    slower = json.loads(said("cycle", file, "--json", code=0)[0].stdout)["duration"]
+    assert slower > motion.duration
+    kept = said("simulate", file, "--duration", slower, "--json", code=0)[0]
+    assert json.loads(kept.stdout)["stopped"] is None
+    quick = "--harmonics", 2, "--period", 1, "--starts", 1, "--draws", 4, "--workers", 1
+    fast = "--speed", 2.0 * rates.max(), "--acceleration", 1000.0
+    assert re.search(told, said("excite", file, *quick, *fast, code=0)[1])
 
 
 def test_units_of_a_cycle_and_a_payload_are_doubted(tmp_path):

@@ -18,6 +18,7 @@ from pteron.motion import (
     best_ratio,
     best_ratios,
     choose,
+    overloads,
     pick_and_place,
     placed,
     read_motors,
@@ -415,6 +416,38 @@ def test_what_is_more_than_the_drives_can_do_is_told_by_leg_and_amount():
     assert f"{found.rms_forces[0]:.4g} N m root mean square" in told[4]
     assert "0.02 N m all the time" in told[4]
     assert sized("five-bar").overloads == ()
+
+
+def test_a_motor_that_gives_too_little_at_a_speed_is_told_with_its_place():
+    """Neither force nor speed is too much by itself: one moment has too much of both."""
+    bare = BARE["quadrupteron-oblique"]
+    free = size(bare, cycle("quadrupteron-oblique"))
+    force, speed = free.peak_forces[1], free.peak_speeds[1]
+    shares = np.abs(free.forces[:, 1]) / force + np.abs(free.speeds[:, 1]) / speed
+    assert 1.0 < shares.max() < 1.95
+    between = 0.5 * (1.0 + shares.max())
+    falls = (0.0, between * force), (between * speed, 0.0)
+    legs = list(bare.legs)
+    legs[1] = replace(legs[1], drive=pteron.legs.Drive(curve=falls))
+    robot = replace(bare, legs=tuple(legs))
+    found = size(robot, cycle("quadrupteron-oblique"))
+    (one,) = found.margins
+    asked = np.abs(found.forces[:, 1]) / np.interp(np.abs(found.speeds[:, 1]), *np.transpose(falls))
+    assert (one.leg, one.limit, one.quantity) == (2, "curve", "force_at_speed")
+    assert asked.max() > 1.0
+    assert one.margin == pytest.approx(1.0 / asked.max(), rel=1e-12)
+    (told,) = found.overloads
+    assert told == (
+        f"leg 2: the motion takes {one.needed:.4g} N at a speed at which its drive gives "
+        f"{one.most:.4g} N (curve)"
+    )
+    assert overloads(robot, found.forces, found.speeds) == (told,)
+    legs[1] = replace(legs[1], drive=pteron.legs.Drive(curve=((0.0, force), (0.5 * speed, 0.0))))
+    none = overloads(replace(bare, legs=tuple(legs)), found.forces, found.speeds)
+    assert none[0].endswith("its drive gives 0 N (curve)")
+    here = Place(tuple(cycle("quadrupteron-oblique").pose.mean(axis=0)))
+    places = size(robot, cycle("quadrupteron-oblique"), places=[here])
+    assert str(here) in places.overloads[0]
 
 
 def test_the_table_has_a_row_a_leg_and_no_number_that_is_not_one():

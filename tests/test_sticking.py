@@ -12,6 +12,7 @@ from pteron.controllers import ComputedTorque
 from pteron.legs import Drive, LuGre
 from pteron.manipulator import parameter_data, parameters
 from pteron.motion import Sensors, advance, pick_and_place, simulate
+from pteron.viewer.pushing import Push
 from pteron.workspace import home_pose
 
 LAWS = {
@@ -135,6 +136,98 @@ def test_no_law_of_friction_brings_energy(name, law):
         last = now
     assert (last < 0.9 * begun).all()
     assert stiffness or (last == 0.0).any()
+
+
+def narrow(name, **drive):
+    """Return a machine whose joints go 5 cm, or 0.05 rad, to either side of home, and home."""
+    robot, home = pteron.load(name), home_pose(name)
+    joints = zip(robot.legs, pteron.inverse_kinematics(robot, home).tolist(), strict=True)
+    legs = tuple(replace(leg, limits=(at - 0.05, at + 0.05)) for leg, at in joints)
+    return driven(replace(robot, legs=legs), Drive(**drive)), home
+
+
+LIMITED = mechanisms.gated(
+    ["quadrupteron", "3-rpr", "sprint-z3", "ankle", "stewart", "delta"], ["3-rpr", "ankle"]
+)
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_friction_holds_a_joint_at_its_limit_and_beyond_it_a_simulation_ends(name, monkeypatch):
+    robot, home = narrow(name)
+    rest = np.zeros(robot.freedom)
+    held = pteron.inverse_dynamics(robot, home, rest, rest)
+    dry = 0.3 * float(np.abs(held).max()) + 0.1
+    robot = driven(robot, Drive(coulomb=dry, rotor_inertia=0.01))
+    at = float(pteron.inverse_kinematics(robot, home)[0])
+    first = replace(robot.legs[0], limits=(at - 0.05, at))
+    robot = replace(robot, legs=(first, *robot.legs[1:]))
+
+    class Same:
+        """Asks for the same forces at every sample."""
+
+        period, law = 1e-3, lambda self, _: self
+
+        def __init__(self, forces):
+            self.forces = forces
+
+        def memory(self, *_):
+            return np.zeros(1)
+
+        def __call__(self, *told):
+            return self.forces, told[-1]
+
+    for share, moves in ((0.9, False), (2.0, True)):
+        law = Same(held + share * dry * (np.arange(len(held)) == 0))
+        monkeypatch.setenv("PTERON_KERNELS", "vm")
+        slow = simulate(robot, None, law, start=(home, rest), duration=0.01)
+        monkeypatch.delenv("PTERON_KERNELS")
+        found = simulate(robot, None, law, start=(home, rest), duration=0.01)
+        for part in ("time", "pose", "velocity", "acceleration", "joints", "forces"):
+            np.testing.assert_array_equal(getattr(found, part), getattr(slow, part))
+        assert found.stopped == slow.stopped
+        if moves:
+            assert "leg 1: " in found.stopped
+            assert "comes to its limit" in found.stopped
+            assert len(found.time) == 2
+        else:
+            assert found.stopped is None
+            np.testing.assert_array_equal(found.pose, np.tile(home, (11, 1)))
+
+
+@pytest.mark.parametrize("name", LIMITED)
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_what_meets_its_limits_in_the_live_view_gains_no_energy_and_rests_there(name, share):
+    """Thrown without gravity: it slid on with what was left of its way, at up to 500 times as much.
+
+    Let fall with friction, it comes to rest against its limits, to the last bit.
+    """
+    robot, home = narrow(name, rotor_inertia=1e-4)
+    robot = replace(robot, gravity=(0.0, 0.0, 0.0)) if not share else robot
+    rest, rng = np.zeros(robot.freedom), np.random.default_rng(1)
+    weight = float(np.abs(pteron.inverse_dynamics(robot, home, rest, rest)).max())
+    robot = driven(robot, Drive(coulomb=share * weight, rotor_inertia=1e-4))
+    push, met = Push(robot, home, "off: no force"), 0
+    velocity = rng.normal(size=len(rest)) * (not share)
+    rates = pteron.jacobian(robot, home) @ velocity
+    push.velocity = velocity * 0.5 / max(np.abs(rates).max(), 1e-9)
+
+    def energy():
+        rates = pteron.kinematics.joint_rates(robot, push.pose, push.velocity).actuated
+        bodies = pteron.kinetic_energy(robot, push.pose, push.velocity)
+        return bodies + pteron.potential_energy(robot, push.pose) + 5e-5 * (rates**2).sum()
+
+    energies = [energy()]
+    for _ in range(150):
+        push.go(1.0 / 60.0)
+        met += bool(push.stops)
+        energies.append(energy())
+    assert met > 5 or weight < 1e-9
+    assert np.diff(energies).max() <= 1e-9 * np.ptp(energies)
+    if share:
+        last = push.pose
+        push.go(1.0 / 60.0)
+        np.testing.assert_array_equal(push.pose, last)
+        assert not push.velocity.any()
 
 
 def test_bristles_come_to_friction_that_sticks_as_they_are_stiffened():

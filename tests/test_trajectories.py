@@ -9,10 +9,13 @@ import polars as pl
 import pytest
 from differences import along as derivative
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, NIGHTLY, gated, random_machine, states
+from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
+from pteron.controllers import ComputedTorque
+from pteron.legs.motor_limits import speed_lines
 from pteron.motion import (
     FourierSeries,
     Motion,
@@ -28,6 +31,7 @@ from pteron.motion import (
     point_to_point,
     replay,
     shortest,
+    simulate,
     there_and_back,
     time_optimal,
     with_payload,
@@ -388,6 +392,147 @@ def test_viscous_friction_is_bounded_tightly():
     exact = (2.0 * h / (rate[1:] + rate[:-1])).sum()
     # Where friction helps to brake it is a chord below the root: a little is given away.
     assert 0.999 < fastest.bound / exact < 1.006
+
+
+FALLS = pteron.legs.Drive(rotor_inertia=0.1, curve=((0.0, 60.0), (0.4, 60.0), (1.2, 0.0)))
+SUPPLIED = pteron.legs.Drive(
+    rotor_inertia=1e-3, ratio=10.0, winding=pteron.legs.Winding(1.5, 0.5, 15.0)
+)
+
+
+@pytest.mark.parametrize("drive", [FALLS, SUPPLIED], ids=["curve", "winding"])
+def test_the_fastest_motion_of_one_slider_is_what_its_motor_can_do(drive):
+    """By SciPy: from either end as hard as the motor can, the switch is where the ways meet."""
+    robot, path, mass = axis_move(coulomb=4.0)
+    legs = [replace(robot.legs[0], drive=replace(drive, coulomb=4.0))]
+    robot = replace(robot, legs=(*legs, *(replace(leg, drive=None) for leg in robot.legs[1:])))
+    fastest = time_optimal(robot, path, limits_of(robot), step=1e-4)
+    mass, square = mass + 0.1, pteron.inverse_dynamics(robot, [0, 0, 0], [1, 0, 0], [0, 0, 0])[0]
+
+    def push(v):
+        return np.interp(v, *np.array(FALLS.curve).T) if drive is FALLS else 50.0 - v * 50.0 / 3.0
+
+    def brake(v):
+        return push(v) if drive is FALLS else 50.0 + v * 50.0 / 3.0
+
+    def reached(force, friction):
+        """Return the speeds (2001,) over the way at which a force pushes all the time."""
+        found = solve_ivp(
+            lambda _, y: [y[1], (force(y[1]) + friction - square * y[1] ** 2) / mass], (0.0, 1.0),
+            np.zeros(2), rtol=1e-10, atol=1e-12, dense_output=True,
+        )  # fmt: skip
+        time = np.linspace(0.0, 1.0, 100_001)
+        way, speed = found.sol(time)
+        return np.interp(np.linspace(0.0, 0.15, 20_001), way, speed)
+
+    speeds = np.minimum(reached(push, -4.0), reached(brake, 4.0)[::-1])
+    exact = (2.0 * 0.15 / 20_000 / (speeds[1:] + speeds[:-1])).sum()
+    assert 0.999 < fastest.bound / exact < 1.006
+    assert fastest.duration < 1.02 * fastest.bound
+
+
+def of_motor(robot, motion, finer=10):
+    """Return the largest share of what curve and winding allow: R i + k w of the supply's V."""
+    rates, _, forces = sides(robot, motion, finer)
+    shares = [0.0]
+    for rate, force, drive in zip(
+        rates.T, forces.T, [leg.drive for leg in robot.legs], strict=True
+    ):
+        if drive.curve:
+            shares.append((np.abs(force) / np.interp(np.abs(rate), *np.array(drive.curve).T)).max())
+        if drive.winding:
+            own, gear = drive.winding, drive.ratio
+            volts = own.resistance * force / (gear * own.torque_constant)
+            volts += own.torque_constant * gear * rate
+            shares.append((np.abs(volts) / own.voltage).max())
+    return max(shares)
+
+
+def with_motors(name):
+    """Return a machine whose motors have a curve or a winding that suit its cycle, and this."""
+    robot = MACHINES[name]
+    cycle = pick_and_place(robot, home(name), least=0.1)
+    rates, _, forces = (float(np.abs(part).max()) for part in sides(robot, cycle, finer=1))
+    curve = (0.0, 1.5 * forces), (0.5 * rates, 1.5 * forces), (1.5 * rates, 0.0)
+    volts = 5.0 * 1.8 * rates
+    winding = pteron.legs.Winding(5.0 * volts / (1.6 * forces), 1.0, volts)
+    own = {"coulomb": 0.02 * forces, "viscous": 0.05 * forces / rates, "rotor_inertia": 1e-7}
+    drives = [
+        pteron.legs.Drive(ratio=5.0, **own, **({"winding": winding} if i % 2 else {"curve": curve}))
+        for i in range(robot.joint_count)
+    ]
+    legs = [replace(leg, drive=drive) for leg, drive in zip(robot.legs, drives, strict=True)]
+    return replace(robot, legs=tuple(legs)), cycle
+
+
+ASKED = ("quadrupteron-oblique +--+", "random PRR 0", "sliding", "delta", "3-rrr", "par4")
+
+
+@pytest.mark.parametrize("name", gated(ASKED, ["sliding"]))
+def test_no_motion_asks_more_than_the_motor_gives_at_its_speed(name):
+    robot, cycle = with_motors(name)
+    limits = limits_of(robot)
+    assert not np.isfinite(limits.force).any()
+    path = cycle_path(cycle)
+    planned = along(robot, path), shortest(robot, cycle.cycle.at, limits), time_optimal(robot, path)
+    for motion in planned:
+        assert 0.98 < of_motor(robot, motion) <= 1.0 + 1e-8
+    start, end = cycle.pose[0], cycle.pose[len(cycle.pose) // 2]
+    quick = limits_of(robot, acceleration=1e3, speed=1e3)
+    assert of_motor(robot, jerk_limited(robot, start, end, 1e6, quick)) <= 1.0 + 1e-8
+    # A little faster is refused, and by whom it is refused is told.
+    with pytest.raises(pteron.DataError, match=r"leg \d takes .* its limit at that speed is"):
+        along(robot, path, duration=0.97 * planned[0].duration)
+    fast = cycle.at(np.linspace(0.0, cycle.duration, 1001))
+    told = {peak.leg: peak for peak in peaks(robot, *fast, limits) if peak.name == "force_at_speed"}
+    assert set(told) == set(range(1, robot.joint_count + 1))
+    rates, _, forces = sides(robot, Motion(np.linspace(0.0, 1.0, 1001), *fast), finer=1)
+    most = np.interp(np.abs(rates[:, 0]), *np.array(robot.legs[0].drive.curve).T)
+    assert told[1].share == pytest.approx((np.abs(forces[:, 0]) / most).max(), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", gated(ASKED, ["random PRR 0"]))
+def test_a_plan_leaves_a_simulated_motor_within_what_it_gives(name):
+    """A controller that follows the plan asks for no more; 1.3 times as fast it does."""
+    robot, cycle = with_motors(name)
+    path = cycle_path(cycle)
+    planned = along(robot, path, duration=1.03 * along(robot, path).duration)
+    parts = planned.pose, 1.3 * planned.velocity, 1.3**2 * planned.acceleration
+    for motion, kept in ((planned, True), (Motion(planned.time / 1.3, *parts), False)):
+        found = simulate(robot, motion, ComputedTorque(), limits=False)
+        assert found.stopped is None
+        assert (found.saturated == 0.0).all() == kept
+        assert (np.abs(found.error).max() < 1e-4) == kept
+
+
+def test_a_hollow_curve_is_kept_by_less_and_a_time_that_it_allows_is_not_refused():
+    hollow = pteron.legs.Drive(curve=((0.0, 60.0), (0.3, 30.0), (0.6, 15.0), (3.0, 15.0)))
+    robot, path, _ = axis_move(curve=hollow.curve)
+    found = along(robot, path)
+    assert of_motor(robot, found) <= 1.0 + 1e-8
+    shorter = next(share for share in np.arange(0.5, 1.0, 0.01) if fits(robot, path, share, found))
+    assert shorter < 0.95
+    rng, speeds = np.random.default_rng(0), np.linspace(0.0, 6.0, 2001)
+    for _ in range(300):
+        points = np.sort(rng.uniform(0.0, 3.0, 4)), np.sort(rng.uniform(0.0, 9.0, 4))[::-1]
+        drive = pteron.legs.Drive(curve=tuple(np.transpose(points).tolist()))
+        most = np.interp(speeds, *points)
+        lines = [one.force - one.fall * speeds for one in speed_lines(drive)]
+        assert (np.min(lines, axis=0) <= most + 1e-9).all()
+        assert np.min(lines, axis=0)[0] == pytest.approx(most[0])
+        if (np.diff(np.diff(points[1]) / np.diff(points[0])) < 0.0).all():
+            within = speeds <= points[0][-1]
+            np.testing.assert_allclose(np.min(lines, axis=0)[within], most[within], atol=1e-9)
+
+
+def fits(robot, path, share, found):
+    """Say whether a share of a motion's time is taken; what is taken keeps what motors give."""
+    try:
+        faster = along(robot, path, duration=share * found.duration)
+    except pteron.DataError:
+        return False
+    assert of_motor(robot, faster) <= 1.0 + 1e-6
+    return True
 
 
 def test_joints_with_limited_jerk_take_the_textbooks_time():

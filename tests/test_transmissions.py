@@ -214,6 +214,34 @@ def test_forces_are_what_motors_give_and_not_what_is_asked_of_them():
     np.testing.assert_allclose(batch.force[1], np.abs(alone.forces).max(axis=0), rtol=1e-9)
 
 
+@pytest.mark.parametrize("name", mechanisms.gated(["quadrupteron", "3-rpr", "ankle"], ["3-rpr"]))
+def test_forces_of_currents_that_lag_are_what_acts_and_not_what_is_asked(name):
+    """One joint bends and has bristles too, one has a current at once; of it all is asked."""
+    drawn = pteron.load(name)
+    home, rest = home_pose(drawn), np.zeros(drawn.freedom)
+    lags = pteron.legs.Drive(rotor_inertia=0.01, current_time=5e-3)
+    soft = replace(lags, elastic=Elastic(4e3, 4.0), coulomb=0.1, lugre=LuGre(1e3, 1.0))
+    at_once = replace(lags, current_time=None)
+    robot = driven(drawn, soft, *[lags] * (drawn.joint_count - 2), at_once)
+    held = pteron.inverse_dynamics(drawn, home, rest, rest)
+    asked = held + 0.3 * np.abs(held).max() * np.linspace(1.0, -0.5, len(held))
+    found = simulate(robot, start=(home, rest), forces=asked, duration=0.02)
+    assert found.stopped is None
+    grown = asked + (held - asked) * np.exp(-found.time / 5e-3)[:, None]
+    grown[:, -1] = asked[-1]
+    np.testing.assert_allclose(found.forces, grown, rtol=0.0, atol=1e-7 * np.abs(asked).max())
+    own = pteron.drive_forces(robot, found.pose, found.velocity, found.acceleration)
+    stiff = slice(1, None)
+    np.testing.assert_allclose(
+        found.forces[:, stiff], own[:, stiff], rtol=0.0, atol=1e-8 * np.abs(own).max()
+    )
+    np.testing.assert_array_equal(found.table()[robot.force_names[0]], found.forces[:, 0])
+    many, motion = machines_about(robot, 2), pick_and_place(drawn, home, scale=0.02, duration=0.5)
+    law, how = FeedForwardPD(bandwidth=20.0), {"duration": 0.02, "model": drawn}
+    alone, batch = simulate(robot, motion, law, **how), simulate_many(many, motion, law, **how)
+    np.testing.assert_allclose(batch.force[1], np.abs(alone.forces).max(axis=0), rtol=1e-9)
+
+
 def test_ripple_and_cogging_come_by_the_motors_angle(mass):
     drive = pteron.legs.Drive(
         rotor_inertia=1e-6, ratio=200.0, ripple=(Wave(6, 0.05, 0.3),), cogging=(Wave(4, 0.02),)

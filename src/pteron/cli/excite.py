@@ -126,6 +126,8 @@ def excite(
     pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60
     pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,
     """
+    import numpy as np
+
     from pteron.identification.excitation import (
         Layout,
         Limits,
@@ -133,6 +135,7 @@ def excite(
         motion_paths,
         optimal_excitation,
     )
+    from pteron.motion.overloads import overloads_of
 
     check_sampling(period, rate, periods)
     layout = Layout(
@@ -189,6 +192,9 @@ def excite(
             raise ModelError(
                 f"{name}: the limits are not kept between samples; choose another --seed"
             )
+    time = np.linspace(0.0, led.duration, int(led.duration * rate) + 1)
+    for text in overloads_of(machine, led.at(time)):
+        note(f"Note: {text}")
     files = [] if out is None else found.write(out, rate, periods, layout, cycles, slow)
     more: dict[str, Any] = {"start": led.start, "end": led.end, "duration": led.duration}
     more |= {"held_out": cycles and cycles.as_dict(), "slow": slow and slow.duration}

@@ -224,9 +224,8 @@ def forces(
     added = machine.force_names
     check_destination(out, table, rows.table, added)
 
-    limited = any(
-        leg.drive and (leg.drive.max_force or leg.drive.max_speed) for leg in machine.legs
-    )
+    limiting = ("max_force", "max_speed", "curve", "winding")
+    limited = any(getattr(leg.drive, key, None) for leg in machine.legs for key in limiting)
 
     def serve(values: NDArray[Any]) -> NDArray[Any]:
         """Return forces to deliver, and forces and rates to hold against the drives' limits."""

@@ -35,8 +35,8 @@ def peaks_table(found: Sequence[Peak]) -> Table:
 
 def _word(peak: Peak) -> str:
     """Return the quantity of a peak: what a crank gives is a torque."""
-    torque = peak.name == "force" and peak.unit == "N m"
-    return "torque" if torque else peak.name.replace("_", " ")
+    word = peak.name.replace("_", " ")
+    return word.replace("force", "torque") if peak.unit == "N m" else word
 
 
 def force_word(robot: Manipulator) -> str:

@@ -83,6 +83,7 @@ def simulate(
     """
     from pteron.controllers import read_gains
     from pteron.motion import Sensors, simulate as simulated
+    from pteron.motion.overloads import overloads_of
 
     if gains is not None and bandwidth is not None:
         raise DataError("--gains, --bandwidth: both given; leave one of them out")
@@ -101,7 +102,7 @@ def simulate(
         if gains is not None:
             acts, told = read_gains(carrying, gains), gains
         motion = motion if cycles == 1 else motion.repeated(cycles)
-        overloads = _overloads(carrying, motion)
+        overloads = overloads_of(carrying, motion)
         if overloads and not anyway:
             raise DataError(
                 f"{'; '.join(overloads)}; give a smaller payload or a longer --duration, or see "
@@ -148,17 +149,6 @@ def controller_of(name: Name, motion: Motion, period: float, bandwidth: float | 
     }
     found: Controller = made[name](period=period, bandwidth=bandwidth)
     return found
-
-
-def _overloads(loaded: Manipulator, motion: Motion) -> tuple[str, ...]:
-    """Return the drives' limits that the motion exceeds."""
-    from pteron.dynamics import drive_forces
-    from pteron.kinematics import joint_rates
-    from pteron.motion import overloads
-
-    state = motion.pose, motion.velocity, motion.acceleration
-    rates = joint_rates(loaded, *state[:2]).actuated
-    return overloads(loaded, drive_forces(loaded, *state, smooth=True), rates)
 
 
 def _data(found: Simulation, controller: str, cycle: str, carried: Carried) -> dict[str, Any]:

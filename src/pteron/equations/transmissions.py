@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pteron.bodies.motion import Expression
 from pteron.legs import Drive
+from pteron.legs.motor_limits import supply
 from pteron.manipulator import Manipulator
 
 
@@ -66,6 +67,14 @@ class DriveKind:
         own = [("current", "change")] * any(self.lag) + [("bristle", "yield")] * any(self.lugre)
         return (*(bends if self.bends else ()), *own)
 
+    def parts(self, states: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Return the parts of states (..., Y) by name: `pose`, `velocity` and those of `more`."""
+        n, names = len(self.elastic), [name for name, _ in self.more]
+        m = (states.shape[-1] - n * len(names)) // 2
+        found = {"pose": states[..., :m], "velocity": states[..., m : 2 * m]}
+        starts = range(2 * m, states.shape[-1], n)
+        return found | {name: states[..., k : k + n] for name, k in zip(names, starts, strict=True)}
+
     @property
     def plain(self) -> bool:
         """Whether they are rigid and give at once what they are asked for."""
@@ -89,8 +98,7 @@ def actuator_numbers(robot: Manipulator) -> NDArray[np.float64]:
     found = []
     for name, joint, k in _names(DriveKind.of(robot)):
         drive = robot.legs[joint].drive or Drive()
-        bends, winding, gear = drive.elastic, drive.winding, abs(drive.gear)
-        lugre = drive.lugre
+        bends, lugre = drive.elastic, drive.lugre
         value: Any = {
             "stiffness": bends and bends.stiffness,
             "damping": bends and bends.damping,
@@ -98,9 +106,8 @@ def actuator_numbers(robot: Manipulator) -> NDArray[np.float64]:
             "bristle": lugre and lugre.stiffness,
             "drag": lugre and lugre.damping,
             "lag": drive.current_time and 1.0 / drive.current_time,
-            "stall": winding
-            and gear * winding.torque_constant * winding.voltage / winding.resistance,
-            "back": winding and (gear * winding.torque_constant) ** 2 / winding.resistance,
+            "stall": drive.winding and supply(drive)[0],
+            "back": drive.winding and supply(drive)[1],
             "speed": drive.curve and drive.curve[min(k, len(drive.curve) - 1)][0],
             "force": drive.curve and drive.curve[min(k, len(drive.curve) - 1)][1],
         }.get(name)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -337,6 +337,7 @@ def _independent(model: Model) -> Model:
     return replace(model, joins=joins)
 
 
+@lru_cache(maxsize=8)
 def _probes(robot: Manipulator) -> States:
     """Return states at random, with payload."""
     rng = np.random.default_rng(0)

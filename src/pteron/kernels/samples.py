@@ -69,15 +69,7 @@ class Plant:
     def __init__(self, program: Program, kind: DriveKind) -> None:
         self._program = Evaluated("plant", program)
         self._kind, self._dry, self.elastic = kind, kind.dry, kind.elastic
-
-    def split(self, y: Array) -> dict[str, Array]:
-        """Return the parts of states (B, Y) by name."""
-        names = [name for name, _ in self._kind.more]
-        n = len(self._kind.elastic)
-        m = (y.shape[1] - n * len(names)) // 2
-        starts = (2 * m + n * k for k in range(len(names)))
-        more = {name: y[:, k : k + n] for name, k in zip(names, starts, strict=True)}
-        return {"pose": y[:, :m], "velocity": y[:, m : 2 * m]} | more
+        self.split = kind.parts
 
     def _moved(self, held: dict[str, Array], arrays: Mapping[str, Array]) -> dict[str, Array]:
         """Return what happens in a state, with the friction that holds joints where some stick."""

@@ -237,7 +237,7 @@ class Drive:
         for name in ("curve", "ripple", "cogging"):
             given = getattr(self, name)
             try:
-                found = tuple(given or ())
+                found = tuple(() if given is None else given)
                 if name == "curve":
                     found = tuple((float(speed), float(force)) for speed, force in found)
                     good = all(isfinite(number) for pair in found for number in pair)

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.dynamics import drive_forces
 from pteron.kernels import as_array
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.kinematics import joint_rates
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.motion import Motion
 from pteron.motion.sizing.drive_margins import drive_margins
 
 
@@ -16,7 +19,8 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     Parameters
     ----------
     robot : Manipulator, name or path
-        The machine; limits are each drive's `max_force` and `max_speed`.
+        The machine; limits are each drive's `max_force` and `max_speed`, and its motor's curve and
+        winding.
     forces : array, shape (..., n)
         Forces of the drives, such as `drive_forces` returns: friction and motors count. N, N m.
     speeds : array, shape (..., n)
@@ -38,9 +42,17 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     """
     robot = as_manipulator(robot)
     sizes = {"peak_force": ("forces", forces), "peak_speed": ("speeds", speeds)}
-    needed = {}
+    needed, moments = {}, []
     for quantity, (name, values) in sizes.items():
-        each = np.abs(as_array(values, name, (len(robot.legs),))).reshape(-1, len(robot.legs))
+        moments.append(as_array(values, name, (len(robot.legs),)).reshape(-1, len(robot.legs)))
         # Rows that no pose serves are NaN.
-        needed[quantity] = np.fmax.reduce(each, axis=0, initial=0.0)
-    return tuple(one.told("") for one in drive_margins(robot, needed) if one.margin < 1.0)
+        needed[quantity] = np.fmax.reduce(np.abs(moments[-1]), axis=0, initial=0.0)
+    margins = drive_margins(robot, needed, *moments)
+    return tuple(one.told("") for one in margins if one.margin < 1.0)
+
+
+def overloads_of(robot: Manipulator, motion: Motion) -> tuple[str, ...]:
+    """Return the limits of drives that a motion of the platform exceeds, one line each."""
+    state = motion.pose, motion.velocity, motion.acceleration
+    rates = joint_rates(robot, *state[:2]).actuated
+    return overloads(robot, drive_forces(robot, *state, smooth=True), rates)

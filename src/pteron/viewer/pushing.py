@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pteron.controllers import ComputedTorque, Law, PDGravity
+from pteron.dynamics import kinetic_energy, potential_energy
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator
@@ -102,22 +103,28 @@ class Push:
     def go(self, span: float) -> None:
         """Let time go on by a span, s.
 
-        The platform slides along what it meets, and loses the speed towards it.
+        The platform slides along what it meets, and loses the speed towards it: it has no more
+        energy than it would have had behind it.
         """
         self.stops, robot = "", self._robot
         for rest in range(max(1, round(span / _PERIOD)), 0, -1):
-            before = self.pose
+            before, rates = self.pose, self.velocity
             self._control()
             whole = self._move(_PERIOD)
             if whole and allowed(robot, self.pose):
                 continue
             # What it meets is met once for the rest of the span, as a slide takes milliseconds.
-            if whole:
-                self._move((rest - 1) * _PERIOD)
+            whole = whole and self._move((rest - 1) * _PERIOD)
+            energy = self._energy(self.pose, self.velocity) if whole else np.nan
+            if not np.isfinite(energy):
+                energy = self._energy(before, rates)
             wanted = self.pose if np.isfinite(self.pose).all() else before
             last, beyond = nearest(robot, before, wanted)
             self.stops = what_stops(robot, wanted if beyond is None else beyond)
-            self._begin(last, (last - before) / (rest * _PERIOD))
+            slide = (last - before) / (rest * _PERIOD)
+            resting = self._energy(last, 0.0 * slide)
+            most, kinetic = max(energy - resting, 0.0), self._energy(last, slide) - resting
+            self._begin(last, slide * np.sqrt(most / kinetic) if kinetic > most else slide)
             return
 
     def _begin(self, pose: Array, velocity: Array) -> None:
@@ -132,6 +139,18 @@ class Push:
         given = self._robot, *state, self.forces, step, count, self._wrench()
         self.pose, self.velocity, self._drives, whole = advance(*given, drives=self._drives)
         return bool(whole)
+
+    def _energy(self, pose: Array, velocity: Array) -> float:
+        """Return the energy of bodies, rotors and spring in a state, J; NaN where there is none."""
+        robot, stretch = self._robot, 0.0
+        rates = joint_rates(robot, pose, velocity, on_failure="nan").actuated
+        rotors = np.array([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
+        if self._arm is not None:
+            place, axes = robot.platform.at(pose)
+            stretch = float(np.linalg.norm(self._held - place - self._arm @ axes))
+        bodies = kinetic_energy(robot, pose, velocity, on_failure="nan")
+        bodies = bodies + potential_energy(robot, pose, on_failure="nan")
+        return float(bodies + 0.5 * rotors @ rates**2 + 0.5 * self.stiffness * stretch**2)
 
     def _control(self) -> None:
         if self._law is None:

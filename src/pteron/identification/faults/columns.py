@@ -16,12 +16,11 @@ import numpy as np
 from pteron.equations.friction import passive_joints
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
-from pteron.identification.model import Model, diagonal, extended
+from pteron.identification.model import Model, diagonal, extended, identification_model
 from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
-from pteron.manipulator import Manipulator
 
 _STRIBECK = (0.05, 0.15, 0.4)
 """Speeds at which friction may fall, over each joint's root mean square: all are tried."""
@@ -53,6 +52,8 @@ class Family:
         Sizes beyond it are another fault, told badly.
     speed : float, optional
         Speed with which friction falls, over the usual one.
+    exact : bool
+        Whether its columns have sizes as large as they may be, not to first order.
     effect : callable, optional
         Returns how the machine's forces change, where that is otherwise than those of the log: by a
         clock that is off all inertia is, and with it the mass that weighs.
@@ -66,6 +67,7 @@ class Family:
     positive: bool = False
     largest: float = np.inf
     speed: float | None = None
+    exact: bool = False
     effect: Callable[[FittedMotion], Array] | None = None
 
     def of_cycle(self, motion: FittedMotion) -> Array:
@@ -156,10 +158,28 @@ _OTHERS = (
     Family("passive", "N m s", _passive_legs, _passive, positive=True),
 )
 
+_ROTORS = Family(
+    "rotors",
+    "kg",
+    lambda m: [f"at {name}" for name in m.robot.force_names],
+    lambda m: diagonal(m.states.joint_accelerations),
+    positive=True,
+    exact=True,
+)
 
-def families_of(robot: Manipulator) -> tuple[Family, ...]:
-    """Return the faults that are told by name; a wrong scale is one actuator's, each is tried."""
-    return (DELAY, *map(_scale, range(robot.joint_count)), *_OTHERS)
+
+def families_of(model: Model) -> tuple[Family, ...]:
+    """Return the faults that are told by name; a wrong scale is one actuator's, each is tried.
+
+    Motors' inertia is tried where the model has none and no other value takes it in, as a ram's.
+    """
+    count = model.robot.joint_count
+    with_rotors = replace(model.terms, rotors=True)
+    rotors = []
+    if not model.terms.rotors:
+        own = identification_model(model.robot, with_rotors, base=model.base).kept_terms
+        rotors = [_ROTORS] * any(term.kind == "rotor" for term in own)
+    return (DELAY, *map(_scale, range(count)), *_OTHERS, *rotors)
 
 
 def _scale(i: int) -> Family:

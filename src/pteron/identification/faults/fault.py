@@ -22,12 +22,13 @@ FaultName = Literal[
     "drift",
     "load",
     "passive",
+    "rotors",
     "play",
 ]
 """Faults by name: forces that are late, the scale of one force, that of all forces, the direction
 of gravity, its size or the rate of the clock, lengths, friction that falls with speed, elastic
 drives, drifting friction or offsets, friction that grows with load, friction in passive joints,
-drives with play."""
+motors' inertia, drives with play."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters."""
@@ -62,6 +63,7 @@ _SENTENCES = {
     "drift": "Friction or offset changes during the log, most clearly at {clearest}",
     "load": "Friction grows with the load, most clearly at {clearest}",
     "passive": "Passive joints have friction, most clearly in {clearest}",
+    "rotors": "The motors' own inertia acts, most clearly {clearest}, and the model has none of it",
     "play": "Residuals of {labels} are {times:.2g} times as large where the load changes "
     "direction, as where a drive has play",
 }
@@ -80,14 +82,19 @@ _REMEDY: dict[FaultName, str] = {
     "drift": "warm the machine up, or record shorter",
     "load": "no term of the model has it: keep to loads like those of the log",
     "passive": "--joints each adds it to the model",
+    "rotors": "--rotors adds it to the model",
     "play": "take the play out of that drive, or keep to motions whose load does not change "
     "direction; faults named after it may be its own",
 }
 
 
-def is_half(delay: float, step: float) -> bool:
-    """Say whether a delay, s, of forces or of positions (below 0) is half a step of the log, s."""
-    return _HALF_STEP[0] * step <= abs(delay) <= _HALF_STEP[1] * step
+def is_half(delay: float, deviation: float, step: float) -> bool:
+    """Say whether a delay of forces, or of positions (below 0), is half a step of the log; all s.
+
+    It may be off by two standard deviations, but not so far that none or a whole step is nearer.
+    """
+    off = max((_HALF_STEP[1] - 0.5) * step, min(2.0 * deviation, 0.25 * step))
+    return abs(abs(delay) - 0.5 * step) <= off
 
 
 def of_held_forces(delay: float) -> str:
@@ -107,7 +114,7 @@ class IsolatedFault:
     labels : tuple of str
         The force or the leg of each size.
     sizes, deviations : array, shape (k,)
-        Errors, in s, rad, m, N or m/N, and their standard deviations; of play how many times as
+        Errors, in s, rad, m, N, kg or m/N, and their standard deviations; of play how many times as
         large the residuals are, and NaN.
     chance : float
         Probability that residuals show it so clearly without it.

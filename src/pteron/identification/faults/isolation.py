@@ -247,7 +247,8 @@ def _isolated(
         left_open.insert(0, "gain")
     shown = {one.fault for one in faults}
     hidden = tuple(fault for fault in left_open if fault not in shown)
-    half = any(one.family is DELAY and is_half(float(one.sizes[0]), step) for one in found)
+    delays = [one for one in found if one.family is DELAY]
+    half = any(is_half(float(one.sizes[0]), float(one.deviations[0]), step) for one in delays)
     return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, held=half)
 
 
@@ -312,7 +313,7 @@ def _parts(
     states = [[b.states for b in samples(model.robot, part, how)] for _, how, part in chosen]
     rates = np.concatenate([s.joint_rates for blocks in states for s in blocks])
     usual = np.sqrt((rates**2).mean(axis=0))
-    families = families_of(model.robot)
+    families = families_of(model)
     if model.terms.stribeck == "auto":  # its speeds are found already
         families = tuple(one for one in families if one.name != "stribeck")
     found = []

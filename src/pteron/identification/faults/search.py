@@ -26,7 +26,8 @@ _SEEN = 1e-3
 counts."""
 
 _AS_WELL = 0.7
-"""Share of the clearest fault's statistic with which one of fewer sizes is taken in its place."""
+"""Share of the clearest fault's statistic with which one of fewer sizes is taken in its place. Of
+an exact one all must be explained but what noise makes."""
 
 _CLEAR = 3.0
 """Standard deviations of a mixture's size from which it is more than noise."""
@@ -118,8 +119,12 @@ def searched(
         if not best > _BESIDE * first:
             break
         # Of those that explain as much, the one of fewest sizes.
-        as_well = [one for one in clear if one.statistic >= _AS_WELL * best]
-        found.append(min(as_well, key=lambda one: (len(one.sizes), -one.statistic)))
+        clearest = max(clear, key=lambda one: one.statistic)
+        as_well = _AS_WELL * best
+        if clearest.family.exact:
+            as_well = best - float(scipy.stats.chi2.isf(_CHANCE, clearest.mix.shape[1]))
+        explaining = [one for one in clear if one.statistic >= as_well]
+        found.append(min(explaining, key=lambda one: (len(one.sizes), -one.statistic)))
     return plain, found
 
 

@@ -1,11 +1,33 @@
-"""The forces that motors give: those asked for, within their curves and windings at a speed."""
+"""The forces that motors give: those asked for within their limits at a speed, or the currents'."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from pteron.equations.transmissions import DriveKind
 from pteron.kernels import Array
+from pteron.legs.motor_limits import within_motor
 from pteron.manipulator import Manipulator
+
+
+def given_forces(
+    robot: Manipulator, forces: Array, motor_rates: Array, currents: Array | None
+) -> Array:
+    """Return the forces (..., n) that motors give, of what their drives are told to give.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    forces : array, shape (..., n)
+        What its drives are told, within their `max_force`, N or N m.
+    motor_rates : array, shape (..., n)
+        Rates of the motors, counted at the joints.
+    currents : array, shape (..., n), or None
+        Forces of the currents, where some lag.
+    """
+    found = within_motors(robot, forces, motor_rates)
+    return found if currents is None else np.where(DriveKind.of(robot).lag, currents, found)
 
 
 def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Array:
@@ -22,14 +44,6 @@ def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Arra
     """
     found = np.array(forces, dtype=float)
     for i, leg in enumerate(robot.legs):
-        drive, rates = leg.drive, motor_rates[..., i]
-        if drive and drive.curve:
-            speeds, most = np.array(drive.curve).T
-            most = np.interp(np.abs(rates), speeds, most)
-            found[..., i] = np.clip(found[..., i], -most, most)
-        if drive and drive.winding:
-            winding, gear = drive.winding, abs(drive.gear)
-            stall = gear * winding.torque_constant * winding.voltage / winding.resistance
-            back = (gear * winding.torque_constant) ** 2 / winding.resistance * rates
-            found[..., i] = np.clip(found[..., i], -stall - back, stall - back)
+        if leg.drive:
+            found[..., i] = within_motor(leg.drive, found[..., i], motor_rates[..., i])
     return found

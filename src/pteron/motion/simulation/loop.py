@@ -17,7 +17,7 @@ from pteron.kernels.loops import Loop, loop, machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion, told_pose
 from pteron.motion.simulation.exported import ExportedCustomLaw, ExportedLaw
-from pteron.motion.simulation.given import within_motors
+from pteron.motion.simulation.given import given_forces
 from pteron.motion.simulation.plant import Adaptive, Method, motor_states
 from pteron.motion.simulation.sensors import (
     Sensors,
@@ -175,14 +175,17 @@ def run(
             break
     done, fault = int(arrays["done"].item()), arrays["fault"].item()
     columns = {name: value[0, :done] for name, value in found.items()}
-    pose, velocity, *more = np.split(columns.pop("states"), np.cumsum([m, m, n, n]), axis=1)
+    kind = DriveKind.of(robot)
+    parts = kind.parts(columns.pop("states"))
+    pose, velocity = parts["pose"], parts["velocity"]
     columns |= {"pose": pose, "velocity": velocity, "memory": columns.pop("memories")}
     columns["joint_rates"] = columns.pop("rates")
-    bends = DriveKind.of(robot).elastic
-    for k, name in enumerate(("joints", "joint_rates")):
-        motor = name.replace("joint", "motor")
-        columns[motor] = np.where(bends, more[k], columns[name]) if any(bends) else columns[name]
-    columns["forces"] = within_motors(robot, columns["forces"], columns["motor_rates"])
+    for name, motor in (("joints", "motor"), ("joint_rates", "motor_rate")):
+        own = columns[name]
+        columns[f"{motor}s"] = np.where(kind.elastic, parts[motor], own) if kind.bends else own
+    columns["forces"] = given_forces(
+        robot, columns["forces"], columns["motor_rates"], parts.get("current")
+    )
     why = None
     if fault == _ASKED:
         why = (

@@ -19,7 +19,7 @@ from pteron.kernels.samples import Evaluated
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
-from pteron.motion.simulation.given import within_motors
+from pteron.motion.simulation.given import given_forces
 from pteron.motion.simulation.loop import Timing, loop_arrays
 from pteron.motion.simulation.machines import Machines
 from pteron.motion.simulation.sensors import (
@@ -187,11 +187,10 @@ def simulate_many(
         came = np.where(done[:, 0] > 0.0, done[:, 0], np.nan)
         found["rms"].append(np.sqrt(np.nansum(error**2, axis=1) / came[:, None]))
         found["most"].append(np.fmax.reduce(np.abs(error), axis=1))
-        rates = samples["rates"]
+        rates, parts = samples["rates"], made.kind.parts(samples["states"])
         if made.kind.bends:
-            moving = samples["states"][..., 2 * m + n : 2 * m + 2 * n]
-            rates = np.where(made.kind.elastic, moving, rates)
-        samples["forces"] = within_motors(robot, samples["forces"], rates)
+            rates = np.where(made.kind.elastic, parts["motor_rate"], rates)
+        samples["forces"] = given_forces(robot, samples["forces"], rates, parts.get("current"))
         force = np.abs(samples["forces"])
         force[gone] = np.nan
         found["force"].append(np.fmax.reduce(force, axis=1))

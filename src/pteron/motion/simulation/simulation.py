@@ -36,8 +36,9 @@ class Simulation:
     motors, motor_rates : array, shape (T, n)
         Those of the motors, counted at the joints, which differ where transmissions bend.
     forces : array, shape (T, n)
-        Forces of the drives from this sample on, limits and delay included, those of motors' curves
-        and windings too; N, N m at cranks. Currents that lag come to them; ripple is beside them.
+        Forces that the motors give: from this sample on, limits and delay included, those of their
+        curves and windings too; of a current that lags, what it gives at this sample. N, N m at
+        cranks; ripple and cogging are beside them.
     asked : array, shape (T, n)
         Forces that the controller asked for at this sample.
     reference : Motion

@@ -17,6 +17,7 @@ from pteron.html_table import Column, html_table
 from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.legs import Drive
+from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator
 from pteron.motion.sizing.drive_margins import DriveMargin, drive_margins
 from pteron.motion.sizing.places import Place
@@ -266,7 +267,7 @@ class Sizing:
     def margins(self) -> tuple[DriveMargin, ...]:
         """The limits of the drives in the machine's file over what the cycle asks, leg by leg."""
         needed = {name: self._most(name) for name in ("rms_force", "peak_force", "peak_speed")}
-        return drive_margins(self.robot, needed)
+        return drive_margins(self.robot, needed, self.forces, self.speeds)
 
     @cached_property
     def overloads(self) -> tuple[str, ...]:
@@ -277,7 +278,13 @@ class Sizing:
 
     def where(self, one: DriveMargin) -> str:
         """Return in words at which of several places a margin is so small; else an empty text."""
-        return f" {self.places[self.worst(one.quantity)[one.leg - 1]]}" if self.places else ""
+        if not self.places:
+            return ""
+        leg = one.leg - 1
+        if one.quantity == "force_at_speed":
+            peak = motor_peak(self.drives[leg], self.forces[..., leg], self.speeds[..., leg])
+            return f" {self.places[peak.at % len(self.places)]}"
+        return f" {self.places[self.worst(one.quantity)[leg]]}"
 
     def table(self) -> pl.DataFrame:
         """Return a table, one row a leg: SI units, at the joint but for motor_torque.

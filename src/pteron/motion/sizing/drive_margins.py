@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from pteron.kernels import Array
 from pteron.legs import Drive
+from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator
 from pteron.shapes import PerJoint
 
@@ -16,9 +18,11 @@ class DriveMargin(NamedTuple):
 
     leg: int
     limit: str
-    """The keys of the file: "rated_torque and ratio", "max_force" or "max_speed"."""
+    """The keys of the file: "rated_torque and ratio", "max_force", "max_speed", or those of "curve"
+    and "winding" that there are."""
     quantity: str
-    """The quantity that it bounds: "rms_force", "peak_force" or "peak_speed"."""
+    """The quantity that it bounds: "rms_force", "peak_force", "peak_speed" or, at the moment where
+    the most of what the motor gives at its speed is taken, "force_at_speed"."""
     most: float
     needed: float
     unit: str
@@ -36,16 +40,24 @@ class DriveMargin(NamedTuple):
                 f"leg {self.leg}: the cycle takes {needed} root mean square{where}, but the motor "
                 f"gives {self.most:.4g} {self.unit} all the time ({self.limit})"
             )
+        if self.quantity == "force_at_speed":
+            return (
+                f"leg {self.leg}: the motion takes {needed}{where} at a speed at which its drive "
+                f"gives {self.most:.4g} {self.unit} ({self.limit})"
+            )
         return (
             f"leg {self.leg}: the motion takes up to {needed}{where}, but its drive gives "
             f"{self.most:g} {self.unit} ({self.limit})"
         )
 
 
-def drive_margins(robot: Manipulator, needed: Mapping[str, PerJoint]) -> tuple[DriveMargin, ...]:
+def drive_margins(
+    robot: Manipulator, needed: Mapping[str, PerJoint], forces: Array, speeds: Array
+) -> tuple[DriveMargin, ...]:
     """Return the margins of the limits that the file has, leg by leg.
 
-    `needed` has what a cycle takes of each joint (n,), by quantity: of some or of all.
+    `needed` has what a cycle takes of each joint (n,), by quantity: of some or of all. `forces` and
+    `speeds` (..., n) are those of its moments.
     """
     found = []
     for i, leg in enumerate(robot.legs):
@@ -60,4 +72,9 @@ def drive_margins(robot: Manipulator, needed: Mapping[str, PerJoint]) -> tuple[D
             for key, quantity, most, unit in limits
             if most is not None and quantity in needed
         ]
+        by_speed = [key for key in ("curve", "winding") if getattr(drive, key)]
+        if by_speed and forces.size:
+            peak = motor_peak(drive, forces[..., i], speeds[..., i])
+            told = " and ".join(by_speed), "force_at_speed", peak.most, peak.force, force
+            found.append(DriveMargin(i + 1, *told))
     return tuple(found)

@@ -6,6 +6,7 @@ motion, viscous friction by its speed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -17,6 +18,8 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kernels.bisection import bisected
 from pteron.kinematics.evaluate import unchecked
+from pteron.legs import Drive
+from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import told_pose
 from pteron.motion.trajectories.limits import MotionLimits
@@ -35,6 +38,7 @@ _WORDS = {
     "speed": ("moves at up to", "{unit}/s"),
     "acceleration": ("accelerates by up to", "{unit}/s^2"),
     "force": ("takes up to", "{force_unit}"),
+    "force_at_speed": ("takes", "{force_unit}"),
     "tool_speed": ("moves at up to", "m/s"),
     "tool_acceleration": ("accelerates by up to", "m/s^2"),
 }
@@ -155,20 +159,19 @@ def most_rate(
             np.sqrt(limits.tool_acceleration / np.linalg.norm(asked.tool[1], axis=-1)),
         ]
         least = min(float(np.nanmin(rate, initial=most)) for rate in rates)
-    limited = np.isfinite(limits.force)
-    if not limited.any():
+    joints, force, fall, back = limits.force_lines
+    if not len(joints):
         return least
     # The margin on each side of a drive's force: square p'^2 + root p' <= margin.
-    rows = []
+    rows, first = [], asked.first[:, joints]
     for dry in asked.dry:
         still = asked.still + dry * np.sign(asked.first)
         _expect_strength(robot, still, limits, poses)
         for side in (1.0, -1.0):
-            parts = limits.force - side * still, side * asked.square
-            rows.append([*parts, side * asked.viscous * asked.first])
-    margin, square, root = (
-        np.concatenate([row[k][:, limited].ravel() for row in rows]) for k in range(3)
-    )
+            parts = force - side * still[:, joints], side * asked.square[:, joints]
+            root = side * (asked.viscous[joints] + back) * first + fall * np.abs(first)
+            rows.append([*parts, root])
+    margin, square, root = (np.concatenate([row[k].ravel() for row in rows]) for k in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
         below = root + np.sqrt(root**2 + 4.0 * square * margin)
         edge = np.where(below > 0.0, 2.0 * margin / below, np.inf)
@@ -188,13 +191,16 @@ def most_rate(
 
 def _expect_strength(robot: Manipulator, still: Array, limits: MotionLimits, poses: Array) -> None:
     """Refuse a curve on which a drive cannot even creep."""
-    over = np.abs(still) - limits.force
+    joints, force, _, _ = limits.force_lines
+    strength = np.full(still.shape[-1], np.inf)
+    np.minimum.at(strength, joints, force)
+    over = np.abs(still) - strength
     if not (over >= 0.0).any():
         return
     k, i = np.unravel_index(int(np.nanargmax(over)), over.shape)
     joint = robot.legs[i].joint
     raise ModelError(
-        f"leg {i + 1}: its drive gives {limits.force[i]:.4g} {joint.force_unit}, but the machine's "
+        f"leg {i + 1}: its drive gives {strength[i]:.4g} {joint.force_unit}, but the machine's "
         f"weight and dry friction alone take {abs(still[k, i]):.4g} {joint.force_unit} at pose "
         f"{told_pose(poses[k])}: no motion is slow enough; take another path, a lighter load or a "
         "stronger drive",
@@ -206,7 +212,9 @@ class Peak(NamedTuple):
     """The largest size of a quantity in a motion, beside its limit."""
 
     name: str
-    """ "speed", "acceleration" or "force" of a joint; "tool_speed" or "tool_acceleration"."""
+    """ "speed", "acceleration" or "force" of a joint; "tool_speed" or "tool_acceleration". Where
+    limits have lines, "force_at_speed" too: the force nearest to what its motor gives at its speed.
+    """
     leg: int
     """Its leg, from 1; 0 for the tool."""
     size: float
@@ -218,15 +226,17 @@ class Peak(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The size over the limit; 0 without one."""
-        return self.size / self.limit
+        """The size over the limit; 0 without one, infinite where it is 0."""
+        return self.size / self.limit if self.limit else math.inf
 
     def told(self) -> str:
         """Return the peak and its limit as words."""
         who = f"leg {self.leg}" if self.leg else "the tool"
         verb, _ = _WORDS[self.name]
+        where = " at that speed" if self.name == "force_at_speed" else ""
         return (
-            f"{who} {verb} {self.size:.4g} {self.unit}, its limit is {self.limit:.4g} {self.unit}"
+            f"{who} {verb} {self.size:.4g} {self.unit}, its limit{where} is {self.limit:.4g} "
+            f"{self.unit}"
         )
 
 
@@ -251,7 +261,8 @@ def peaks(
     robot = as_manipulator(robot)
     asked = demand(robot, pose, velocity, acceleration)
     ones = np.ones(len(pose))
-    force = np.abs(asked.drive_forces(ones, 0.0 * ones)).max(axis=0)
+    given = asked.drive_forces(ones, 0.0 * ones)
+    force = np.abs(given).max(axis=0)
     found = []
     for name, sizes in (
         ("speed", np.abs(asked.first)),
@@ -263,6 +274,12 @@ def peaks(
             at = int(np.argmax(sizes[:, i]))
             size = float(sizes[at, i])
             found.append(Peak(name, i + 1, size, unit, float(getattr(limits, name)[i]), at))
+    for i, leg in enumerate(robot.legs):
+        if not any(limits.lines[i : i + 1]):
+            continue
+        size, most, at = motor_peak(leg.drive or Drive(), given[..., i], asked.first[:, i])
+        told = leg.joint.force_unit, most, at % len(pose)
+        found.append(Peak("force_at_speed", i + 1, size, *told))
     for name, part in zip(("tool_speed", "tool_acceleration"), asked.tool, strict=True):
         sizes = np.linalg.norm(part, axis=-1)
         at = int(np.argmax(sizes))

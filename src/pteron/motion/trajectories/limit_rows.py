@@ -44,14 +44,17 @@ def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
             part.append((np.broadcast_to(values, linear.shape) / limit)[:, has])
 
     zero = np.zeros_like(asked.first)
+    joints, force, fall, back = limits.force_lines
     moving = np.sign(asked.first)
     for side in (1.0, -1.0):
         against = side * moving > 0.0
         dry = np.where(against, asked.dry[1], asked.dry[0]) * side * moving
         add(side * asked.first, side * asked.second, zero, zero, limits.acceleration)
         still = side * asked.still + dry
-        root = side * asked.viscous * asked.first
-        add(side * asked.growth, side * asked.square, still, root, limits.force)
+        root = side * (asked.viscous[joints] + back) * asked.first[:, joints]
+        root += fall * np.abs(asked.first[:, joints])
+        linear, square = (side * part[:, joints] for part in (asked.growth, asked.square))
+        add(linear, square, still[:, joints], root, force)
     speed, bend = asked.tool
     if math.isfinite(limits.tool_acceleration):
         # Both lie in a plane: speed along its x, and what is left of the bend along its y.

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.arguments import checked_arguments, number_or_nan
 from pteron.errors import DataError, shown
 from pteron.kernels import Array
 from pteron.legs import Drive
+from pteron.legs.motor_limits import SpeedLine, speed_lines
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 PerJointLimit = float | Sequence[float] | Array | None
@@ -23,6 +25,8 @@ PerJointLimit = float | Sequence[float] | Array | None
 class MotionLimits:
     """Largest speeds, accelerations and forces, infinite without a limit. Made by `limits_of`.
 
+    A drive whose force is limited by its speed has lines |f + back q'| <= force - fall |q'| beside.
+
     Attributes
     ----------
     speed, acceleration : array, shape (n,)
@@ -31,6 +35,8 @@ class MotionLimits:
         Limits of the drives, N or N m: their friction and their motors' inertia take a part of it.
     tool_speed, tool_acceleration : float
         Limits of the tool's centre point, m/s and m/s^2.
+    lines : tuple of tuple of SpeedLine
+        What curve and winding of each drive leave at speed.
     """
 
     speed: Array
@@ -38,12 +44,22 @@ class MotionLimits:
     force: Array
     tool_speed: float = math.inf
     tool_acceleration: float = math.inf
+    lines: tuple[tuple[SpeedLine, ...], ...] = ()
 
     @property
     def bounds_acceleration(self) -> bool:
         """Whether any limit bounds the acceleration."""
         finite = np.isfinite([*self.acceleration, *self.force, self.tool_acceleration])
-        return bool(finite.any())
+        return bool(finite.any()) or any(self.lines)
+
+    @property
+    def force_lines(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
+        """All limits of forces, as lines: joint, force, fall and back, (R,) each."""
+        flat = [(i, (force, 0.0, 0.0)) for i, force in enumerate(self.force) if force < math.inf]
+        every = [*flat, *((i, one) for i, lines in enumerate(self.lines) for one in lines)]
+        joints = np.array([i for i, _ in every], dtype=np.int64)
+        force, fall, back = np.array([line for _, line in every]).reshape(-1, 3).T
+        return joints, force, fall, back
 
     @property
     def any(self) -> bool:
@@ -65,7 +81,8 @@ def limits_of(
     Parameters
     ----------
     robot : Manipulator, name or path
-        The machine; its drives' `max_speed` and `max_force` count where nothing else is given.
+        The machine; its drives' `max_speed` and `max_force` count where nothing else is given, and
+        what their `curve` and `winding` leave at speed in any case.
     speed, acceleration, force : float or sequence of n floats, optional
         Of each joint: m/s, m/s^2 and N, or rad/s, rad/s^2 and N m.
     tool_speed, tool_acceleration : float, optional
@@ -93,13 +110,11 @@ def limits_of(
         per_joint(robot, "speed", speed, [drive.max_speed for drive in drives]),
         per_joint(robot, "acceleration", acceleration, [None] * len(drives)),
         per_joint(robot, "force", force, [drive.max_force for drive in drives]),
-        *(
-            math.inf if value is None else _positive(name, value)
-            for name, value in (
-                ("tool_speed", tool_speed),
-                ("tool_acceleration", tool_acceleration),
-            )
-        ),
+        math.inf if tool_speed is None else _positive("tool_speed", tool_speed),
+        math.inf
+        if tool_acceleration is None
+        else _positive("tool_acceleration", tool_acceleration),
+        tuple(map(speed_lines, drives)),
     )
 
 

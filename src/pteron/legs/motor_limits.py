@@ -1,0 +1,94 @@
+"""What a motor's curve and winding leave of a drive's force at a speed, at the joint."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.legs.drive import Drive
+
+
+class SpeedLine(NamedTuple):
+    """A straight limit of a drive's force f by its speed q': |f + back q'| <= force - fall |q'|."""
+
+    force: float
+    fall: float
+    back: float
+
+
+def supply(drive: Drive) -> tuple[float, float]:
+    """Return what a winding gives at rest, N or N m, and by how much less for each m/s or rad/s."""
+    winding, gear = drive.winding, abs(drive.gear)
+    if winding is None:
+        raise ValueError("drive: has no winding")
+    stall = gear * winding.torque_constant * winding.voltage / winding.resistance
+    return stall, (gear * winding.torque_constant) ** 2 / winding.resistance
+
+
+def within_motor(
+    drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return forces (...) of a drive, cut to what its motor can give at its rates (...).
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    forces : array, shape (...)
+        What is asked of it, N or N m.
+    rates : array, shape (...)
+        Of the motor, counted at the joint, m/s or rad/s.
+    """
+    if drive.curve:
+        speeds, most = np.array(drive.curve).T
+        most = np.interp(np.abs(rates), speeds, most)
+        forces = np.clip(forces, -most, most)
+    if drive.winding:
+        stall, back = supply(drive)
+        forces = np.clip(forces, -stall - back * rates, stall - back * rates)
+    return forces
+
+
+class MotorPeak(NamedTuple):
+    """The moment at which a drive's force is nearest to, or most beyond, what its motor gives."""
+
+    force: float
+    """Its size, N or N m."""
+    most: float
+    """The greatest that the motor gives that way at its speed."""
+    at: int
+    """The place of the moment in the array, flat."""
+
+
+def motor_peak(drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.float64]) -> MotorPeak:
+    """Return the hardest moment of a drive's forces and rates (...), of which NaN are none."""
+    forces, rates = np.broadcast_arrays(forces, rates)
+    side = np.where(forces < 0.0, -1.0, 1.0)
+    most = np.maximum(side * within_motor(drive, side * np.inf, rates), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(forces == 0.0, 0.0, np.abs(forces) / most)
+    at = int(np.nan_to_num(shares, nan=-1.0, posinf=np.inf).argmax())
+    return MotorPeak(abs(float(forces.flat[at])), float(most.flat[at]), at)
+
+
+def speed_lines(drive: Drive) -> tuple[SpeedLine, ...]:
+    """Return straight limits that curve and winding keep: all that motions are planned with.
+
+    They are the winding's and, as long as each piece of the curve falls faster than the one before,
+    the curve's. Where it falls more slowly again, the steeper piece goes on and allows less.
+    """
+    found: list[SpeedLine] = []
+    if drive.curve:
+        ends = (0.0, drive.curve[0][1]), (math.inf, drive.curve[-1][1])
+        for (slow, high), (fast, low) in pairwise([ends[0], *drive.curve, ends[1]]):
+            if fast > slow and all(one.force - one.fall * fast > low for one in found):
+                fall = (high - low) / (fast - slow)
+                found.append(SpeedLine(high + fall * slow, fall, 0.0))
+    if drive.winding:
+        stall, back = supply(drive)
+        found.append(SpeedLine(stall, 0.0, back))
+    return tuple(found)
