@@ -465,8 +465,8 @@ BAD_FILES = {
     "a decimal comma": (
         "mass = 0.8",
         "mass = 0,8",
-        "not a TOML file (Expected newline or end of document after a statement (at line 11, column "
-        "9); 0,8 has a decimal comma, write a point)",
+        "not a TOML file (Expected newline or end of document after a statement (at line 11, "
+        "column 9); 0,8 has a decimal comma, write a point)",
     ),
     "a key twice": ("mass = 0.8", "mass = 0.8\nmass = 0.8", "not a TOML file (Cannot overwrite"),
     "directions in a plane": (

@@ -213,7 +213,7 @@ def log_scale(axes: Axes, low: float, high: float) -> None:
         fine = np.outer(10.0 ** np.arange(first - 1, last + 1), (1.0, 2.0, 5.0)).ravel()
         ticks = fine[(fine >= low) & (fine <= high)]
     if len(ticks) < 2:  # one number tells no scale
-        fine = MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high)
+        fine = np.array(MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high))
         ticks = fine[(fine >= low) & (fine <= high)]
     axes.xaxis.set_major_locator(FixedLocator(ticks.tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
