@@ -306,7 +306,7 @@ def test_columns_and_units_are_those_of_the_joints(mixed: str, monkeypatch: pyte
     ("cells", "words"),
     [
         ("0,0,0.9,0", ["misses it by", "--on-failure nan"]),
-        ("0,0,,0", ["column z", "the cell is empty", "on-failure nan"]),
+        ("0,0,,0", ["column z", "the cell is empty", "empty with --on-failure nan"]),
         ("0,nan,0,0", ["column y", "'nan' given, a finite number expected"]),
         ("0,0,0,abc", ["column phi", "'abc' given, a number expected"]),
         ("0,0,0", ["has 3 cells, but the header names 4 columns"]),

@@ -309,6 +309,9 @@ def test_pictures_show_what_they_are_given():
     low, high = axes.get_xlim()
     assert low < 1.0
     assert high > 30.0
+    same = errors_figure(np.array([1.95, 2.3]), np.array([1.98, 2.31]), np.array([2.1, 2.2]))
+    low, high = same.axes[0].get_xlim()
+    assert sum(low < tick < high for tick in same.axes[0].get_xticks()) > 1, "one tells no scale"
     ratios = np.array([5.0, np.inf, 0.0])
     axes = certainty_figure(["a", "b", "c"], ratios, ratios < 2.0, 2).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["c", "b", "a"]

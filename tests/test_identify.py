@@ -6,6 +6,7 @@ import weakref
 from dataclasses import replace
 from functools import partial
 
+import casadi as ca
 import numpy as np
 import pytest
 from logs_of_motions import Friction, log_of, machine, truth
@@ -602,6 +603,28 @@ def test_an_error_that_an_extension_makes_of_an_interrupt_is_an_interrupt():
 
     with pytest.raises(KeyboardInterrupt), insistent_interrupts():
         build()
+
+
+def test_an_interrupt_in_casadi_gets_through_once_its_call_is_over():
+    def interrupted(_):
+        signal.raise_signal(signal.SIGINT)
+        return ca.SX(0)
+
+    # CasADi asks a value for its expression as it looks which form of a function fits, and drops
+    # what is raised there: its call would fail.
+    value = type("Value", (), {"__SX__": interrupted})()
+    done = []
+
+    def work():
+        done.append(ca.sin(value))
+        time.sleep(5.0)
+        done.append("slept to the end")
+
+    with pytest.raises(KeyboardInterrupt), insistent_interrupts():
+        work()
+    assert len(done) == 1
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    time.sleep(0.05)  # no second interrupt comes
 
 
 # Files ---------------------------------------------------------------------------------------

@@ -462,6 +462,12 @@ BAD_FILES = {
     "empty name": ('"quadrupteron"', '" "', "name: ' ' is not a text with at least one letter"),
     "legs that are none": ("[platform]", "legs = 3\n[platform]", "not a TOML file"),
     "not TOML": ("mass = 0.8", "mass = = 0.8", "not a TOML file (Invalid value (at line 11"),
+    "a decimal comma": (
+        "mass = 0.8",
+        "mass = 0,8",
+        "not a TOML file (Expected newline or end of document after a statement (at line 11, "
+        "column 9); 0,8 has a decimal comma, write a point)",
+    ),
     "a key twice": ("mass = 0.8", "mass = 0.8\nmass = 0.8", "not a TOML file (Cannot overwrite"),
     "directions in a plane": (
         "direction = [0.0, 0.0, 1.0]",

@@ -60,6 +60,7 @@ def test_a_csv_file_is_read_however_it_was_written(given, content: bytes):
         (b"x,y\n1,\xff\n", "not UTF-8 text"),
         ("x,y\n1,2\n".encode("utf-16"), "not UTF-8 text"),
         (b"x,y,x\n1,2,3\n", "two columns are called 'x'"),
+        (b"0,-.5,0\n1,2,3\n", "its first line has numbers; it must name the columns"),
         (b"x,\ry\n1,2\n", "row 1 (line 2) has 1 cells"),
         (b'x,"y\n1,2\n', "its header is not CSV (unexpected end of data); check its quotes"),
         (b"x;y\n1,5;2\n", "its cells look separated by semicolons, with decimal commas; separate"),

@@ -1,4 +1,4 @@
-"""Writing of files whole or not at all: where one fails, what was there before stays."""
+"""Writing of files whole or not at all: if writing fails, the former files are unchanged."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pteron.errors import OutputError
 
 
 def write_texts(folder: str | Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write files to `folder` in UTF-8, by their names: all of them, or none.
+    """Write texts in UTF-8 to files of a folder, by their names: all of them, or none.
 
     Raises
     ------
     OutputError
-        If the folder cannot be made or written, or UTF-8 has no form of a text; files that were
-        there are left as they were.
+        If the folder cannot be made or written, or a text cannot be encoded in UTF-8; former files
+        are then unchanged.
     """
     target = make_folder(folder)
     return write_files(
@@ -36,7 +36,7 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
     Raises
     ------
     OutputError
-        If the folder is missing or cannot be written; a file that was there is left as it was.
+        If the folder is missing or cannot be written; a former file is then unchanged.
     """
     return write_files({Path(path): data})[0]
 
@@ -44,7 +44,8 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
 def write_files(files: Mapping[Path, bytes]) -> list[Path]:
     """Write files, all of them or none, and return their paths.
 
-    Every file is written beside its place before the first is renamed: a full disk loses nothing.
+    Every file is first written under a temporary name in its folder, then all are renamed: a full
+    disk loses nothing.
 
     Raises
     ------

@@ -60,6 +60,11 @@ _STRING_OR_COMMENT = re.compile(
     r"|#[^\n]*",
     re.DOTALL,
 )
+_DECIMAL_COMMA = re.compile(
+    r"^[ \t]*[\w.-]+[ \t]*=[ \t]*([+-]?\d+,\d+)[ \t]*(?:#.*)?\r?$", re.MULTILINE
+)
+"""A line that gives a key a number with a decimal comma."""
+
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_PARTS}}}")
 
 
@@ -122,6 +127,8 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
         reason = shown(str(fault), bare=True, longest=200)
+        if comma := _DECIMAL_COMMA.search(text):
+            reason += f"; {comma[1]} has a decimal comma, write a point"
     except RecursionError:
         reason = "its brackets are nested too deeply"
     except ValueError:  # of `int`

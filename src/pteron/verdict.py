@@ -1,4 +1,4 @@
-"""The verdict on what logs or measurements tell of a machine: a grade, reasons and advice."""
+"""The verdict on an identified or calibrated machine: a grade, reasons and advice."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Verdict:
 
 @dataclass
 class Opinion:
-    """A verdict in the making."""
+    """A verdict to which reasons are added, and whose grade may fall."""
 
     grade: Grade = "trustworthy"
     reasons: list[str] = field(default_factory=list)

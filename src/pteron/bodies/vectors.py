@@ -23,14 +23,14 @@ _VANISHING = 1e-9
 """Singular value of stacked unit vectors below which they do not span its direction."""
 
 _ROUNDING = 4 * math.ulp(1.0)
-"""Difference from length 1 up to which a vector is kept as it is given."""
+"""Greatest difference of the length from 1 of a vector that is kept bit for bit."""
 
 _UPRIGHT = 1e-15
-"""Cosine of two unit vectors up to which the one is kept as perpendicular to the other."""
+"""Greatest cosine of two unit vectors that count as perpendicular to rounding."""
 
 
 def number(value: object, key: str) -> float:
-    """Return `value` as a finite float, or say under which `key` it is not one."""
+    """Return `value` as a finite float, or raise an error that names its `key`."""
     try:
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -106,7 +106,8 @@ def unit_vector(values: Sequence[object], key: str) -> Vector:
 def perpendicular(values: Sequence[object], axis: Vector, key: str, other: str) -> Vector:
     """Return `values` as `unit_vector` does, made perpendicular to a unit vector to rounding.
 
-    One that leans is refused first, whatever its length: what to write is then right in both.
+    A vector that is not perpendicular is refused before its length is checked: the message then has
+    one that is right in both.
     """
     given = vector(values, key)
     lean, size = dot(given, axis), norm(given)
@@ -155,7 +156,7 @@ def scaled(a: Vector, factor: float) -> Vector:
 
 
 def moved(point: Vector, direction: Vector, way: float) -> Vector:
-    """Return a point moved `way` along a direction."""
+    """Return a point moved by `way`, m, along a direction."""
     return (
         point[0] + way * direction[0],
         point[1] + way * direction[1],
@@ -169,13 +170,13 @@ def parallel(a: Vector, b: Vector) -> bool:
 
 
 def vertical(d: Vector, gravity: Vector) -> bool:
-    """Say whether gravity has no part across a unit vector."""
+    """Say whether gravity has no component perpendicular to a unit vector."""
     size = norm(gravity)
     return size == 0.0 or parallel(d, scaled(gravity, 1.0 / size))
 
 
 def complement(axes: ArrayLike) -> NDArray[np.float64]:
-    """Return rows that span what is perpendicular to given vectors."""
+    """Return orthonormal rows (k, 3) that span the complement of vectors (n, 3)."""
     matrix = np.asarray(axes, dtype=float).reshape(-1, 3)
     _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
     spanning: NDArray[np.float64] = rows[int((sizes > _VANISHING).sum()) :]

@@ -29,7 +29,7 @@ _BY_DATA = 0.3
 """Deviation after the fit, as a share of the tolerance, up to which the data made a value."""
 
 _BY_TOLERANCE = 0.9
-"""The share from which on the value is that of the drawing, within its tolerance."""
+"""Deviation after the fit, as a share of the tolerance, from which the value is the drawing's."""
 
 _QUANTILE = float(scipy.stats.norm.ppf(0.975))
 
@@ -43,11 +43,12 @@ class Value:
     name, group, unit : str
         As in `Unknown`.
     drawn, found : float
-        In SI units; of a direction what it turned about an axis, rad.
+        The value in the drawing and after calibration, SI units; for a direction the angle about an
+        axis, rad.
     deviation : float
-        Standard deviation.
+        Standard deviation of `found`.
     origin : {"data", "both", "tolerance"}
-        What made it.
+        Its source: measurements, both, or the drawing with its tolerance.
     """
 
     name: str
@@ -60,30 +61,33 @@ class Value:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Where it is with 95 %."""
+        """The 95 % interval."""
         half = _QUANTILE * self.deviation
         return self.found - half, self.found + half
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Root mean square errors at rows that the fit did not see, by kind, before and after; SI."""
+    """Root mean square errors at held-out rows, by kind of measurement, in SI units.
+
+    `before` is with the machine as drawn, `after` with the calibrated one.
+    """
 
     rows: int
     before: dict[str, float]
     after: dict[str, float]
     expected: dict[str, float]
-    """After, from the noise and the intervals."""
+    """The expected values of `after`, from the noise and the intervals."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault that the measurements show: a kind, where, and a sentence."""
+    """A fault that the measurements show: its kind, and a sentence that says where it is."""
 
     kind: str
     text: str
     improvement: float = 0.0
-    """By how much the squared residuals fall with it, in variances."""
+    """Fall of the sum of squared residuals with this fault in the fit, in variances."""
 
 
 @dataclass(frozen=True)
@@ -95,12 +99,12 @@ class Calibration:
     drawn : Manipulator
         The machine as it was given.
     robot : Manipulator
-        The machine as it was found; its legs hold the readings' zeros and scales.
+        The calibrated machine; its legs hold the readings' zeros and scales.
     values : tuple of Value
     noise : dict
-        Standard deviation by kind of measurement, given or found.
+        Standard deviation by kind of measurement, given or estimated.
     observability : Observability
-        What the measurements can show.
+        The rank of the measurements, and the combinations that they do not show.
     held_out : HeldOut or None
         Errors at rows that were not fitted.
     findings : tuple of Finding
@@ -108,9 +112,9 @@ class Calibration:
     verdict : Verdict
     measurements : Measurements
     fit : Fit
-        Of all rows.
+        The fit of all rows.
     blocks : tuple of Block
-        What was sought, in the order of `values`.
+        The unknowns, in the order of `values`.
     start : Guess
         The machine as drawn, with its surroundings as described.
     """
@@ -129,22 +133,24 @@ class Calibration:
     start: Guess
 
     def errors(self, poses: ArrayLike) -> tuple[Array, Array]:
-        """Return where the tool goes wrong at poses: by how much as drawn, and what stays open.
+        """Return the errors of the tool at poses as drawn, and their uncertainty as calibrated.
 
-        Of a machine whose platform turns only, it is the pose's angles that go wrong, rad.
+        For a platform that only turns, they are those of the pose's angles, rad.
 
         Parameters
         ----------
         poses : array, shape (N, m)
-            Poses that are asked for, m and rad.
+            The desired poses, m and rad.
 
         Returns
         -------
         before : array, shape (N, 3) or (N, m)
-            From where the tool is asked to be to where the found machine takes it when it is driven
-            as drawn, in the base frame, m; or the angles' differences; NaN where it cannot go.
+            Error of the calibrated machine when it is driven as drawn: from the desired place of
+            the tool to the actual one, in the base frame, m; or the angles' errors; NaN where the
+            pose is out of reach.
         after : array, shape (N,)
-            Standard deviation of the tool's place, or of the angles, when driven as found.
+            Standard deviation of the tool's place, m, or of the angles, rad, when driven as
+            calibrated.
         """
         asked = np.atleast_2d(np.asarray(poses, dtype=float))
         slopes = MachineSlopes(self.drawn, self.blocks)
@@ -162,7 +168,7 @@ class Calibration:
         return before, np.sqrt(np.maximum(variances(moved, self.fit.covariance), 0.0))
 
     def misfit(self, other: Guess | Sequence[float]) -> float:
-        """Return by how much the squared residuals and tolerances grow from here to other values.
+        """Return the growth of the sum of squared residuals, tolerances included, at other values.
 
         Below the chi-squared quantile of as many degrees as there are values, the other values are
         in the joint region of that probability. Steps from the drawing are given in the order of
@@ -214,7 +220,7 @@ def _origin(left: float, unknown: Unknown) -> Origin:
 
 
 def calibrated(guess: Guess) -> Manipulator:
-    """Return the machine of a guess; its geometry takes the zeros that it can."""
+    """Return the machine of a guess, with zeros of readings moved into the geometry if possible."""
     legs = []
     each = zip(guess.robot.legs, guess.zeros.tolist(), guess.scales.tolist(), strict=True)
     for leg, zero, scale in each:

@@ -14,33 +14,37 @@ from pteron.reduction.numerical import independent
 Array = NDArray[np.float64]
 
 _PART = 0.02
-"""Least part of a combination that is named, as a share of its greatest."""
+"""Least coefficient of a combination that is named, as a share of the greatest one."""
 
 _NAMED = 6
-"""Most values that are named of a combination, and most combinations that have no common name."""
+"""Greatest number of values named of a combination, and of combinations without a name of their
+own."""
 
 _WHOLE = 0.9995
-"""A part, over the greatest one, that counts as 1."""
+"""Coefficient, over the greatest one, that is printed as 1."""
 
 _INSIDE = 1e-5
-"""Part of a combination outside the space of unseen ones up to which it counts as one of them."""
+"""Greatest distance of a unit combination from the space of unseen ones that counts as zero."""
 
 
 def unseen_combinations(
     start: Guess, blocks: Sequence[Block], axes: Array, tolerances: Array
 ) -> tuple[str, ...]:
-    """Return the combinations that the rows of `axes` span, in words, with a number where several.
+    """Return the combinations that the rows of `axes` span, in words.
+
+    Known combinations, such as a motion of the whole machine, come first, with their number; then
+    a basis of the rest.
 
     Parameters
     ----------
     start : Guess
         The machine.
     blocks : sequence of Block
-        What is sought.
+        The unknowns.
     axes : array, shape (u, p)
-        Orthonormal, in units of the tolerances.
+        An orthonormal basis of the unseen combinations, in units of the tolerances.
     tolerances : array, shape (p,)
-        Those units.
+        The tolerances of the p unknowns, SI units.
     """
     lines: dict[str, list[str]] = {}
     left = axes
@@ -52,7 +56,7 @@ def unseen_combinations(
         scaled = scaled / size
         if np.linalg.norm(scaled - axes.T @ (axes @ scaled)) > _INSIDE:
             continue
-        # What is left is at right angles to what was named.
+        # The rest of the space is orthogonal to the named combinations.
         along = left @ scaled
         if np.linalg.norm(along) < _INSIDE:
             continue
@@ -73,7 +77,7 @@ def unseen_combinations(
 
 
 def told(vector: Array, names: Sequence[str]) -> str:
-    """Return a combination in words: its greatest parts, for a greatest one of 1."""
+    """Return a combination in words: its greatest terms, scaled so that the first is 1."""
     parts = vector / vector[np.abs(vector).argmax()]
     order = np.argsort(-np.abs(parts), kind="stable")
     named = [k for k in order if abs(parts[k]) >= _PART]
@@ -87,7 +91,7 @@ def told(vector: Array, names: Sequence[str]) -> str:
 
 
 def _known(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Array]]:
-    """Yield combinations that have a name: text, whose, and the vector (p,)."""
+    """Yield the combinations that have a name: its text, its owner, and the vector (p,)."""
     robot = start.robot
     names = [unknown.name for block in blocks for unknown in block.unknowns]
     place = {name: k for k, name in enumerate(names)}
@@ -167,7 +171,7 @@ def _rigid(
 
 
 def _size(start: Guess, blocks: Sequence[Block]) -> Array:
-    """Return all lengths growing alike."""
+    """Return the vector (p,) of a growth of all lengths by one factor."""
     legs = start.robot.legs
     lengths = [
         unknown.unit == "m" or (block.kind == "scales" and legs[block.legs[k]].joint.unit == "m")
@@ -178,7 +182,7 @@ def _size(start: Guess, blocks: Sequence[Block]) -> Array:
 
 
 def _sparse(rows: Array) -> Array:
-    """Return rows that span the same with as few parts as elimination leaves."""
+    """Return rows that span the same space, made sparse by elimination."""
     order = np.argsort(-np.abs(rows).max(axis=0, initial=0.0), kind="stable").tolist()
     taken = independent(rows, order, len(rows), least=1e-6)[0]
     work = np.asarray(np.linalg.solve(rows[:, taken], rows), dtype=float)

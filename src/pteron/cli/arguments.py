@@ -26,25 +26,25 @@ STANDARD = "adept"
 """The name of the pick-and-place cycle of 25, 305 and 25 mm."""
 
 Failure = Literal["raise", "nan"]
-"""Whether a row that fails ends the command or is left empty."""
+"""Handling of a row that fails: it ends the command ("raise") or is left empty ("nan")."""
 
 MOTION = ("--pose", "--velocity", "--acceleration", "--wrench")
 """The options that give a state of motion, as several numbers each."""
 
 VECTORS = (*MOTION, "--from", "--to", "--around", "--speed", "--force", "--jerk")
-"""The options that take all numbers that follow them."""
+"""The options that take several numbers: all that follow them."""
 
 
 class Command(TyperCommand):
-    """A command whose help gives its flags no type."""
+    """A command whose help shows flags without a type."""
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """Return the parameters; ``--json <bool>`` would look as if it took a value."""
+        """Return the parameters; a flag is ``--json``, not ``--json <bool>``."""
         return without_types(super().get_params(ctx))
 
 
 def without_types(parameters: list[Any]) -> list[Any]:
-    """Return a command's parameters, the flags among them without a type in the help."""
+    """Return a command's parameters; flags get no type in the help."""
     for parameter in parameters:
         if getattr(parameter, "is_flag", False):
             parameter.metavar = ""
@@ -66,7 +66,7 @@ class NumbersCommand(Command):
 
 
 def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
-    """Return arguments with an option's numbers joined by commas and the free ones behind ``--``.
+    """Return arguments with each option's numbers joined by commas, and the others behind ``--``.
 
     `valued` are the options that take a value.
 
@@ -108,7 +108,7 @@ def _meant_for_vector(words: Sequence[str]) -> int:
 
 
 def _numeric(word: str) -> bool:
-    """Say whether a word is meant as a number, also where it is none, as in -0.1.2."""
+    """Say whether a word is meant as a number, even if it is not one, such as -0.1.2."""
     if word[:1] == "-" and word[1:2] and word[1] in ".0123456789":
         return True
     try:
@@ -120,7 +120,7 @@ def _numeric(word: str) -> bool:
 
 
 def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
-    """Return the finite numbers in words, apart by blanks or commas; `names` say what each is."""
+    """Return the finite numbers in words separated by blanks or commas, one for each name."""
     parts = " ".join(words).replace(",", " ").split()
     values = []
     for part in parts:
@@ -140,7 +140,7 @@ def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> lis
 
 
 def parsed_list(text: str | None, what: str) -> list[float] | None:
-    """Return the numbers in an option's text, as many as there are; None where it is left out."""
+    """Return all numbers in an option's text; None where the option is left out."""
     if text is None:
         return None
     words = text.replace(",", " ").split()
@@ -167,7 +167,7 @@ def split_numbers(
 
 
 def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = False) -> Manipulator:
-    """Load a machine, in the working mode that `elbows` says, such as ``++-+``.
+    """Load a machine in a working mode, given by `elbows` such as ``++-+``.
 
     Warnings about its file are shown unless `quiet`.
     """
@@ -189,11 +189,11 @@ def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = Fa
 
 
 def check_rate(rate: float) -> None:
-    """Refuse a rate that is none."""
+    """Refuse a sampling rate that is not a number above 0."""
     if not 0.0 < rate < math.inf:
         raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
 
 
 def signs(robot: Manipulator) -> str:
-    """Return a machine's working mode as one sign a leg."""
+    """Return a machine's working mode as text: + or - for each leg."""
     return "".join("+" if leg.elbow > 0 else "-" for leg in robot.legs)

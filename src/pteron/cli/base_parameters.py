@@ -22,7 +22,7 @@ Format = Literal["text", "sympy", "latex", "booktabs", "json"]
 """Forms in which base parameters are printed."""
 
 _COMMENTS = {"sympy": "#", "latex": "%", "booktabs": "%"}
-"""Signs before a comment, by form."""
+"""Characters that begin a comment, by form."""
 
 
 def base(
@@ -37,16 +37,16 @@ def base(
 ) -> Result:
     """Find the base inertial parameters: the sums of parameters that act on the forces.
 
-    Formats latex and booktabs are lines of mathematics, and a table with values for a paper.
+    The format latex prints lines of mathematics, booktabs a table with values for a paper.
 
     Options
     -------
     --method: Exact arithmetic with a proof, or a numerical rank.
     --keep NAMES: Parameters to keep before others: I_l1,m_l4.
     --shared: All legs share one set of inertial parameters.
-    --format: How they are written.
+    --format: The form in which they are printed.
     --symbols: Write the coefficients in symbols of the geometry.
-    --leg-symbols: The same, and equal lengths of several legs share no symbol.
+    --leg-symbols: The same, with symbols of each leg: equal lengths share none.
 
     Examples
     --------

@@ -24,10 +24,10 @@ _NOT_PROVED = 1
 """Exit code for a region that is not proved."""
 
 TOLERANCE = 0.05
-"""Default of the greatest undecided share of a volume: it takes some seconds."""
+"""Default of the greatest undecided share of a volume; smaller ones take longer than seconds."""
 
 _SHAPES = {1: ("length", "interval"), 2: ("area", "square"), 3: ("volume", "cube")}
-"""The size that is proved and the shape inscribed in it, by the number of the pose's lengths."""
+"""Nouns for the size of a workspace and the shape inscribed in it, by its number of lengths."""
 
 _MAY_BE_SINGULAR = (
     "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."
@@ -42,13 +42,13 @@ class Proofs:
     Parameters
     ----------
     certify : bool
-        The whole workspace at an orientation.
+        Whether to prove the size of the whole workspace at an orientation.
     prove : str or None
-        A box of poses.
+        A box of poses to prove, as typed.
     tolerance : float or None
-        Greatest undecided share of the whole.
+        Greatest undecided share of the workspace.
     type_i, type_ii : float or None
-        Least singularity measures; None where they do not matter.
+        Least singularity measures; None for no bound.
     """
 
     certify: bool
@@ -64,11 +64,11 @@ class Proofs:
 
     @property
     def floors(self) -> dict[str, float]:
-        """The least measures, 0 where they do not matter."""
+        """The least measures by name, 0 for no bound."""
         return {"type_i": self.type_i or 0.0, "type_ii": self.type_ii or 0.0}
 
     def check(self, maps: Mapping[str, object], slice_: str | None) -> None:
-        """Refuse options that do nothing beside others, and numbers out of range."""
+        """Refuse options that have no effect together, and numbers out of range."""
         own = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
         if self.prove is not None:
             _expect_none({**maps, "slice": slice_, "certify": self.certify or None}, "--prove")
@@ -83,7 +83,7 @@ class Proofs:
                 raise DataError(f"--{name}: {value:g} given, a number {least} expected")
 
     def result(self, robot: Manipulator, slice_: str | None, warnings: list[str]) -> Result:
-        """Prove it and return the result; the exit code is 1 if a box is not proved."""
+        """Run the proof and return its result; the exit code is 1 if a box is not proved."""
         if self.prove is None:
             pose = _orientation(robot, slice_)
             proved = self._certify if robot.platform.lengths else self._leaning
@@ -136,14 +136,14 @@ class Proofs:
 
 
 def _expect_none(given: Mapping[str, object], what: str) -> None:
-    """Refuse options that do nothing beside another."""
+    """Refuse options that have no effect beside `what`."""
     for name, value in given.items():
         if value is not None and value != []:
             raise DataError(f"--{name}: does not go with {what}")
 
 
 def _orientation(robot: Manipulator, slice_: str | None) -> Array:
-    """Return a pose at the orientation that is asked for, or else at that of the home pose."""
+    """Return a pose at the orientation of --slice, else the home pose."""
     import numpy as np
 
     from pteron.maps.grid import expect_coordinates

@@ -1,6 +1,6 @@
-"""`pteron design`: a search for a machine's best dimensions by a TOML file that says what is asked.
+"""`pteron design`: a search for a machine's best dimensions, with requirements in a TOML file.
 
-With `--out` all that is evaluated is kept in a folder, and the search goes on there.
+With `--out` all evaluated designs are kept in a folder, from which a search that ended goes on.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ if TYPE_CHECKING:
     from pteron.design import Front, Spec, Summary
 
 _GENERATIONS, _SURVEY = "generations", "survey"
-"""Subfolders of the results that keep the designs evaluated: by a search, by `--sweep`."""
+"""Subfolders of the results for the designs evaluated by a search, and by `--sweep`."""
 
 _MOST_WORKERS = 8
-"""Most processes of a search where nothing else is asked: a generation has not many more designs
-for each."""
+"""Greatest number of processes by default: a generation has only some designs for each."""
 
 
 def design(
@@ -56,7 +55,7 @@ def design(
     Options
     -------
     --out FOLDER: Write the results to a folder, and go on there if ended.
-    --seed: Of all chance. [default: the file's]
+    --seed: Seed of the random numbers. [default: the file's]
     --sweep: Evaluate so many designs spread evenly, in whole files of 256, instead of a search.
     --workers: Processes that do the work. [default: of a search one a core, up to 8]
 
@@ -89,7 +88,7 @@ def design(
 
 
 def _tell_resumed(folder: Path) -> None:
-    """Say whether the search goes on from what is there."""
+    """Print whether the search goes on from evaluated designs in the folder."""
     for name, word in ((_GENERATIONS, "generations"), (_SURVEY, "blocks")):
         count = len([*(folder / name).glob("[0-9]*")])
         if count:

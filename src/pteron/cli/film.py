@@ -36,11 +36,11 @@ def film(
     Options
     -------
     --out, -o FILE: The film: .mp4 (H.264) or .gif.
-    --speed: Of the film: 1 is real time, 0.4 slow motion. [default: the largest of 1, 0.5, 0.2, 0.1
-        ... that takes 2 s]
+    --speed: Speed of the film: 1 is real time, 0.4 slow motion. [default: the largest of 1, 0.5,
+        0.2, 0.1 ... that takes 2 s]
     --fps: Frames a second.
     --size WIDTHxHEIGHT: Width and height, pixels, both even.
-    --turns: How often the eye goes round the machine; not of planar ones.
+    --turns: Turns of the view round the machine over the film; not for planar machines.
     --forces: Draw the drives' forces below.
 
     Examples

@@ -70,9 +70,9 @@ def identify(
 ) -> Result:
     """Identify a machine from recorded motions, and say whether the result can be trusted.
 
-    With --payload, what a payload adds is found from the motion recorded with it and without: in
-    one log whose column payload is 0, then 1, or in two logs, without.csv and with.csv, each with
-    that column, 0 throughout or 1. What is found is printed as the call set_payload of exported C.
+    With --payload, the inertia of a payload is found from the motion recorded with it and without:
+    in one log whose column payload is 0, then 1, or in two logs, without.csv and with.csv, each
+    with that column, 0 throughout or 1. It is printed as the call set_payload of exported C.
 
     The folder gets identification.html to read, identification.json with all numbers, and the
     machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
@@ -85,8 +85,8 @@ def identify(
     -------
     --robot ROBOT: The machine as it is drawn.
     --out DIR: The folder to write it to.
-    --held-out LOG: What to judge by; once for each. By default the last 30 % of every log.
-    --description TOML: Of all logs; by default beside each.
+    --held-out LOG: A log to judge by; once for each. By default the last 30 % of every log.
+    --description TOML: Description of all logs; by default that beside each.
     --estimator: How the equations are solved.
     --without TERMS: Leave out: coulomb,viscous,offset.
     --joints: Viscous friction in the passive joints.
@@ -97,11 +97,11 @@ def identify(
     --payload: A payload too: logs with it and without, column payload 1 and 0.
     --shared: All legs share one set of inertial parameters.
     --derivatives: How positions are differentiated; the data decide.
-    --cutoff HZ: Of the positions' filter.
-    --band HZ: Of the filter on both sides.
-    --period S: After which the motion repeats.
-    --cad WHICH: Bodies are near: robot, none, or a machine's file.
-    --box BODY=X0,X1,Y0,Y1: Holds all mass of u1, l3, e, u, ...; m.
+    --cutoff HZ: Cut-off of the positions' filter.
+    --band HZ: Cut-off of the parallel filter, on forces and regressor.
+    --period S: Time after which the motion repeats.
+    --cad WHICH: Bodies are sought near those of: robot, none, or a machine's file.
+    --box BODY=X0,X1,Y0,Y1: Box, m, that holds all mass of u1, l3, e, u, ...
 
     Examples
     --------
@@ -250,7 +250,7 @@ def _values(result: Identification) -> Table:
 
 
 def _payload(result: Identification) -> list[str]:
-    """Return how a controller and the commands take the payload that was found."""
+    """Return the lines that give the payload to a controller and to other commands."""
     from pteron.identification.payload import payload_in
 
     found = payload_in(result)

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import _thread
+import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Timer
+from types import FrameType
 from typing import TYPE_CHECKING
 
 from pteron.errors import PteronError
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
-    from types import FrameType
 
 _AGAIN = 0.02
-"""Seconds until an interrupt that was discarded is raised again."""
+"""Seconds until an interrupt that was discarded, or must wait, comes again."""
+
+_WAITS = 10
+"""Times that an interrupt waits for a call of CasADi to end; a longer call looks for it itself."""
 
 
 @contextmanager
@@ -25,26 +29,43 @@ def insistent_interrupts() -> Iterator[None]:
     """Raise an interrupt from the keyboard again if it was raised where errors are discarded.
 
     Python runs the handler of a signal between any two steps of the main thread, also in a callback
-    of the garbage collector or of a weak reference. What is raised there is printed and dropped:
-    the work would go on to its end. An extension that is interrupted while it is imported, or calls
-    Python, may report an error of its own instead, such as an ImportError.
+    of the garbage collector or of a weak reference. An exception there is printed and dropped: the
+    work would go on to its end. CasADi, too, drops exceptions while it looks which form of a
+    function fits its arguments; an interrupt in such a call comes again when that is over. An
+    extension that is interrupted while it is imported, or calls Python, may report an error of its
+    own instead, such as an ImportError.
     """
-    usual, heard = sys.unraisablehook, []
-    ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    usual, waits, raised = sys.unraisablehook, 0, False
+    timer = threading.Timer(_AGAIN, _interrupt)
 
-    def handler(number: int, frame: FrameType | None) -> None:
-        heard.append(number)
-        signal.default_int_handler(number, frame)
+    def again() -> None:
+        nonlocal timer
+        if not timer.is_alive():
+            timer = threading.Timer(_AGAIN, _interrupt)
+            timer.daemon = True
+            timer.start()
 
     def hook(args: UnraisableHookArgs) -> None:
-        if not issubclass(args.exc_type, KeyboardInterrupt):
+        if issubclass(args.exc_type, KeyboardInterrupt):
+            again()  # not at once: that would still be inside the callback
+        else:
             usual(args)
-            return
-        # Not at once: that would still be inside the callback.
-        again = Timer(_AGAIN, _thread.interrupt_main)
-        again.daemon = True
-        again.start()
 
+    def handler(number: int, frame: FrameType | None) -> None:
+        nonlocal waits, raised
+        waits += 1
+        if waits <= _WAITS and _in_casadi(frame):
+            again()
+        else:
+            waits, raised = 0, True
+            timer.cancel()
+            signal.default_int_handler(number, frame)
+
+    # A shell has programs in the background ignore Ctrl-C, and only the main thread may choose.
+    ours = (
+        signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        and threading.current_thread() is threading.main_thread()
+    )
     sys.unraisablehook = hook
     if ours:
         signal.signal(signal.SIGINT, handler)
@@ -53,10 +74,29 @@ def insistent_interrupts() -> Iterator[None]:
     except (PteronError, OSError):
         raise
     except Exception as error:
-        if heard or isinstance(error.__cause__, KeyboardInterrupt):
+        if raised or isinstance(error.__cause__, KeyboardInterrupt):
             raise KeyboardInterrupt from error
         raise
     finally:
-        sys.unraisablehook = usual
+        timer.cancel()
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.unraisablehook = usual
+
+
+def _interrupt() -> None:
+    """Interrupt the main thread, and where the system can the wait that it may be in."""
+    main = threading.main_thread().ident
+    if os.name == "posix" and main is not None:
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
+
+
+def _in_casadi(frame: FrameType | None) -> bool:
+    """Say whether a function of CasADi is among those that are running."""
+    while frame is not None:
+        if frame.f_globals.get("__name__") == "casadi.casadi":
+            return True
+        frame = frame.f_back
+    return False

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
-"""Keys of report.json with a value for each sample of the motion, too long to print."""
+"""Keys of report.json with a value for each sample of the motion: they are not printed."""
 
 
 def report(
@@ -29,8 +29,8 @@ def report(
 ) -> Result:
     """Write a report on a machine: one page with pictures, and its numbers.
 
-    The page is report.html, the numbers are in report.json beside it. Its forces are what the
-    machine needs with its payload, not those of a file, and it says where these differ.
+    The page is report.html, the numbers are in report.json beside it. Forces are computed for the
+    machine with its payload; if the motion's file has forces too, the page says where they differ.
 
     Options
     -------
@@ -42,7 +42,7 @@ def report(
     pteron report quadrupteron --out report
     pteron report quadrupteron --motion motion.csv --payload 0.5 --out report
     """
-    # The name is the page's heading, which says what the forces on it are with.
+    # The name is the page's heading: it says which payload the forces are computed with.
     machine = replace(carried.on(machine), name=f"{machine.name}{carried}")
     with spinner(f"Writing the report on {machine.name}"):
         from pteron.report import write_report

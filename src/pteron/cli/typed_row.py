@@ -1,6 +1,7 @@
-"""`TypedRow`: a row that was typed, and its results, in the text that `Table` would give.
+"""`TypedRow`: numbers typed on the command line, with their results, printed as a `Table` is.
 
-`pteron.tables` loads Polars, which takes longer than all else that a typed pose needs.
+It takes the place of `pteron.tables.Table`, which loads Polars: that takes longer than the whole
+calculation for one pose.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ Cell = float | int | None
 
 @dataclass(frozen=True)
 class TypedRow:
-    """Columns of finite numbers by name, all as long as each other; None is an empty cell."""
+    """Columns of finite numbers by name, all of one length; None is an empty cell."""
 
     cells: Mapping[str, Sequence[Cell]]
     source: str = "the command line"
@@ -36,37 +37,40 @@ class TypedRow:
 
     @property
     def frame(self) -> pl.DataFrame:
-        """The same as a data frame, to be written to a file."""
+        """The cells as a Polars data frame, to be written to a file."""
         import polars as pl
 
         return pl.DataFrame(dict(self.cells))
 
     def place(self, index: int) -> str:
-        """Return the place of a row."""
+        """Return the place of a row, from 0, for messages."""
         return f"{self.source}: row {index + 1}"
 
     def numbers(self, columns: Sequence[str], on_failure: str | None = None) -> NDArray[Any]:
-        """Return columns as an array of floats; whatever was typed is a finite number."""
+        """Return columns as an array of floats (rows, columns); typed numbers are finite."""
         return np.array([self.cells[name] for name in columns], dtype=float).T
 
     def extended(self, results: Mapping[str, ArrayLike]) -> TypedRow:
-        """Return the row with columns added behind its own, see `Table.extended`."""
+        """Return the rows with columns of results added, as `Table.extended` does."""
         added = {name: _column(values) for name, values in results.items()}
         return replace(self, cells=self._without(results) | added)
 
     def repeated(self, modes: Sequence[int | None], replaced: Collection[str]) -> TypedRow:
-        """Return the row once for each mode, before it `row`, behind it `mode`."""
+        """Return the row once for each mode, with a first column `row` and a last one `mode`.
+
+        Columns that are `replaced` are left out.
+        """
         kept = self._without({"row", "mode", *replaced})
         count = len(modes)
         cells = {name: [*values] * count for name, values in kept.items()}
         return replace(self, cells={"row": [1] * count, **cells, "mode": modes})
 
     def empty(self, column: str) -> int:
-        """Return how many cells of a column are empty."""
+        """Return the number of empty cells of a column."""
         return sum(cell is None for cell in self.cells[column])
 
     def rows(self, columns: Sequence[str], most: int) -> Iterator[tuple[Cell, ...]]:
-        """Return the first rows of columns."""
+        """Return the first rows of some columns, `most` of them."""
         return islice(zip(*(self.cells[name] for name in columns), strict=True), most)
 
     def json(self) -> str:
@@ -95,7 +99,7 @@ def _column(values: ArrayLike) -> list[Cell]:
 
 
 def _text(cell: Cell) -> str:
-    """Return a number as Polars writes it, with Python's digits and fewer zeros or exponents."""
+    """Return a number as Polars writes it: Python's digits, 0.00001 for 1e-05, e-6 for e-06."""
     text = "" if cell is None else repr(cell)
     if text.endswith("e-05"):
         sign, digits = text[: -len(text.lstrip("-"))], text[:-4].lstrip("-").replace(".", "")

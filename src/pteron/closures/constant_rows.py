@@ -9,6 +9,7 @@ numerically: the only denominator is N . j, which depends on the platform's angl
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -62,6 +63,10 @@ class ConstantRows(Closure):
 
     def vanishes(self) -> bool:
         """Say so where all rows lie in a plane, and for layouts with fourfold symmetry about k."""
+        return self._vanishes
+
+    @cached_property
+    def _vanishes(self) -> bool:
         sizes = np.linalg.svd(np.array(ca.evalf(self.rows)), compute_uv=False)
         if sizes[-1] <= _VANISHING * sizes[0] or self.orientation is None:
             return bool(sizes[-1] <= _VANISHING * sizes[0])

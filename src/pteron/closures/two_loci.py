@@ -17,7 +17,7 @@ from pteron.platforms.motion import PlatformEquations
 
 
 class TwoLoci(Closure):
-    """Two legs under a 2T platform."""
+    """Two legs under a 2T platform: two assembly modes, the two common points of their loci."""
 
     modes = 2
 

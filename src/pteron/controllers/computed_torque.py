@@ -10,11 +10,12 @@ from pteron.controllers.feedback import Feedback
 
 @dataclass(frozen=True)
 class ComputedTorque(Feedback):
-    """F = what the drives need for q'' = q''_d + K_p e + K_d e', in the measured state.
+    """F are the drive forces for q'' = q''_d + K_p e + K_d e' in the measured state.
 
-    With the true model the errors e = q_d - q obey e'' + K_d e' + K_p e = 0, at every joint by
-    itself. The pose is that of the measured joints, by Newton's method from the last one; the model
-    is taken in the middle of the period of the forces. Friction is that of the wanted rates.
+    With the true model the errors e = q_d - q obey e'' + K_d e' + K_p e = 0, each joint
+    independently. The pose is that of the measured joints, by Newton's method from the last one;
+    the model is evaluated at the middle of the sampling period. Friction is that of the wanted
+    rates.
 
     Parameters
     ----------
@@ -23,7 +24,7 @@ class ComputedTorque(Feedback):
     bandwidth : float or one for each joint, optional
         Rate at which an error decays, rad/s; by default 0.1 / period.
     damping : float or one for each joint
-        1 is the least without overshoot.
+        Damping ratio of an error; 1 is the least without overshoot.
     proportional, derivative : float or one for each joint, optional
         The gains themselves, 1/s^2 and 1/s.
 
@@ -43,7 +44,7 @@ class ComputedTorque(Feedback):
 
     @property
     def what(self) -> str:
-        """The name of its law."""
+        """The name of the law."""
         return "computed_torque"
 
     of_accelerations: ClassVar[bool] = True

@@ -25,11 +25,11 @@ class Law:
     Attributes
     ----------
     what : str
-        Its name, among `pteron.kernels.FUNCTIONS`.
+        Name of the law, one of `pteron.kernels.FUNCTIONS`.
     model : Manipulator
         The machine as the controller knows it.
     gains : array, shape (G,)
-        SI units.
+        The gains, in the order of `gain_names`, SI units.
     base : BaseParameters, optional
         The base parameters that an adaptive law estimates.
 
@@ -51,13 +51,13 @@ class Law:
     base: BaseParameters | None = field(default=None, repr=False)
 
     def memory(self, pose: PoseLike, velocity: PoseLike) -> Array:
-        """Return the memory with which to begin in a state of the machine.
+        """Return the law's memory before the first sample, for a state of the machine.
 
         Parameters
         ----------
         pose, velocity : array, shape (..., m)
-            m, rad and s. The pose may be some millimetres from that of the joints, as the last one
-            of a motion is; the wanted acceleration counts as zero before the first sample.
+            The state, m, rad and s. The pose may be some millimetres from that of the joints. The
+            wanted acceleration before the first sample is taken as zero.
 
         Returns
         -------
@@ -92,16 +92,16 @@ class Law:
             The platform's motion that is wanted at this sample; m, rad and s. Leading axes
             broadcast.
         joints, joint_rates : array, shape (..., n)
-            What is measured: m and m/s at a slider, rad and rad/s at a crank, as
+            The measured state of the joints: m and m/s at a slider, rad and rad/s at a crank, as
             `inverse_kinematics` gives them.
         memory : array, shape (..., K)
-            What the last sample, or `memory`, returned.
+            The memory that the call at the last sample, or `memory`, returned.
 
         Returns
         -------
         forces : array, shape (..., n)
-            Of the drives, N at a slider, N m at a crank. NaN where a leg does not reach the wanted
-            pose, where that is singular, or Newton's method finds no pose for the joints.
+            Forces of the drives, N at a slider, N m at a crank. NaN where a leg does not reach the
+            wanted pose, where that is singular, or Newton's method finds no pose for the joints.
         memory : array, shape (..., K)
         """
         wanted = pose, velocity, acceleration
@@ -118,7 +118,7 @@ class Law:
 
     @property
     def numbers(self) -> dict[str, Array]:
-        """Its gains and the model's numbers, as `pteron.kernels.loops.Loop.run` takes them."""
+        """The gains and the model's numbers, as `pteron.kernels.loops.Loop.run` takes them."""
         found = machine_numbers(self.model, self.program, "law")
         return found | {"law_gains": self.gains.reshape(1, 1, -1)}
 
@@ -127,12 +127,12 @@ class Law:
         return numeric(self.model, self.what, base=self.base)
 
     def estimates(self, memory: Array) -> Array:
-        """Return what an adaptive law estimates: base parameters, then drives where it does.
+        """Return the estimates of an adaptive law: base parameters, then those of drives, if any.
 
         Parameters
         ----------
         memory : array, shape (..., K)
-            What the law returned.
+            The memory that the law returned.
 
         Returns
         -------

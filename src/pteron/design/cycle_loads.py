@@ -1,4 +1,4 @@
-"""The loads of cycles on drives: the shortest time that they allow, and margins of motors."""
+"""Cycles and drives: the shortest time of a cycle within drives' limits, and motors' margins."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _RATES = np.array([1.0, 2.0, 3.0])
 """Rates at which forces are evaluated: they are quadratic in the rate."""
 
 _DECADES = 4.0
-"""Powers of ten below the ratio at which a motor is as fast as it may be, where one is sought."""
+"""Range of the search for a motor's ratio: powers of ten below that of its greatest speed."""
 
 
 def shortest_time(robot: Manipulator, motion: Motion) -> float:
-    """Return the time in which the drives can go a motion, evenly faster or slower, s.
+    """Return the shortest duration, s, of a motion within the drives' limits, by uniform scaling.
 
     At the rate u the forces are A + B u + C u^2 at each sample, and the first u at which one is at
-    its limit is exact. A part of dry friction by Stribeck's law counts at every speed.
+    its limit is exact. Stribeck's part of dry friction counts in full at every speed.
 
     Raises
     ------
@@ -98,9 +98,9 @@ def _at_its_best(sizing: Sizing, leg: int, motor: Motor) -> Fit:
 
 
 def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[Fit]:
-    """Return a motor of a list for each joint: the smallest whose margin is enough.
+    """Return the smallest motor of a list with a sufficient margin, for each joint.
 
-    Where none is, the one with the greatest margin.
+    Where no margin reaches `enough`, it is the motor with the greatest margin.
     """
     found = []
     for leg in range(1, sizing.robot.joint_count + 1):

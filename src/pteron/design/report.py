@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReportedDesign(Proved):
-    """One machine of a search, with what is proved of it.
+    """One machine of a search, with the proofs about it.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class ReportedDesign(Proved):
 
     @property
     def changes(self) -> list[Change]:
-        """Quantities, geometry and masses that are others than at the start."""
+        """Quantities, geometry and masses that differ from those at the start."""
         task, robot = self.design.task, self.design.robot
         return [
             *quantity_changes(self.design),
@@ -69,7 +69,7 @@ class ReportedDesign(Proved):
 
     @property
     def _place(self) -> str:
-        """Where the workspace is that floats."""
+        """The place of a workspace that floats, in words."""
         design = self.design
         if not self.workspace:
             largest = f", at most at {design.scale:.3g} times its size" if design.scale else ""
@@ -78,13 +78,13 @@ class ReportedDesign(Proved):
 
     @property
     def lacking(self) -> list[str]:
-        """The quantities that it does not have, and why."""
+        """The quantities that the machine does not have, with the reason."""
         found = ((name, self.design.lack(name)) for name in self.design.task.asked)
         return [f"{name}: none, because {lack}" for name, lack in found if lack]
 
     @property
     def covers(self) -> list[str]:
-        """The quantities that were asked for by how far they are known, and the motors."""
+        """The quantities of the search by the samples or proofs behind them, and the motors."""
         design, task = self.design, self.design.task
         known: dict[str, list[str]] = {}
         for name in task.asked:
@@ -120,7 +120,7 @@ class Summary:
 
     @cached_property
     def chosen(self) -> list[ReportedDesign]:
-        """The best designs in each objective, and the compromise; one of several names once."""
+        """The best design of each objective and the compromise; a design of several names once."""
         task, names = self.front.task, dict[int, str]()
         for name, at in self.front.chosen.items():
             names[at] = f"{names[at]}, {name}" if at in names else name
@@ -137,7 +137,7 @@ class Summary:
         }
 
     def table(self) -> pl.DataFrame:
-        """Return the front as a file has it, units in the headings."""
+        """Return the front as a table, with units in the headings."""
         shown = self.front.table.select(list(self.front.headings))
         return shown.rename(self.front.headings)
 
@@ -200,7 +200,7 @@ def _told(name: str, design: Design) -> ReportedDesign:
 
 
 def _lines(one: ReportedDesign) -> list[str]:
-    """Return what is proved, what each quantity is over, and the strokes used."""
+    """Return the lines on proofs, on the poses that each quantity is over, and on strokes."""
     task, lines = one.design.task, [*one.proofs, *one.covers]
     region = "the workspace" if task.spec.workspace is not None else "the cube"
     if (task.seeks_place and one.design.cube.edge <= 0.0) or not one.design.reached:

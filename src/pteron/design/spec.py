@@ -25,13 +25,13 @@ from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
 
 _ABSENT = "no such file; it should describe a search for a design"
-"""The message where the file is missing."""
+"""The end of the message for a missing file."""
 
 ROUNDING = 1e-9
 """Share of a bound by which it may be missed."""
 
 Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
-"""Least value of a measure that is 1 at best."""
+"""Type of the least value of a measure that is 1 at best."""
 
 
 def _rising(pair: tuple[float, float]) -> tuple[float, float]:
@@ -62,8 +62,8 @@ class VariableTable(Table):
 class WorkspaceTable(Table):
     """`[workspace]`: the region in which the machine must work.
 
-    A box of sides, a cube or a cylinder without a center floats: each design has it where the
-    machine has most to spare.
+    A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
+    design has it where the machine's margins are largest.
     """
 
     low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
@@ -108,15 +108,15 @@ class WorkspaceTable(Table):
 
     @property
     def floats(self) -> bool:
-        """Whether it has no place of its own."""
+        """Whether it has no given place."""
         return self.low is None and self.center is None
 
     def placed(self, center: Iterable[float]) -> Self:
-        """Return the same at a place of its own."""
+        """Return the same workspace at a given center, m."""
         return self.model_copy(update={"center": tuple(map(float, center))})
 
     def dimensions(self, count: int) -> tuple[float, ...]:
-        """Return the sides (count,) of the box that holds it, m."""
+        """Return the sides (count,) of the box around it, m."""
         if self.low is not None and self.high is not None:
             return tuple(b - a for a, b in zip(self.low, self.high, strict=True))
         if self.radius is not None and self.height is not None:
@@ -127,7 +127,7 @@ class WorkspaceTable(Table):
 
     @property
     def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and greatest coordinates of the box that holds it, once it has a place, m."""
+        """Least and greatest coordinates of the box around a placed workspace, m."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
         center = self.center or ()
@@ -139,7 +139,7 @@ class WorkspaceTable(Table):
 
     @property
     def lengths(self) -> int | None:
-        """Number of its coordinates; None where any will do."""
+        """Number of its coordinates; None if it fits any number."""
         return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
 
 
@@ -151,7 +151,7 @@ class FloorsTable(Table):
 
 
 class MotionTable(Table):
-    """`[motion]`: the motion, in every direction, by which drives are judged."""
+    """`[motion]`: the speed and acceleration, in every direction, that drives must give."""
 
     speed: Positive = key("of P in any direction, m/s", 1.0)
     acceleration: Positive = key("of P in any direction, m/s^2", 10.0)
@@ -181,7 +181,7 @@ class ObjectiveTable(Table):
 
     @property
     def sign(self) -> float:
-        """1 where less is better, -1 where more is."""
+        """1 for a quantity to minimise, -1 for one to maximise."""
         return 1.0 if self.minimise else -1.0
 
 
@@ -209,7 +209,7 @@ class RequirementTable(Table):
         return self
 
     def missed_by(self, value: float, failed: float) -> float:
-        """Return by how much a value misses it, over the bound; `failed` where there is none."""
+        """Return the violation by a value over the bound, 0 if met; `failed` for a value of NaN."""
         if math.isnan(value):
             return failed
         missing = 0.0 if self.least is None else (self.least - value) / (abs(self.least) or 1.0)
@@ -237,7 +237,7 @@ class SearchTable(Table):
 
 
 class Spec(Table):
-    """A search for a design, as its file has it."""
+    """A search for a design, as in its TOML file."""
 
     robot: str = key("the machine to begin with: a catalog name or a TOML file")
     pose: tuple[Number, ...] | None = key(
@@ -266,7 +266,7 @@ class Spec(Table):
 
     @property
     def source(self) -> str:
-        """The file that it was read from; empty where it was not."""
+        """The path of the file that it was read from; empty if there is none."""
         return self._source
 
     @property
@@ -276,14 +276,14 @@ class Spec(Table):
         return tuple(dict.fromkeys(chain(*given)))
 
     def with_seed(self, seed: int) -> Spec:
-        """Return the same search with other chance."""
+        """Return the same search with another seed of the random numbers."""
         return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
 
 
 def read_spec(path: str | Path) -> Spec:
     """Read a search for a design from a TOML file.
 
-    Files of a machine and of motors are looked for beside it first.
+    Files of a machine and of motors that it names are sought in its own folder first.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def asked_words(spec: Spec) -> list[str]:
-    """Return what a search asks for, a line each, in the numbers of its file."""
+    """Return the objectives and requirements of a search in words, one line each."""
     lines = [
         f"{one.quantity} as {'small' if one.minimise else 'large'} as can be"
         for one in spec.objectives

@@ -1,4 +1,4 @@
-"""Drives: their friction and motors' inertia, and the acceleration that their forces give.
+"""Drives: the forces that their friction and motors' inertia need, and the acceleration left.
 
 The numbers of a drive are those of `pteron.legs.drive.Drive`.
 """
@@ -21,7 +21,7 @@ from pteron.manipulator import Manipulator
 
 
 class Drives(NamedTuple):
-    """The numbers of all drives, (n, 1) each."""
+    """The numbers of all drives at their joints, (n, 1) each; SI units, as in `Drive`."""
 
     inertia: Expression
     coulomb: Expression
@@ -33,7 +33,7 @@ class Drives(NamedTuple):
 
     @classmethod
     def of(cls, values: Expression) -> Drives:
-        """Take the numbers from a vector (7 n, 1), such as `drive_numbers` returns."""
+        """Return the numbers from a vector (7 n, 1), such as `drive_numbers` returns."""
         return cls(*ca.vertsplit(values, values.shape[0] // len(cls._fields)))
 
 
@@ -61,7 +61,7 @@ def drives_of(robot: Manipulator) -> Drives:
 
 
 def drive_names(robot: Manipulator) -> tuple[str, ...]:
-    """Return what `drive_numbers` are: "coulomb_1" for leg 1, and so on."""
+    """Return the names of `drive_numbers`: "coulomb_1" for leg 1, and so on."""
     legs = range(1, robot.joint_count + 1)
     return tuple(f"{name}_{i}" for name in Drives._fields for i in legs)
 
@@ -72,7 +72,10 @@ def dry_friction(drives: Drives, rates: Expression) -> Expression:
 
 
 def friction(drives: Drives, rates: Expression, *, smooth: bool) -> Expression:
-    """Return what friction and offset take (n, 1); `smooth` where a joint rests, else by sign."""
+    """Return the force of friction and offset (n, 1), N or N m.
+
+    Dry friction has the sign of the rate, or if `smooth` tanh(q' / rest_speed).
+    """
     side = _ahead(rates) - _ahead(-rates)
     if smooth:  # tanh(q'/rest_speed), by an exponential that controllers have and none overflows
         small = ca.exp(-2 * ca.fabs(rates) / drives.rest_speed)
@@ -95,7 +98,7 @@ def joint_motion(state: State) -> tuple[Expression, Expression]:
 def drive_forces(
     drives: Drives, rates: Expression, accelerations: Expression, *, smooth: bool
 ) -> Expression:
-    """Return what the drives need for themselves (n, 1) as their joints move at q' and q''."""
+    """Return the forces (n, 1), N or N m, that the drives need for themselves at q' and q''."""
     return drives.inertia * accelerations + friction(drives, rates, smooth=smooth)
 
 
@@ -110,7 +113,8 @@ def drive_accelerations(
 ) -> Expression:
     """Return x'' under the drives' forces (n, 1): (M + J^T D J) x'' = J^T (F - f) + wrench - h.
 
-    D is the motors' inertia at the joints, f friction and what D needs at x'' = 0.
+    D is the motors' inertia at the joints, f the drives' own forces at x'' = 0: friction, offset
+    and D q''.
     """
     state = machine.state(pose, velocity)
     rows = jacobian(state)

@@ -13,10 +13,10 @@ from pteron.manipulator import Manipulator
 
 
 class PassiveJoint(NamedTuple):
-    """The joint that a column of `passive_friction` is for."""
+    """The passive joint of a column of `passive_friction`."""
 
     leg: int | None
-    """Its leg, from 1; None for the platform's axis, about which several legs' joints may turn."""
+    """Number of its leg, from 1; None for joints of several legs about the platform's axis."""
     number: int
     """Its place in the leg's chain, from 0."""
     kind: Literal["P", "R"]
@@ -27,8 +27,8 @@ def passive_friction(machine: Machine, state: State) -> Expression:
 
     By virtual work: a joint at the rate q' with the coefficient c needs J^T F = c (dq'/dx')^T q'.
     Columns are the passive joints of leg 1 that move with its point, of leg 2, ...; where legs have
-    joints that turn with the platform alone, one more follows for all of them: they turn alike,
-    as the platform does, so that only the sum of their coefficients acts.
+    joints that turn with the platform alone, one more column follows for all of them: they have one
+    rate, the platform's, so that only the sum of their coefficients acts.
     """
     columns = []
     for joint in _moving(state):
@@ -46,13 +46,13 @@ def passive_friction(machine: Machine, state: State) -> Expression:
 
 @lru_cache(maxsize=64)
 def passive_joints(robot: Manipulator) -> tuple[PassiveJoint, ...]:
-    """Return what each column of `passive_friction` is for."""
+    """Return the passive joint of each column of `passive_friction`."""
     machine = Machine.of(robot)
     return _moving(machine.state(ca.SX.sym("pose", machine.freedom)))
 
 
 def _moving(state: State) -> tuple[PassiveJoint, ...]:
-    """Return the passive joints, those that turn with the platform alone as one, which is last."""
+    """Return the passive joints; those that turn with the platform alone are one, the last."""
     found, turning = [], []
     for i, leg in enumerate(state.legs, start=1):
         for k, joint in enumerate(leg.chain):

@@ -1,8 +1,8 @@
 """Performance indices of a machine at a pose, such as the condition number, as expressions.
 
-Most use the homogeneous Jacobian, in which no unit is mixed with another: joint rates are speeds
-in m/s, of a slider or of a crank's end, and the platform's turning counts as the speed at a
-length L from P. The meaning and source of each index is in `pteron.indices`.
+Most use the homogeneous Jacobian, whose entries have one unit: joint rates are speeds in m/s, of a
+slider or of a crank's end, and the platform's turning counts as the speed at a length L from P. The
+meaning and source of each index is in `pteron.indices`.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def lever_arms(machine: Machine, state: State) -> list[Expression]:
 def homogeneous(machine: Machine, state: State) -> Homogeneous:
     """Return J with a crank's row times its length and the turns' columns over the length L.
 
-    L is the root mean square distance of the platform points, as far as they turn, from the axis
-    through P, or from all such axes; 1 m where none of them does. The joint of a leg that follows
+    L is the root mean square distance of the platform points that turn from the axis through P, or
+    from all axes through P; 1 m where none turns. The joint of a leg that follows
     the angle counts as that angle times L: its gear does not count. Where the platform tilts the
     turns are those about the base frame's axes, or of a tripod roll and pitch.
     """
@@ -54,7 +54,7 @@ def homogeneous(machine: Machine, state: State) -> Homogeneous:
 
 
 def by_points(machine: Machine, state: State) -> Expression:
-    """Return the Jacobian in terms of the platform points' velocities, all of them alike.
+    """Return the Jacobian in terms of the platform points' velocities, with equal weights.
 
     With V = S x' these velocities and S^T S = n R^T R it is J R^-1: that of the points' centroid,
     with their root mean square distance from it for L. No length and no point P is chosen.
@@ -69,7 +69,7 @@ def by_points(machine: Machine, state: State) -> Expression:
     apart = [arm - first - offset for arm in arms]
     length = _root_or_one(sum(ca.dot(arm, arm) for arm in apart) / len(arms))
     rows = _measured(machine, _jacobian(state), length)
-    # What the turning about the centroid asks of the joints.
+    # The joint rates for a turn about the centroid.
     moved = ca.mtimes(rows[:, :-1], ca.mtimes(machine.platform.directions.T, first + offset))
     rows[:, -1] = (rows[:, -1] - moved) / length
     return rows
@@ -171,7 +171,7 @@ def error(machine: Machine, state: State) -> Expression:
 
 
 def error_worst(machine: Machine, state: State) -> Expression:
-    """Return the longest sum of their columns with any signs: the joints' errors conspire."""
+    """Return the longest sum of their columns with any signs: the joints' worst errors."""
     across, volume = _inverse(homogeneous(machine, state).matrix)
     return _conspiring(_lengths(machine, across.T).T) / ca.fabs(volume)
 
@@ -184,7 +184,7 @@ def turning_error(machine: Machine, state: State) -> Expression:
 
 
 def turning_error_worst(machine: Machine, state: State) -> Expression:
-    """Return the same of the platform's turning, rad/m, where the errors conspire."""
+    """Return the same of the platform's turning, rad/m, by the joints' worst errors."""
     rows, length = homogeneous(machine, state)
     across, volume = _inverse(rows)
     return _conspiring(_turns(machine, across.T).T) / (length * ca.fabs(volume))

@@ -1,6 +1,7 @@
 """Control laws: the drives' forces at one sample, and the memory for the next.
 
-`equations.control` has a law's inputs, the joints' errors e and e', and the middle of the period.
+A law takes a `Sample` (`equations.control`): the wanted motion, the measured joints, the errors
+e = q_d - q and e' of the joints, and the wanted state at the middle of the sampling period.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pteron.equations.mixed import mixed_forces
 from pteron.equations.virtual_work import inverse_dynamics
 
 Answer = tuple[Expression, dict[str, Expression]]
-"""Forces (n, 1), and the parts of the memory."""
+"""Forces of the drives (n, 1), and the parts of the law's memory by name."""
 
 
 def pd_gravity(s: Sample) -> Answer:
@@ -28,14 +29,14 @@ def pd_gravity(s: Sample) -> Answer:
 
 
 def feed_forward_pd(s: Sample) -> Answer:
-    """Return F = K_p e + K_d e' + what the drives need for the wanted motion."""
+    """Return F = K_p e + K_d e' + F_d, F_d the drive forces of the wanted motion."""
     needed = inverse_dynamics(s.machine, s.middle, s.parameters)
     needed += drive_forces(s.drives, *joint_motion(s.middle), smooth=True)
     return s.feedback + needed, {"acceleration": s.wanted.acceleration}
 
 
 def computed_torque(s: Sample) -> Answer:
-    """Return what the drives need for q'' = q''_d + K_p e + K_d e' in the measured state.
+    """Return the drive forces for q'' = q''_d + K_p e + K_d e' in the measured state.
 
     Friction is that of the wanted rates: where a joint rests, measured ones have no steady sign.
     """
@@ -48,7 +49,7 @@ def computed_torque(s: Sample) -> Answer:
 
 
 def adaptive(s: Sample) -> Answer:
-    """Return the forces, and what is learnt at this sample: Slotine and Li's law.
+    """Return the forces and the updated estimates of Slotine and Li's adaptive law.
 
     With the reference q'_r = q'_d + slope e, and z = q'_r - q' = e' + slope e,
 
@@ -57,9 +58,9 @@ def adaptive(s: Sample) -> Answer:
     where Y theta are the forces of M x''_r + C(x, x') x'_r + g and of the drives at q'_r, q''_r. Y
     is never formed: Y theta is linear in theta, so that Y^T z is the derivative of z^T Y theta.
 
-    What is kept is eta of theta = theta_0 + L eta: eta' = L^T Y^T z, one step of Euler's method a
-    sample, after which eta is brought back to |eta| <= room. In these coordinates that is no
-    farther from the true values, wherever they are within.
+    The memory holds eta, of theta = theta_0 + L eta: eta' = L^T Y^T z, by one step of Euler's
+    method a sample, after which eta is projected onto |eta| <= room. In these coordinates the
+    projection moves eta no farther from the true values, if they are within.
 
     J.-J. E. Slotine, W. Li, "On the adaptive control of robot manipulators", The International
     Journal of Robotics Research 6 (1987) 49-59; their s is -z.
@@ -68,7 +69,7 @@ def adaptive(s: Sample) -> Answer:
 
 
 def adaptive_drives(s: Sample) -> Answer:
-    """Return what `adaptive` does, with motors' inertia, friction and offsets among the estimates.
+    """Return forces and estimates as `adaptive`, which include motors' inertia, friction, offsets.
 
     Dry friction and viscous friction grow with the rate: taken at q'_r they take energy from z.
     """

@@ -103,9 +103,9 @@ class Machine:
         return cls(robot, legs, platform, closure(legs, platform), gravity)
 
     def in_platform_axes(self, pose: Expression) -> tuple[Machine, Expression] | None:
-        """Return the machine with all vectors along the platform's axes, and those, (3, 3).
+        """Return the machine with all vectors along the platform's axes, and these axes (3, 3).
 
-        Forces at the joints are the same; the platform's points stand still, which saves
+        Forces at the joints are the same; the platform's points are constant, which saves
         operations. None where it saves none.
         """
         seen = self.platform.in_own_axes(pose)
@@ -165,7 +165,7 @@ def numbers(robot: Manipulator) -> list[float]:
 
 
 def number_places(robot: Manipulator) -> list[dict[str, int]]:
-    """Return where each quantity begins in that vector: those of each leg, and of the platform."""
+    """Return the first place of each quantity in the vector of `numbers`: by leg, then platform."""
     sizes = [{q.name: len(q.value) for q in leg.quantities} for leg in robot.legs]
     owned = [one | {"platform_point": 3, "fixed_offset": 3} for one in sizes]
     quantities = robot.platform.quantities.items()

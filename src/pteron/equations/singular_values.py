@@ -2,8 +2,8 @@
 
 Each rotation makes two columns perpendicular; after some sweeps over all pairs all of them are, and
 their lengths are the singular values. Small ones keep their digits better than by eigenvalues of
-A^T A, whose squares lose half of them, and equal ones are nothing special: there is no quotient
-that could be 0/0. A fixed number of sweeps is straight-line code, which a compiler vectorises.
+A^T A, which lose half of them, and equal singular values are no special case: no quotient becomes
+0/0. A fixed number of sweeps is straight-line code, which a compiler vectorises.
 
 M. R. Hestenes, Journal of SIAM 6 (1958) 51-90; J. Demmel, K. Veselic, SIAM Journal on Matrix
 Analysis and Applications 13 (1992) 1204-1245.
@@ -26,9 +26,9 @@ _TINY = 1e-300
 
 
 def singular_values(matrix: Expression) -> list[Expression]:
-    """Return the singular values of a matrix (k, n), n <= k, in no order.
+    """Return the min(k, n) singular values of a matrix (k, n), in no order.
 
-    One with more columns than rows is turned: it has as many as the smaller of its sizes.
+    A matrix with more columns than rows is transposed first.
     """
     if matrix.shape[1] > matrix.shape[0]:
         matrix = matrix.T
@@ -40,9 +40,9 @@ def singular_values(matrix: Expression) -> list[Expression]:
 
 
 def _perpendicular(u: Expression, v: Expression) -> tuple[Expression, Expression]:
-    """Return two columns turned, by 45 degrees at most, until they are perpendicular.
+    """Return two columns made perpendicular by a rotation of 45 degrees at most.
 
-    tan(2 angle) = 2 u.v / (u.u - v.v), of which the smaller angle is taken.
+    Its angle is the smaller solution of tan(2 angle) = 2 u.v / (u.u - v.v).
     """
     apart, across = ca.dot(u, u) - ca.dot(v, v), 2 * ca.dot(u, v)
     whole = ca.fabs(apart) + ca.sqrt(apart * apart + across * across) + _TINY

@@ -70,13 +70,13 @@ def export_c(
         `"joint_feed_forward_base"`, from base parameters as `base_parameters` and `pteron
         identify` list them. By default inverse and direct kinematics, Jacobian, inverse dynamics
         from the inertial parameters and from base parameters, forward dynamics, the regressor and
-        `"set_payload"`, whose parameters the others take while something is carried; of a machine
+        `"set_payload"`, whose parameters the others take while a payload is carried; for a machine
         with drives `"feed_forward"` and `"joint_feed_forward"` too. Where direct kinematics have no
         closed form, `"direct_step"` comes in their place. A controller stands for its law, with a
         table of its gains; a law's name has those that it has by default. A `Custom` controller is
         called as its function is, with tables of its parameters.
     folder : path
-        Where; made if it is missing.
+        The folder to write to; made if it is missing.
     real : {"double", "float"}
         The type of the numbers.
     specialised : bool
@@ -190,7 +190,7 @@ class CPrinter:
         return head + (",\n" + " " * len(head)).join(arguments) + ")"
 
     def _operations(self) -> dict[str, str]:
-        """Return how operations are written; roots and quotients are guarded."""
+        """Return the forms of operations in C, roots and quotients guarded."""
         own = {
             "sin": f"{self.prefix}_sincos({{0}}).sine",
             "cos": f"{self.prefix}_sincos({{0}}).cosine",
@@ -206,7 +206,7 @@ class CPrinter:
         }
 
     def body(self, item: Exported) -> tuple[list[str], list[tuple[str, str]]]:
-        """Return the statements of a function, and conditions with the failures that they are."""
+        """Return the statements of a function, and its conditions with the failures they mean."""
         graph, nodes = item.graph, item.graph.nodes
         names = names_of(graph, lambda i, j: f"{item.inputs[i].name}[{j}]", self.number)
         names = [item.names.get(k, name) for k, name in enumerate(names)]
@@ -230,7 +230,7 @@ class CPrinter:
                     finite.append(f"{self.prefix}_finite({port.name}[{j}])")
         used = {i for i, _ in used_inputs(graph)}
         lines += [f"(void){port.name};" for i, port in enumerate(item.inputs) if i not in used]
-        if item.several:  # one pose that is real will do
+        if item.several:  # one real pose is enough
             rows = finite[:: item.outputs[0].shape[1]]
             return lines, [(_all(f"({test} == 0)" for test in rows), "UNREACHABLE")]
         reached = [f"(isgreaterequal({name}, {self.number(0.0)}) != 0)" for name in radicands]

@@ -33,9 +33,10 @@ def node_names(
 ) -> dict[int, str]:
     """Return a name for every node of a program's graph that computes something.
 
-    Quantities that the equations know are called after them: `leg2_u_a` is a component of leg 2's
-    closing vector in the axes of its plane, `c2_z` one of its platform point, and so on. What
-    depends on one leg alone carries the leg's number; all else is numbered. `states` are inputs.
+    Quantities of the equations have their names there: `leg2_u_a` is a component of leg 2's closing
+    vector in the axes of its plane, `c2_z` one of its platform point, and so on. A node that
+    depends on one leg alone has the leg's number; all others are numbered. `states` are values of
+    the inputs.
     """
     symbols = given.function.sx_in()
     inputs = {port.name: symbol for port, symbol in zip(given.inputs, symbols, strict=True)}
@@ -57,7 +58,7 @@ def node_names(
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[NamedQuantity]:
     """Yield the quantities with names, preferred ones first."""
-    if "found" in inputs:  # the pose given is but where Newton's method begins
+    if "found" in inputs:  # the given pose is the start of Newton's method
         moving = [inputs.get(f"joint_{name}") for name in ("rates", "accelerations")]
         pose = inputs["found"]
         known = moving[0] is not None
@@ -73,7 +74,7 @@ def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Nam
                 yield f"leg{i}_{name}", i, ca.SX(value)
         for k, pose in enumerate(ca.horzsplit(machine.closure.poses(joints)), start=1):
             for name, _, value in _motion(machine, pose):
-                yield f"pose{k}_{name}", 0, value  # of no leg alone: all of them make the pose
+                yield f"pose{k}_{name}", 0, value  # of no single leg: the pose depends on all
 
 
 def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[NamedQuantity]:
@@ -105,10 +106,10 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
 
 
 def _matches(values: Array, wanted: Array) -> dict[int, int]:
-    """Return, for nodes that are a wanted quantity, its place: the first for each of them."""
+    """Return the places of the wanted quantities, by the first node that equals each of them."""
     found: dict[int, int] = {}
     for place, row in enumerate(wanted):
-        if np.isfinite(row).all() and np.ptp(row) > 0.0:  # a constant says nothing
+        if np.isfinite(row).all() and np.ptp(row) > 0.0:  # constants may be equal by chance
             same = (np.abs(values - row) <= _SAME * np.abs(row)).all(axis=1)
             for k in np.flatnonzero(same):
                 found.setdefault(int(k), place)

@@ -72,12 +72,12 @@ if TYPE_CHECKING:
         observations_of as observations_of,
         stacked as stacked,
     )
+    from pteron.identification.own_regressor import Fit as Fit, estimate as estimate
     from pteron.identification.payload import (
         Payload as Payload,
         identify_payload as identify_payload,
     )
     from pteron.identification.prediction import Prediction as Prediction
-    from pteron.identification.regressor import Fit as Fit, estimate as estimate
     from pteron.identification.result import Identification as Identification
     from pteron.identification.signals import (
         Preprocessing as Preprocessing,

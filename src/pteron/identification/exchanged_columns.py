@@ -1,4 +1,4 @@
-"""Search for exchanged columns or wrong signs in a log: a fit with them put right is far better."""
+"""Search for exchanged columns or wrong signs in a log, by how much better corrected data fit."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _ALIKE = 1.2
 """Error of a fit, over the least one, up to which it explains the forces as well."""
 
 _ROUNDING = 1e-7
-"""Error relative to the forces that counts as zero: the root of what a difference of squares loses,
-some 1e-15 of them."""
+"""Error relative to the forces that counts as zero: the root of the rounding, some 1e-15, of a
+difference of squares."""
 
 _ROWS = 4000
 """Rows of the observations, at least, to which longer ones are thinned."""
@@ -41,11 +41,11 @@ _TOLD = 3
 
 @dataclass(frozen=True)
 class ColumnFault:
-    """Columns of forces and of joints that are not what their names say, or gravity that is not.
+    """A fault of columns: forces or joints exchanged or of wrong sign, or gravity reversed.
 
-    `order` is which of the columns, from 0, belongs to each actuator, a sign is -1 where it is
-    flipped; `before` and `after` mending they leave such errors of the fit relative to the forces.
-    `equivalents` explain the forces as well.
+    `order` has the column, from 0, that belongs to each actuator; a sign is -1 where it is flipped.
+    `before` and `after` are the errors of the fit relative to the forces, without and with the
+    correction. `equivalents` are other faults, in words, that explain the forces as well.
     """
 
     forces: tuple[str, ...]
@@ -61,7 +61,7 @@ class ColumnFault:
 
     @property
     def changes(self) -> int:
-        """Number of exchanges and flips that mend it; legs that are exchanged count once."""
+        """Number of exchanges and flips that correct it; exchanged legs count once."""
         legs = self.order == self.joint_order
         orders = (self.order,) if legs else (self.order, self.joint_order)
         flips = self.signs.count(-1) + self.joint_signs.count(-1)
@@ -88,7 +88,7 @@ class ColumnFault:
 
 
 def _exchanges(order: Sequence[int]) -> int:
-    """Return how many exchanges of two make an order."""
+    """Return the least number of exchanges of two that make an order."""
     left, count = set(range(len(order))), len(order)
     while left:
         at, count = left.pop(), count - 1
@@ -115,11 +115,11 @@ def _flipped(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> ColumnFault | None:
     """Return the exchange of columns, or of signs, that explains a log's forces far better.
 
-    Of those that explain them alike, the one comes first with which friction and inertia are
-    positive, then the one of fewest changes. None where nothing makes the error three times
-    smaller, or a machine of negative inertia or friction one that can be.
+    Of several that explain them equally well, one with positive friction and inertia is preferred,
+    then the one of fewest changes. None if no exchange makes the error three times smaller, or
+    makes negative inertia or friction positive.
     """
-    # Without the mask of slow joints, which belongs to the order that is in question.
+    # Without the mask of slow joints, which depends on the order of the joints.
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
     usual = observations_of(model, log, plain)
     none = _fault(model, usual.actuators)
@@ -131,7 +131,7 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     least = min(fault.after for fault in faults)
     limit = _ALIKE * max(least, _ROUNDING)
     if not max(least, _ROUNDING) * DECISIVE < before:
-        # Signs of what is not explained say nothing.
+        # Forces that no order explains say nothing about signs.
         if before > _EXPLAINED:
             return None
         limit = _ALIKE * max(before, _ROUNDING)
@@ -141,7 +141,7 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     first, *rest = sorted(alike, key=lambda k: (states[k], faults[k].changes, faults[k].after))
     if faults[first].changes == 0:
         return None
-    # Legs that are alike can be renamed beside every fault: more changes tell nothing new.
+    # Equal legs can be renamed in every fault: faults of more changes add nothing.
     most = states[first], faults[first].changes
     as_well = [faults[k].message() for k in rest if (states[k], faults[k].changes) <= most]
     return replace(faults[first], equivalents=tuple(as_well[:_TOLD]))
@@ -161,7 +161,7 @@ def exchanged_joints(
 
 
 def _fault(model: LinearModel, n: int) -> ColumnFault:
-    """Return the columns as they are called, for the other faults to change."""
+    """Return the faultless columns, each as its name says, from which faults are made."""
     usual, upright = tuple(range(n)), (1,) * n
     names = model.robot.force_names, model.robot.joint_names
     return ColumnFault(*names, usual, upright, usual, upright, np.inf, np.inf)
@@ -197,12 +197,12 @@ def _others(
 def _moved_joints(
     none: ColumnFault, model: LinearModel, log: Log, how: Preprocessing
 ) -> Iterator[tuple[ColumnFault, Observations]]:
-    """Yield logs with the sign of a joint flipped, or joints in another order, that have poses."""
+    """Yield faults of joints, one sign or another order, with which all rows have poses."""
     n = len(none.order)
     faults = [
         replace(none, joint_signs=tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)
     ]
-    # Few exchanges first: of two orders that do as well, the simpler one is meant.
+    # Few exchanges first: of two orders that explain equally well, the simpler one is right.
     orders = sorted(permutations(none.order), key=_exchanges)
     faults += [replace(none, joint_order=order) for order in orders[1:]]
     for fault in faults:
@@ -219,7 +219,7 @@ def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> l
     matrix, forces = observations.matrix[::step], observations.forces[::step]
     rows, n, p = matrix.shape
     basis = np.linalg.qr(scaled(matrix.reshape(-1, p))[0])[0].reshape(rows, n, -1)
-    # What each column, given to each actuator, is made of: orders and signs only add these up.
+    # The projection of each column, given to each actuator: orders and signs add these up.
     parts = np.einsum("rnk,rj->njk", basis, forces)
     power = float((forces**2).sum())
     found = []
@@ -231,7 +231,7 @@ def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> l
 
 
 def _unphysical(fault: ColumnFault, observations: Observations, model: Model) -> int:
-    """Return how much of the machine cannot be, once the forces are mended."""
+    """Return the number of unphysical values that the corrected forces give."""
     forces = observations.forces[:, list(fault.order)] * np.array(fault.signs)
     mended = observations.with_forces(forces)
     return unphysical(model, mended, weighted(mended))

@@ -60,7 +60,7 @@ _SLOWLY = (
 )
 
 Stage = Callable[[str, int, int], None]
-"""A callback that is told the task, its rows that are done, and all its rows."""
+"""A callback of progress: it gets the step, the number of its rows done, and of all its rows."""
 
 
 def identify(
@@ -85,8 +85,8 @@ def identify(
     Parameters
     ----------
     robot : Manipulator, name or path
-        The machine as it is drawn: its geometry counts, its inertial parameters are where the
-        search for real bodies begins.
+        The machine as it is drawn: its geometry is used, and its inertial parameters start the
+        search for real bodies.
     logs : Log, LogFile or a sequence of them
         The logs to fit.
     held_out : Log, LogFile or a sequence of them
@@ -106,7 +106,7 @@ def identify(
     bounds : Bounds, optional
         Limits that the bodies are known to keep.
     progress : callable, optional
-        Called with the task, its rows that are done, and all its rows.
+        Called with the step, the number of its rows done, and of all its rows.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def identify(
             estimate = estimated(estimator, model, fit, preprocessing, observations)
             estimate = replace(estimate, covariance=estimate.covariance + more)
 
-        # Judge by what was held out, which betrays columns that are not what they are called
+        # Judge by held-out data, which show exchanged columns
         modes = [None] * len(check) if others else [how.start for how in preprocessing]
         held = [
             judged(model, estimate.values, one, preprocessing_for(robot, one, used, start))
@@ -186,7 +186,7 @@ def identify(
         faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
         if late or given is not None or not faults.held:
             break
-        # Forces that are held are no fault, but they move values: fit again, with that taken out.
+        # Forces that are held are no fault, but change values: fit again with that delay.
         late = True
     verdict = verdict_of(held, faults, repeats=not others, limits=limits)
     fitted = tuple(
@@ -257,7 +257,7 @@ def _reader(report: Stage, task: str) -> Callable[[int], None]:
 
 
 def _told(recordings: Sequence[Recording], report: Stage, task: str) -> list[Recording]:
-    """Return recordings that report how many of their rows are read for a task."""
+    """Return recordings that report how many of their rows are read in a step."""
     return [replace(one, tell=_reader(report, task)) for one in recordings]
 
 
@@ -297,7 +297,7 @@ def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
 def _unknowns_notes(found: Unknowns, model: Model, *, held: bool) -> list[str]:
     """Return notes on the delay and the speeds of Stribeck's friction that were found.
 
-    `held` says that the delay was taken out unasked, as that of forces that are held.
+    `held` says that the delay of held forces was corrected by default.
     """
     notes = []
     if held:
@@ -332,9 +332,9 @@ def _real_bodies(
     cad: Manipulator | None,
     bounds: Bounds | None,
 ) -> tuple[Consistency | None, float, float, tuple[str, ...]]:
-    """Return real bodies, how far their forces are off, and why there are none if so.
+    """Return real bodies or None, two errors of their forces, and why there are no bodies.
 
-    Their forces are off by so much over the residuals, and by so many percent of the forces.
+    The errors are relative to the residuals, and in percent of the forces.
     """
     rank = model.base.rank
     values = (estimate.values - known)[:rank]

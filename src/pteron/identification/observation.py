@@ -48,7 +48,7 @@ class LinearModel(Protocol):
 
 
 _LEAST_SHARE = 0.3
-"""Least noise of an equation that is used, over the usual: below, hardly any samples are in it."""
+"""Least noise of an equation that is used, over the usual noise: one below it has few samples."""
 
 
 _ROWS = ("matrix", "forces", "time", "gain", "payload")
@@ -59,8 +59,8 @@ _ROWS = ("matrix", "forces", "time", "gain", "payload")
 class Observations(OfLog):
     """Rows of F = W beta, after the parallel filter.
 
-    Rows are divided by the filter's gain for white noise: what a fit leaves of the forces has the
-    standard deviation of the noise on the measured samples, whatever the filter.
+    Rows are divided by the filter's gain for white noise: the residuals of a fit have the standard
+    deviation of the noise on the measured samples, whatever the filter.
 
     Attributes
     ----------
@@ -69,13 +69,13 @@ class Observations(OfLog):
     matrix : array, shape (R, n, p)
         The observation matrix W.
     forces : array, shape (R, n)
-        F, N.
+        The filtered drive forces F, N or N m, over the gain.
     time : array, shape (R,)
-        s.
+        Times of the rows, s.
     gain : array, shape (R, n)
-        Divisors of the rows; 0 for an equation that is not used, whose numbers are 0 too.
+        The divisors of the rows; 0 for an equation that is not used, whose row is 0 too.
     payload : array of int, shape (R,)
-        The phase of each row.
+        The payload phase of each row: 0 without payload, 1 with it.
     source : str
         Name of their log in messages.
     kinds : tuple of str
@@ -118,12 +118,12 @@ class Observations(OfLog):
         )
 
     def with_matrix(self, matrix: Array) -> Observations:
-        """Return the observations of other columns (R, n, k), which are numbered."""
+        """Return the observations with other columns (R, n, k), whose names are their numbers."""
         names = tuple(map(str, range(matrix.shape[-1])))
         return replace(self, matrix=matrix, names=names, units=names, kinds=())
 
     def with_forces(self, forces: Array) -> Observations:
-        """Return the observations of other forces (R, n)."""
+        """Return the observations with other forces (R, n)."""
         return replace(self, forces=forces)
 
     def part(self, rows: slice) -> Observations:
@@ -146,11 +146,11 @@ def observations_of(
     model : Model or another that is linear in what is identified
         The model.
     log : Log or iterable of Log
-        The log, or its pieces in order, which are not kept.
+        The log, or its pieces in order, read one at a time.
     preprocessing : Preprocessing
         Its preprocessing, from `preprocessing_of`.
     block : int
-        Rows that are filtered at a time, about.
+        Number of rows filtered at a time, about.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def observations_of(
             for part in _phases(log, preprocessing.rate, fit)
         ]
         return replace(stacked(parts), source=log.source)
-    # Whether a row counts depends on those around it, in the next block too.
+    # The mask of a row depends on the rows around it, in the next block too.
     margin = preprocessing.decimation.margin + preprocessing.settling
     found, source = [], "the log"
     for one in samples(model.robot, log, preprocessing, margin=margin, block=block):
@@ -186,7 +186,7 @@ def stacked(parts: Sequence[Observations]) -> Observations:
 
 
 def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> Array:
-    """Return 1 where a joint (R, n) moves, 0 where its friction is not known, and `rows` around it.
+    """Return a mask (R, n): 1 where a joint moves, 0 where it is `slow`, and `rows` rows around.
 
     Both sides of F = W beta are multiplied with it before the parallel filter.
     """
@@ -223,7 +223,11 @@ def assembled(
     payload: NDArray[np.int64],
     usual: float | np.floating[Any],
 ) -> Observations:
-    """Return observations from their noise (R, n), for unit white noise on the samples."""
+    """Return observations whose rows are divided by their noise (R, n).
+
+    The noise is the standard deviation that white noise of unit variance on the samples gives each
+    equation; `usual` is that of an equation all of whose samples count.
+    """
     gain = np.where(noise >= _LEAST_SHARE * usual, noise, 0.0)
     factor = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain > 0.0)
     return Observations(
@@ -255,8 +259,8 @@ def _periodic(
     model: LinearModel, log: Log, preprocessing: Preprocessing, fit: FourierFit
 ) -> Observations:
     """Return the observations of one period, with noise averaged over all that were recorded."""
-    # The parallel filter keeps the harmonics up to the band, on both sides, and as many rows as
-    # these have coefficients: a projection, so that white noise stays white.
+    # The parallel filter is a projection of both sides onto the harmonics up to the band, with as
+    # many rows as coefficients, so that white noise stays white.
     period, rate = fit.period, preprocessing.rate
     start = float(log.time[0])
     periods = int((log.duration + 1.0 / rate) / period + 1e-3)
@@ -273,7 +277,7 @@ def _periodic(
     used = moving[np.round(places).astype(int) % per_period]
     time, shown = log.time, used
     if log.rows == periods * per_period and np.abs(places - np.arange(log.rows)).max() <= EVEN:
-        # All periods have their samples at the same instants: one stands for all.
+        # All periods have their samples at the same instants: one period is enough.
         time, shown = fine, moving
 
     def regressor(part: slice) -> Array:

@@ -65,11 +65,11 @@ class Payload:
     covariance : array, shape (k, k)
         The covariance of these values, SI units.
     estimate : Estimate
-        The fit of everything: base parameters, friction and offsets first, the payload last.
+        The fit of all values: base parameters, friction and offsets first, the payload last.
     residual : array, shape (n,)
-        Standard deviation of each actuator's residuals, N or N m, as that of unfiltered samples.
+        Standard deviation of each actuator's residuals, N or N m, referred to unfiltered samples.
     fault_isolation : FaultIsolation
-        Faults of the logs or the machine that the residuals show, and what they spoil.
+        Faults of the logs or the machine that the residuals show, with their effects.
     findings : tuple of Finding
         Oddities of the logs, such as uneven time stamps.
     """
@@ -115,7 +115,7 @@ class Payload:
         return tuple((about - self.mass * np.array(shares)).tolist())
 
     def carried_by(self, robot: RobotLike) -> Manipulator:
-        """Return a machine that carries it; `set_payload` of exported code takes the same values.
+        """Return the machine with the payload, as `set_payload` of exported code makes it.
 
         These are `mass`, `center_of_mass` and `central_inertia`; what the forces do not show is 0.
 
@@ -129,7 +129,7 @@ class Payload:
         return with_payload(robot, *self.arguments(robot))
 
     def arguments(self, robot: RobotLike) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
-        """Return its mass, centre of mass and central inertia, 0 where the forces show none.
+        """Return mass, centre of mass and central inertia, 0 where the forces do not show them.
 
         `with_payload` takes them, and so does `set_payload` of exported code.
         """
@@ -139,7 +139,7 @@ class Payload:
         return mass, center, self.central_inertia or (0.0,) * count
 
     def call(self, robot: RobotLike) -> str:
-        """Return the call of exported C that takes it, and the option of the commands."""
+        """Return as text the call of exported C that sets the payload, and the commands' option."""
         mass, center, inertia = (
             ", ".join(f"{value:.9g}" for value in np.ravel(part)) for part in self.arguments(robot)
         )
@@ -163,7 +163,7 @@ class Payload:
 
     @property
     def felt(self) -> bool:
-        """Whether the values differ from those of no payload by more than chance (Wald, 0.1 %)."""
+        """Whether the values differ significantly from zero (Wald's test, 0.1 %)."""
         chosen = [self.estimate.names.index(name) for name in self.names]
         return self.estimate.wald(self.values, chosen) > float(
             scipy.stats.chi2.isf(CHANCE, len(chosen))
@@ -171,7 +171,7 @@ class Payload:
 
     @property
     def allowed_for(self) -> bool:
-        """Whether the stated errors of the values hold: no fault that matters shows."""
+        """Whether the stated errors of the values hold: no fault shows that lowers the grade."""
         return not self.fault_isolation.matters
 
     def summary(self) -> str:
@@ -229,13 +229,13 @@ def identify_payload(
     """Return a payload's inertia from motions with and without it.
 
     F = W beta without payload and F = W beta + W_L theta_L with it, W_L being the platform's
-    columns of the regressor, are solved as one: friction and base parameters are the same in both,
-    so that the machine's own parameters need not be known.
+    columns of the regressor, are solved as one system: friction and base parameters are the same
+    in both, so that the machine's own parameters need not be known.
 
     Parameters
     ----------
     robot : Manipulator, name or path
-        The machine: its geometry counts, its inertial parameters play no part.
+        The machine: its geometry is used, its inertial parameters are not.
     without : Log
         A log without payload; or one whose payload column has both phases, 0 and 1.
     with_payload : Log, optional
@@ -258,7 +258,7 @@ def identify_payload(
     References
     ----------
     W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of
-    industrial manipulators", ICRA 2007: the log with payload and the one without, solved as one.
+    industrial manipulators", ICRA 2007: the logs with and without payload solved as one system.
     """
     robot = as_manipulator(robot)
     model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
@@ -340,7 +340,7 @@ def _phases(
 def _observed(
     model: Model, fit: Sequence[Recording], processing: Processing | None
 ) -> tuple[list[Observations], list[Preprocessing]]:
-    """Return the observations of each recording, in which both phases must be, and its plan."""
+    """Return observations and preprocessing of each recording; both phases must be in them."""
     logs = [one.head() for one in fit]
     plans = [preprocessing_of(model.robot, log, processing) for log in logs]
     parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
@@ -357,7 +357,7 @@ def _observed(
 
 
 def _check_phases(log: Log) -> None:
-    """Refuse a single log that has not both phases."""
+    """Refuse a single log without both phases."""
     phases = [] if log.payload is None else np.unique(log.payload).tolist()
     if len(phases) > 1:
         return

@@ -17,10 +17,10 @@ from pteron.kernels import Array
 from pteron.verdict import Grade, Opinion, Verdict
 
 AT_THE_FLOOR = 1.5
-"""Held-out error, over the noise floor, up to which it is all noise."""
+"""Held-out error, over the noise floor, up to which it counts as noise."""
 
 DROWNED = 50.0
-"""Held-out error, percent, beyond which nothing has been explained, whatever the noise."""
+"""Held-out error, percent, beyond which the model explains nothing, whatever the noise."""
 
 SMALL = 5.0
 """Held-out error beyond the noise, percent of a force's standard deviation, up to which a model is
@@ -33,7 +33,7 @@ CYCLE = 3.0
 """Error in a pick-and-place cycle, percent of its forces, up to which a model is trusted."""
 
 _LOWER = (0.7, 0.5)
-"""Lower cut-offs that are tried too, over that of the whole recording."""
+"""Lower cut-offs that are tried too, as shares of that of the whole recording."""
 
 FAR = 5.0
 """Distance from values of real bodies, in standard deviations, beyond which values are not
@@ -41,7 +41,7 @@ trusted."""
 
 _SEEN = 0.5
 """Difference of the nearest real bodies' forces, percent, from which that distance counts: without
-noise standard deviations are next to nothing."""
+noise the standard deviations are near zero."""
 
 _HIDDEN: dict[str, tuple[str, str]] = {
     "gain": (
@@ -77,7 +77,7 @@ _STEPS = (
 """Remedies for an error beyond the noise, where friction explains some of it and where little."""
 
 _MANY = 100.0
-"""Multiple from which no digits are told."""
+"""Ratio from which only "more than" is printed."""
 
 
 def verdict_of(
@@ -119,9 +119,9 @@ def verdict_of(
 
 
 def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
-    """Return a verdict that says first where no real bodies have the values.
+    """Return the verdict with a first reason, if no real bodies have the values.
 
-    `off` is the difference of the nearest ones' forces from those of the fit, percent.
+    `off` is the difference of the forces of the nearest real bodies from those of the fit, percent.
     """
     if consistency is None or consistency.metric != "covariance":
         return verdict
@@ -139,9 +139,9 @@ def judged(
 ) -> Prediction:
     """Return the prediction by a model with values (p,) of a recording that was not fitted.
 
-    Where that is not trusted, lower cut-offs of the positions' filter are tried: it was chosen for
-    the whole recording, and samples at rest, which do not count, have less noise than others. No
-    value is fitted to this, and a wrong model stays wrong at every cut-off.
+    If its error is too large, lower cut-offs of the positions' filter are tried: the cut-off was
+    chosen for the whole recording, whose samples at rest have less noise but do not count. No value
+    is fitted to the recording, and a wrong model stays wrong at every cut-off.
     """
     found = predict(model, values, recording, preprocessing)
     if preprocessing.cutoff is None or preprocessing.derivatives == "periodic":
@@ -236,7 +236,7 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
 
 
 def percentages(values: Iterable[float], places: int = 2) -> str:
-    """Return percentages with so many places, or that all are less than their last one.
+    """Return percentages as text with `places` decimals, or that all are less than the last one.
 
     Examples
     --------
@@ -250,7 +250,7 @@ def percentages(values: Iterable[float], places: int = 2) -> str:
 
 
 def times(ratio: float) -> str:
-    """Return how many times one value is another.
+    """Return the ratio of two values as text.
 
     Examples
     --------

@@ -29,13 +29,13 @@ class GlobalConditioning:
     Attributes
     ----------
     value : float
-        In (0, 1]; 1 where the machine is isotropic everywhere.
+        The mean of 1 / c, in (0, 1]; 1 for a machine that is isotropic everywhere.
     standard_error : float
-        Its standard error.
+        Standard error of `value`.
     share : float
         Share of the box that is in reach, within the joints' limits.
     count : int
-        Number of poses in the box that the estimate rests on.
+        Number of poses in the box.
     """
 
     value: float
@@ -65,7 +65,7 @@ def global_conditioning(
     pose : array, shape (m,)
         Gives the orientation, m and rad: all positions in reach at this orientation count.
     box : array, shape (2, m), optional
-        Least and greatest pose; in place of that, all poses in reach in this box count.
+        Least and greatest pose of a box: then all poses in reach in it count, of any orientation.
     points : bool
         Whether c is that of `condition_points` instead of `condition`.
     count : int
@@ -114,7 +114,7 @@ def global_conditioning(
         poses[:, free] += unit * (high - low)[free]
         margin = numeric(robot, "reach")(poses)[0]
         inside = np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0
-        # At the very edge of reach the index is not defined, and 1 / c is 0.
+        # At the edge of reach the index is not defined, and 1 / c is taken as 0.
         values = np.nan_to_num(1.0 / np.asarray(evaluate(robot, name, poses[inside])))
         sums.append((values.sum(), inside.sum()))
     total, number = np.array(sums, dtype=float).T

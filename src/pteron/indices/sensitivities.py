@@ -34,7 +34,7 @@ class Sensitivities:
     roles : tuple of {"point", "length", "angle"}
         The role of each.
     units : tuple of str
-        The unit of each, m or rad; of what slides on a platform m/rad.
+        The unit of each, m or rad; m/rad for points of a platform that slides.
     matrix : array, shape (..., m, p)
         d pose / d dimension, with the position of the platform's point P.
     tool : array, shape (..., m, p)
@@ -55,9 +55,9 @@ def geometric_sensitivities(
 
     The joint coordinates are q(x, g), g the dimensions; held, J dx + (dq/dg) dg = 0. A direction
     has two angles by which it may be tilted, about axes of the base frame made perpendicular to it;
-    what the leg has at right angles to it is tilted with it, and may be turned about it. Angles out
-    of a planar machine's plane and between axes that a leg has parallel are not among them: they
-    would strain the machine or tilt its platform, which a pose does not tell.
+    directions of the leg perpendicular to it are tilted with it, and may be turned about it. Angles
+    out of a planar machine's plane and between a leg's parallel axes are left out: they would
+    strain the machine or tilt its platform, which a pose cannot express.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def tool_arm(robot: Manipulator, poses: Array) -> Array:
 
 
 def at_tool(robot: Manipulator, poses: Array, errors: Array) -> Array:
-    """Return changes of the pose (..., m, K) as the tool's centre point sees them."""
+    """Return changes of the pose (..., m, K) with the position of the tool's centre point."""
     if not robot.platform.angles or not any(robot.platform.tool):
         return errors
     platform, turning = robot.platform, robot.platform.angular
@@ -167,7 +167,7 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
 
 
 def _of_leg(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
-    """Yield name, role and what changes by a unit, of every dimension of a leg."""
+    """Yield name, role and unit change of the quantities, for every dimension of a leg."""
     units = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     for quantity in leg.quantities:
         if quantity.role == "length":

@@ -1,4 +1,4 @@
-"""Bisection: where something that holds at one end of an interval no longer does."""
+"""Bisection for the place in an interval where a condition stops holding."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 def bisected(
     holds: Callable[[Any], Any], low: ArrayLike, high: ArrayLike, halvings: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return two places between which something ceases to hold: at the first it does.
+    """Return two places between which a condition stops holding: it holds at the first only.
 
     Parameters
     ----------
     holds : callable
-        Says at places, of the shape of the ends, whether it holds: for all of them at once, or for
-        each, in a shape that broadcasts with theirs.
+        The condition: from places, of the shape of the ends, one truth value for all, or one for
+        each in a shape that broadcasts with theirs.
     low, high : array
-        The ends: at `low` it holds, at `high` it does not. Each pair may be any two places, also
-        vectors, of which all numbers move as one where `holds` has one answer for them.
+        The ends: it holds at `low` and not at `high`. They may be vectors, whose numbers move
+        together where `holds` returns one value for them.
     halvings : int
-        How often the interval is halved.
+        Number of times that the interval is halved.
 
     Returns
     -------
     tuple of array
-        The last place where it was found to hold, and the nearest known where it does not.
+        The last place where it holds, and the first known one where it does not.
 
     Examples
     --------

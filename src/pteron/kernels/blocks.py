@@ -20,11 +20,11 @@ _ANGLES = {"sin": "sine", "cos": "cosine"}
 class Block:
     """The statements of a program's C for one lane k; `loop.c.j2` puts functions around them.
 
-    Its rows are the elements of its inputs: `in` of those of a state, `numbers` of those that are
-    the machine's own, of which `own` is computed once. An output whose name is
-    a key of `later` takes the place of the one named there, in lanes that do not `slide`. Where the
-    block is `split` these come in a second part, which reads rows that the first has `kept`; else
-    all is one.
+    The C code reads rows, one for each element of an input: `in` has the inputs of a state,
+    `numbers` the machine's own, and `own` values that are computed from `numbers` once. An output
+    whose name is a key of `later` replaces the output named there, in lanes that do not `slide`. If
+    the block is `split`, these outputs are computed in a second part, which reads rows that the
+    first part has `kept`; else there is one part.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Block:
 
     @cached_property
     def sizes(self) -> dict[str, int]:
-        """Rows of what goes in, the numbers, what is computed of them, and what comes out."""
+        """Numbers of rows: of inputs, of the machine's numbers, of `own`, and of outputs."""
         return {
             "in": max(1, sum(port.size for port in self.varying)),
             "numbers": max(1, sum(port.size for port in self.fixed)),
@@ -71,7 +71,7 @@ class Block:
         return [*lines, *(f"own[{row}][k] = {names[k]};" for k, row in self._own.items())]
 
     def body(self, sincos: str) -> list[str]:
-        """Return the statements for a state; `sincos` finds sine and cosine of an angle."""
+        """Return the statements for a state; `sincos` is C's function for sine and cosine."""
         graph, names = self._graph, self._names()
         for k, row in self._own.items():
             names[k] = f"own[{row}][k]"
@@ -110,7 +110,7 @@ class Block:
 
     @property
     def has_angles(self) -> bool:
-        """Whether there is a sine or a cosine of what changes with the state."""
+        """Whether there is a sine or a cosine of a value that depends on the state."""
         nodes = self._graph.nodes
         return any(n.operation in _ANGLES for k, n in enumerate(nodes) if k not in self._shared)
 
@@ -125,7 +125,7 @@ class Block:
 
     @cached_property
     def _late(self) -> frozenset[int]:
-        """The nodes that only the later outputs ask for."""
+        """The nodes that only the later outputs need."""
         graph, needed = self._graph, {k for _, k in self._results(later=False)}
         late = set[int]()
         for k in reversed(graph.operations()):
@@ -137,7 +137,7 @@ class Block:
 
     @cached_property
     def _kept(self) -> dict[int, int]:
-        """The rows of `kept`, by node: what the second part reads of the first."""
+        """The rows of `kept`, by node: values of the first part that the second reads."""
         if not self.split:
             return {}
         graph = self._graph
@@ -148,7 +148,7 @@ class Block:
 
     @cached_property
     def _own(self) -> dict[int, int]:
-        """The rows of `own`, by node: what others than shared nodes read."""
+        """The rows of `own`, by node: those that nodes that are not shared read."""
         graph = self._graph
         read = {k for part in graph.outputs for k in part}
         for k in graph.operations():

@@ -29,26 +29,26 @@ _AT_EXIT = 3.0
 """Seconds that a process waits at its end for a compiler in the background: most take less."""
 
 _AT_WORK = threading.Semaphore(1)
-"""It admits one compilation at a time; other callers ask again later."""
+"""Admits one compilation at a time; a caller that finds it taken asks again later."""
 
 
 def numeric(
     robot: RobotLike, what: str, *, base: Selects | None = None, wrench: bool = False
 ) -> Adaptive:
-    """Return the kernel that evaluates a function for the public functions, by this policy.
+    """Return the kernel with which the public functions evaluate `what` of a machine.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
     Once it has spent 0.1 s on a function of a machine's layout, C code for it is read from the
-    cache or, where there is a compiler, compiled in the background: half a second or so that no
-    call waits for. From then on calls, and what is left of a large batch, run that code, at some
-    tens of nanoseconds a state. It returns the same bits, so that a result does not depend on when
-    it was asked for. Nothing is compiled at import. A process that ends while one compiles waits
-    for it, three seconds at most, so that the next one has the code. `PTERON_KERNELS=vm` in the
-    environment keeps to the virtual machine; `compile` gives a kernel of any target, compiled when
-    asked.
+    cache or, where there is a compiler, compiled in the background, which takes half a second or
+    so and lets no call wait. From then on calls, and the rest of a large batch, run that code, at
+    some tens of nanoseconds a state. It returns the same bits, so that a result does not depend on
+    when it is computed. Nothing is compiled at import. A process that ends during a compilation
+    waits for it, three seconds at most, so that the next process has the code. With
+    `PTERON_KERNELS=vm` in the environment only the virtual machine is used; `compile` returns a
+    kernel of any target, compiled at once.
     """
     columns = None if base is None else columns_of(base)
-    # Nothing is kept under a name: what its file says may change.
+    # Kernels are kept by machine, not by a name, whose file may change.
     machine = robot if isinstance(robot, Manipulator) else as_manipulator(robot)
     return _known(machine, what, columns, wrench, ALIKE.get())
 
@@ -77,7 +77,7 @@ def guarded(
 
 
 def adaptive(key: tuple[Any, ...], build: Callable[[], Program]) -> Adaptive:
-    """Return the kernel of a program that is not a machine's own, kept under a key."""
+    """Return the kernel of a program that belongs to no machine, kept under a key."""
     built = kept(key, build)
     parts = built.name, built.function, built.inputs, built.outputs
     return Adaptive(VirtualMachine(*parts), _tier_of(Code(*parts)))
@@ -87,7 +87,7 @@ def adaptive(key: tuple[Any, ...], build: Callable[[], Program]) -> Adaptive:
 def _tier(
     layout: Manipulator, what: str, columns: Columns | None, wrench: bool, general: bool
 ) -> Tier:
-    """Return the code that machines of one layout share, or if it is general of one topology."""
+    """Return the code that machines of one layout share; if `general`, those of one topology."""
     built = program(layout, what, columns, wrench=wrench, guarded=True)
     return _tier_of(Code(built.name, built.function, built.inputs, built.outputs))
 
@@ -97,7 +97,7 @@ def _tier_of(code: Code) -> Tier:
 
 
 class Tier:
-    """The C code of one function and layout, and how long it has been missed.
+    """The C code of one function and layout, and the time that calls have spent without it.
 
     Parameters
     ----------
@@ -113,9 +113,9 @@ class Tier:
         self._patience = patience
 
     def fetch(self, *, at_any_cost: bool) -> None:
-        """Load the code, if it is on disk, or compile it `at_any_cost`; return when it is ready.
+        """Load the code if it is on disk; if not, compile it and wait, but `at_any_cost` only.
 
-        A caller that is about to ask for millions of states would rather wait once.
+        A batch of millions of states is worth the wait.
         """
         if self.ready or os.environ.get(VARIABLE) == "vm" or compiler() is None:
             return
@@ -124,7 +124,7 @@ class Tier:
             self._fetch()
 
     def missed(self, seconds: float) -> None:
-        """Count the time of the virtual machine in its place; compile when it is enough."""
+        """Add time, s, that the virtual machine spent; from `patience` on, compile in a thread."""
         self._patience -= seconds
         if self._patience > 0.0 or not _AT_WORK.acquire(blocking=False):
             return
@@ -142,15 +142,15 @@ class Tier:
             _ = self.code.module
             self.ready = True
         except Exception:
-            # A compiler that fails costs speed, not results: the virtual machine goes on. Whoever
-            # asks `compile` for target "c" is told.
+            # A compiler that fails costs speed, not results: the virtual machine goes on.
+            # `compile` with target "c" raises the error.
             pass
         finally:
             _AT_WORK.release()
 
 
 def _end(worker: threading.Thread) -> None:
-    """Wait for a compiler whose work the next process takes; end one that is far from done."""
+    """Wait for a compilation at the end of the process, some seconds; then end the compiler."""
     worker.join(_AT_EXIT)
     if worker.is_alive():
         end_all()
@@ -158,7 +158,7 @@ def _end(worker: threading.Thread) -> None:
 
 
 class Adaptive(VirtualMachine):
-    """A kernel of the virtual machine that gives way to C code once that is there.
+    """A kernel that runs on the virtual machine until its C code is ready, then in C.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class Adaptive(VirtualMachine):
     tier : Tier
         The C code.
     chunk : int
-        States between two looks at whether it is ready.
+        Number of states after which it is checked again whether the code is ready.
     """
 
     def __init__(self, kernel: Kernel, tier: Tier, chunk: int = 1 << 15) -> None:

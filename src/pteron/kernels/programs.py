@@ -45,7 +45,7 @@ _HUGE = 1e75
 """Inputs or outputs beyond this count as not finite: their squares might overflow."""
 
 _TINY = 1e-300
-"""A leg reaches a pose where its discriminant is above minus this: so at 0, the edge, it does."""
+"""A leg reaches a pose where its discriminant is above minus this: at the edge, 0, too."""
 
 REDUCIBLE = (
     *("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward"),
@@ -60,7 +60,7 @@ LOADED = (
 """Functions that may take a load, a wrench on the platform, as one more input."""
 
 _FORCES = ("inverse_dynamics", "drive_forces", "feed_forward")
-"""Functions whose results, at the joints, are the same along any axes."""
+"""Functions whose results, forces at the joints, do not depend on the axes of vectors."""
 
 SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
 """Functions that take a choice of base parameters, but not their values."""
@@ -69,7 +69,7 @@ _SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives", "actu
 """Inputs of which one value serves a whole batch."""
 
 ALIKE: ContextVar[Manipulator | None] = ContextVar("alike", default=None)
-"""The machine whose general programs serve others of its topology for the moment."""
+"""The machine whose general programs are used for others of its topology, within `alike`."""
 
 Columns = tuple[tuple[int, ...], ...]
 """For each column of a base regressor, the inertial parameters whose columns it adds up."""
@@ -89,7 +89,8 @@ def program(
 
     With `columns` the dynamics are those of base parameters, which are then the input; with
     `wrench` a wrench on the platform is an input too; with `guarded` a last output, `status`, is 1
-    where the result counts and 0 where the pose, or a number, does not serve; with `plain` the
+    where the result counts and 0 where the pose is out of reach or singular, or a number is
+    not finite; with `plain` the
     equations are as they are written, without the pass that saves operations; with `named` vectors
     are along the base's axes, as the names of exported code say.
 
@@ -115,10 +116,10 @@ def program(
 
 @contextmanager
 def alike(robot: RobotLike) -> Iterator[None]:
-    """Within it the public functions take many machines of one topology, each only a few times.
+    """Make the public functions fast for many machines of one topology, each used a few times.
 
-    They evaluate programs whose geometry is an input, so that nothing is built for a machine that
-    differs from `robot` in its numbers alone. Results are the same but for rounding.
+    In this context they evaluate programs whose geometry is an input, so that nothing is built for
+    a machine that differs from `robot` in its numbers alone. Results are the same but for rounding.
 
     Examples
     --------
@@ -220,9 +221,9 @@ def _built(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
 
 
 def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -> Program:
-    """Return the motion of a machine whose drives are of some kind: `equations.sticking.moved`.
+    """Return the program of `equations.sticking.moved`: accelerations under the drives' forces.
 
-    Of a `general` one geometry and gravity are an input too.
+    `kind` says which parts the drives have. If `general`, geometry and gravity are an input too.
     """
     layout = bare(robot)
     key = ("motion", layout, kind, *(["general"] if general else []))
@@ -251,7 +252,7 @@ def general_program(robot: RobotLike, what: str) -> Program:
 
 @lru_cache(maxsize=256)
 def _general(robot: Manipulator, form: _Form) -> Program:
-    # The form is plain: exact arithmetic wants the equations as they stand.
+    # The form is plain: exact arithmetic evaluates the equations as they are written.
     return kept(("general", robot, form), lambda: _program(*Machine.symbols(robot), form=form))
 
 
@@ -318,7 +319,7 @@ def _shared_last(name: str) -> int:
 
 
 def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
-    """Return an output's expression and its shape; one that is stacked is vertical."""
+    """Return an output's expression and its shape; parts are stacked one below another."""
     if isinstance(output, tuple):
         return output
     if isinstance(output, list):
@@ -329,9 +330,9 @@ def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
 def _statuses(
     machine: Machine, entry: Entry, symbols: dict[str, Expression], results: list[Expression]
 ) -> list[Expression]:
-    """Return 1 where everything holds that the result needs, else 0; also for NaN.
+    """Return 1 where the result counts, else 0, for NaN too, in one or more equivalent forms.
 
-    In several forms, where one of them may cost less than another beside the results.
+    The form that shares most with the results is the cheapest.
     """
     states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
     sums = [

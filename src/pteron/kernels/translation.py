@@ -21,11 +21,11 @@ _ARITHMETIC: dict[str, Callable[..., int]] = {
 """Operations that become sums and products; others are nodes of their own."""
 
 _BINARY = ca.SX.binary
-"""It takes an eighth of the time of `*` and the like, which first check for arrays."""
+"""CasADi's own binary operation: eight times faster than `*` and others, which check for arrays."""
 
 
 def read(function: ca.Function) -> tuple[TermGraph, list[int]]:
-    """Return the graph of a function and the values of its outputs' elements, one after another."""
+    """Return a function's graph, and the nodes of its outputs' elements in one list."""
     graph, given = TermGraph(), graph_of(function)
 
     def rule(node: Node, values: list[int]) -> int:
@@ -40,12 +40,12 @@ def read(function: ca.Function) -> tuple[TermGraph, list[int]]:
 
 
 def written(graph: TermGraph, roots: list[int], function: ca.Function) -> ca.Function:
-    """Return the graph as a CasADi function with the inputs and outputs of the one given."""
+    """Return the graph as a CasADi function with the inputs and outputs of `function`."""
     elements = [symbol.nonzeros() for symbol in function.sx_in()]
     order = graph.order(roots)
     wanted = _wanted_signs(graph, order, roots)
-    # Each node's expression, and whether it is the node's value (1) or its negative (-1): a
-    # difference comes in the order that its users want, so that few values need a negation.
+    # Each node's expression, and whether it is the node's value (1) or its negative (-1): each
+    # difference is written in the order for which fewest values need a negation.
     found: dict[int, tuple[Any, int]] = {}
 
     def signed(value: int) -> tuple[Any, int]:
@@ -86,14 +86,14 @@ def written(graph: TermGraph, roots: list[int], function: ca.Function) -> ca.Fun
 
 
 def _wanted_signs(graph: TermGraph, order: list[int], roots: list[int]) -> list[int]:
-    """Return for each node whether its value (> 0) or its negative (< 0) serves its users more."""
+    """Return for each node whether more users need its value (> 0) or its negative (< 0)."""
     wanted = [0] * len(graph.nodes)
     for v in roots:
         wanted[abs(v)] += sign_of(v)
     for k in reversed(order):
         kind, operands = graph.kinds[k], graph.operands[k]
         if kind == "product":
-            # One that turns is enough, or -1/x in the place of 1/x: see `_product`.
+            # One negated factor is enough, or -1/x in place of 1/x: see `_product`.
             reciprocals = [f for f in operands if graph.kinds[f] == "reciprocal"]
             turning = [f for f in operands if graph.kinds[f] in ("sum", "product")]
             if turning:
@@ -107,7 +107,7 @@ def _wanted_signs(graph: TermGraph, order: list[int], roots: list[int]) -> list[
 
 
 def _sum(terms: list[tuple[Any, int]], wanted: int) -> tuple[Any, int]:
-    """Return a sum of signed terms, or its negative where that is wanted or saves a negation."""
+    """Return a sum of signed terms or its negative, by the number of negations, and the sign."""
     positive = sum(sign > 0 for _, sign in terms)
     turn = -1 if positive == 0 or (wanted < 0 and positive < len(terms)) else 1
     first, *rest = sorted(terms, key=lambda item: -turn * item[1])
@@ -120,7 +120,7 @@ def _sum(terms: list[tuple[Any, int]], wanted: int) -> tuple[Any, int]:
 def _product(
     above: list[tuple[Any, int]], below: list[tuple[Any, int]], wanted: int
 ) -> tuple[Any, int]:
-    """Return a quotient of signed factors."""
+    """Return a quotient of signed factors, and its sign."""
     # CasADi turns a product with 1/x into a quotient, which is slower, but leaves -1/x alone.
     one = 1 if wanted > 0 else -1
     (total, sign), *rest = above or [(one, one)]

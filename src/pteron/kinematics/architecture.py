@@ -1,8 +1,8 @@
 """`architecture`: whether a machine is singular at every pose (det J = 0), with reason and proof.
 
-One pose at which det J is not zero disproves it. It is proved by exact arithmetic, for geometries
-in simple numbers, or by the closed form det J = A cos(phi) + B sin(phi) of P-R-R-R legs, up to
-rounding; else it is concluded from many random poses.
+One pose at which det J is not zero shows that it is not. That it is, is proved by exact arithmetic
+for geometries in simple numbers, or by the closed form det J = A cos(phi) + B sin(phi) of P-R-R-R
+legs, up to rounding; else it is concluded from many random poses.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ _ATTEMPTS = 400
 """Random states tried modulo a prime: at most of them a square root does not exist."""
 
 _ZEROS = 3
-"""Zeros at random states modulo a prime of 61 bits: by chance once in 10^40 or so."""
+"""Zeros at random states modulo a prime of 61 bits that prove: chance gives them once in 10^40 or
+so."""
 
 Proof = Literal["closed form", "exact arithmetic", "numerical", "one pose"]
 """Grounds on which a layout is known to be singular everywhere or, by one pose, not to be."""
@@ -64,7 +65,7 @@ class Architecture:
         coefficients of det J vanish but for rounding, or rams of a hexapod balance at every pose.
         "numerical": det J does at many poses.
     type_ii : float
-        The largest type-II measure, in size, of the poses that were looked at.
+        The largest type-II measure, in size, of the poses that were evaluated.
     holds : bool or None
         Whether the legs' constraints hold the platform's orientation in some pose, joints held or
         not; None where the machine's file does not tell the bars of its parallel rods.
@@ -72,8 +73,9 @@ class Architecture:
         The largest constraint measure of these poses; see `constraint_measure`. NaN where `holds`
         is None.
     self_motions : tuple of str
-        At which poses the platform of a hexapod of rams can move while all are held, though others
-        are not singular: kinds that the figures of the rams' ends show. There may be more.
+        Kinds of poses, in words, at which the platform of a hexapod can move while all its rams are
+        held, though other poses are not singular: those that the figures formed by the rams' ends
+        show. There may be more.
     """
 
     singular: bool
@@ -139,7 +141,7 @@ def _architecture(robot: Manipulator) -> Architecture:
 def is_singular_everywhere(robot: RobotLike) -> bool:
     """Say whether det J vanishes at every pose; `architecture` says why.
 
-    So it does, for one, where the rows of all legs lie in a plane, and for P-R-R-R layouts with
+    Examples are layouts where the rows of all legs lie in a plane, and P-R-R-R layouts with
     fourfold symmetry about k.
 
     Parameters
@@ -169,7 +171,7 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
         return True
     poses = _poses(robot)
     if not len(poses):
-        return False  # nowhere in reach, which is told where a pose is used
+        return False  # no pose is in reach: functions that take a pose raise that
     if (type_ii_sizes(robot, poses) > _VANISHING).any():
         return False
     # Where legs are far longer than the platform is wide, det J is small but its rank is full.
@@ -183,9 +185,9 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
 
 @lru_cache(maxsize=64)
 def _poses(robot: Manipulator) -> Array:
-    """Return some poses in reach, singular (type II) or not; none where none is found."""
+    """Return some poses in reach, singular (type II) or not; an empty array if none is found."""
     try:
-        # Limits, short rams' above all, leave few poses of a platform that tilts.
+        # Limits, most of all those of short rams, leave few poses of a platform that tilts.
         limits, rng = not robot.platform.tilts, np.random.default_rng(0)
         return drawn_poses(robot, _SAMPLES, rng, type_i=1e-3, limits=limits)
     except ModelError:
@@ -309,7 +311,7 @@ def _has_fourfold_symmetry(robot: Manipulator, bars: Array) -> bool:
 
 
 def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> SingularPose:
-    """Return what is said of such a machine, here and where a pose of it is used."""
+    """Return the error for a machine that is singular at every pose."""
     return SingularPose(
         f"singular at every pose (type II): {architecture(robot).reason}; with the actuators held "
         "still the platform can move; change a leg's direction or platform point",

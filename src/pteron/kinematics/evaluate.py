@@ -1,7 +1,7 @@
-"""`evaluated`: calls a public function's kernel, and raises an error that names the state at fault.
+"""`evaluated`: a public function's kernel, called, with an error that names a state that fails.
 
 The kernel returns its values and, for each state, a status: 1 where they count, 0 where they do
-not. The reason is worked out only where a state fails.
+not. The reason is found only where a state fails.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _COINCIDENT = 1e-6
 """Share of a leg's length within which its two ends count as coincident, in messages."""
 
 _TYPED: tuple[type, ...] = (list, tuple)
-"""Types that a person types; arrays are not checked for unlikely units."""
+"""Types of poses that a person types; only these are checked for unlikely units."""
 
 _MILLIMETRES = 20.0
 """A pose this many leg sizes out of reach was perhaps given in millimetres."""
@@ -57,13 +57,13 @@ def evaluated(
 
 
 def unchecked(robot: RobotLike, what: str, *values: PoseLike, base: Selects | None = None) -> Any:
-    """Return the outputs of a function as they come: NaN, or what it may be, in a bad state."""
+    """Return the outputs of a function without a check: NaN or arbitrary in a bad state."""
     *results, _ = numeric(robot, what, base=base)(*values)
     return results[0] if len(results) == 1 else tuple(results)
 
 
 def expect_choice(on_failure: str) -> None:
-    """Refuse what is no choice of what to do with a bad state."""
+    """Refuse a value other than "raise" or "nan"."""
     if on_failure not in ("raise", "nan"):
         raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
 
@@ -105,7 +105,7 @@ def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
 def _failure(
     robot: Manipulator, what: str, values: tuple[PoseLike, ...], status: Array, wrench: bool
 ) -> PteronError:
-    """Return what is wrong with the first state that does not serve."""
+    """Return the error for the first state that fails."""
     index = tuple(int(i) for i in np.argwhere(status == 0.0)[0])
     ports = [p for p in numeric(robot, what, wrench=wrench).inputs if not p.shared]
     for port, value in zip(ports, values, strict=True):
@@ -128,7 +128,7 @@ def _failure(
 def singular_angles(
     robot: Manipulator, pose: Array, index: tuple[int, ...], many: str = ""
 ) -> SingularPose:
-    """Return what is said where the pose's angles are singular."""
+    """Return the error for a pose whose angles are singular."""
     first, second, third = robot.platform.angles
     return SingularPose(
         f"{place('pose', index)}: the angles are singular where {second} is +-90 degrees, not the "
@@ -141,7 +141,7 @@ def singular_angles(
 
 
 def no_place(index: tuple[int, ...], many: str = "") -> UnreachablePose:
-    """Return what is said where the planes of a tripod's legs have no place for its points."""
+    """Return the error for a pose at which a tripod's points cannot lie in its legs' planes."""
     return UnreachablePose(
         f"{place('pose', index)}: the planes of the legs have no place for the platform's points "
         f"at this roll and pitch; move the pose towards level, or the planes nearer to P{many}",
@@ -152,14 +152,14 @@ def no_place(index: tuple[int, ...], many: str = "") -> UnreachablePose:
 
 
 def place(name: str, index: tuple[int, ...]) -> str:
-    """Return where an element of a batch is: "pose[3]", or "pose" where there is but one."""
+    """Return the name of an element of a batch: "pose[3]", or "pose" for a single one."""
     return f"{name}[{', '.join(map(str, index))}]" if index else name
 
 
 def _some_far(robot: Manipulator, poses: Array) -> bool:
     """Say whether one of the poses (K, m) is so far out that millimetres are likelier.
 
-    The first one that fails need not be: a motion in millimetres may begin at zero.
+    The first one that fails may be near: a motion in millimetres may begin at zero.
     """
     misses = -numeric(robot, "reach")(poses)[0]
     return bool((misses > _MILLIMETRES * np.array([leg.size for leg in robot.legs])).any())

@@ -63,7 +63,7 @@ def link_vectors(
     Returns
     -------
     l_u, l_l : array, shape (..., n, 3)
-        Towards the platform, in the base frame, m; NaN for a link that a leg has not.
+        Towards the platform, in the base frame, m; NaN for a link that a leg does not have.
 
     Raises
     ------

@@ -16,12 +16,11 @@ from pteron.manipulator import Manipulator
 class JacobianAtPose:
     """The Jacobian (n, m) at a pose, Eq. (10), and its condition number.
 
-    The number is that of J with a crank's row times its length and the angle's column divided by
-    `radius`, so that no unit is mixed with another. The joint of a leg that follows the angle, such
-    as a shaft, is measured as that angle times the same radius: its gear does not count. The radius
-    is the root mean square distance of the platform points, as far as they turn, from the
-    platform's axis through P; None where the platform does not turn, or none of them does: then
-    nothing but such a leg moves with the angle.
+    The condition number is that of J with each crank's row multiplied by the crank's length and the
+    angle's column divided by `radius`, m, so that all entries have one unit. The joint of a leg
+    that follows the angle, such as a shaft, counts as that angle times `radius`, without its gear.
+    The radius is the root mean square distance of the platform points that turn from the platform's
+    axis through P; None where the platform does not turn, or no point does.
     """
 
     matrix: Array

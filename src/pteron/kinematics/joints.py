@@ -52,8 +52,8 @@ class JointMotion:
         a link that does not turn about its leg's d alone.
     passive : array, shape (..., n, j)
         The passive joints from the base to the platform: each body against the one before it in
-        the leg; NaN for a joint that a leg has not. Where d of a P-R-R-R leg is parallel to k, R3
-        and R4 are one joint: its motion is under R3, and R4 is 0.
+        the leg; NaN for a joint that a leg does not have. Where d of a P-R-R-R leg is parallel to
+        k, R3 and R4 are one joint: its motion is under R3, and R4 is 0.
     """
 
     actuated: PerJoint

@@ -24,15 +24,15 @@ class LimitedJoint:
     Attributes
     ----------
     leg : int
-        Its leg, from 1; 0 for an angle of the platform.
+        Number of its leg, from 1; 0 for an angle of the platform.
     noun : str
-        Its kind: "slider", "elbow", ...
+        Kind of the joint: "slider", "elbow", ...
     actuated : bool
         Whether a drive moves it.
     unit : str
         Unit of the numbers, "m" or "rad".
     value, least, most : float
-        Its coordinate, and its limits.
+        Its coordinate and its limits, in `unit`.
     only_most : bool
         Whether only `most` is a limit, as of a cone's angle, which is never below 0.
     """
@@ -49,7 +49,7 @@ class LimitedJoint:
     told_limits = former_attribute("told_limits", "limits_text")
 
     def limits_text(self, text: Callable[..., str]) -> str:
-        """Return its limits as words; `text` turns a value and the unit into text."""
+        """Return its limits in words; `text` makes text of a value and the unit."""
         most = text(self.most, self.unit)
         return f"at most {most}" if self.only_most else f"{text(self.least, self.unit)} to {most}"
 

@@ -14,24 +14,24 @@ from pteron.kernels import Array
 from pteron.kernels.path_programs import rows_kernel
 
 ROUNDING = 2e-14
-"""Greatest miss, as a share of its terms, of a pose that is not proved, where two poses meet."""
+"""Greatest residual, as a share of its terms, of a pose without proof, where two poses meet."""
 
 _STEPS = 30
-"""Steps of a descent."""
+"""Number of steps of a descent."""
 
 _FLAT = 1e-6
-"""Singular value of the closures' derivatives, over the largest, that counts as none."""
+"""Singular value of the closures' derivatives, over the largest, that counts as zero."""
 
 _ALONG = 0.02
 """Distance, |z| = 1, from a pose to another on a curve. At an isolated pose of multiplicity m the
-closures miss there by its m-th power or so, far above rounding."""
+residuals there are about its m-th power, far above rounding."""
 
 
 def on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
     """Return which z (K, d) lead to a pose that lies on a curve of poses of its machine (K, k, 7).
 
-    Where the closures' derivatives lose a rank other poses are sought, at a distance either way in
-    the direction that is free.
+    Where the closures' derivatives lose a rank, other poses are sought at a distance in the free
+    direction, to both sides.
     """
     if not len(z):
         return np.zeros(0, dtype=bool)
@@ -51,9 +51,9 @@ def on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
 
 
 def _descended(closed: Closed, machines: Array, z: Array, across: Array) -> tuple[Array, Array]:
-    """Return the best z (K, d) of Levenberg and Marquardt's steps, and what it misses.
+    """Return the best z (K, d) of Levenberg and Marquardt's steps, and its residuals.
 
-    Damped by the square of the miss they come to a curve of poses as fast as Newton's to a regular
+    Damped by the square of the residual they reach a curve of poses as fast as Newton's a regular
     pose (Yamashita and Fukushima, On the rate of convergence of the Levenberg-Marquardt method,
     2001). `across` (d, d) or (K, d, d) projects onto the steps that are allowed.
     """
@@ -81,5 +81,5 @@ def second_slopes(closed: Closed, machines: Array) -> Array:
 
 
 def of_length_one(z: Array) -> Array:
-    """Return z (..., d) over their lengths."""
+    """Return z (..., d) divided by their lengths."""
     return np.asarray(z / np.linalg.norm(z, axis=-1, keepdims=True))

@@ -28,7 +28,7 @@ _PATHS = 4096
 """Paths followed at a time."""
 
 _STEPS = 500
-"""Most steps of a path: one in a thousand takes more than a third of it."""
+"""Greatest number of steps of a path: one in a thousand takes more than a third of it."""
 
 _GONE, _FIRST = 0.1, 0.05
 """Straight extrapolation before a path's start, and its first step, in the path's parameter."""
@@ -37,7 +37,7 @@ _LEAST = 1e-8
 """Step below which a path is lost: it leads to no pose, or almost meets another path."""
 
 _TRIALS = 4
-"""Most attempts to follow all paths to a machine, where some were lost."""
+"""Greatest number of attempts to follow all paths to a machine, if some are lost."""
 
 _ALIKE = 1e-6
 """Sine of the angle between two poses z below which they count as one."""
@@ -49,10 +49,10 @@ _REFINING = 2
 """Pairs of Newton's steps at the end of a path."""
 
 _CONVERGED = 1e-7
-"""Greatest last step: next to another pose a path's end may not be told from the other's."""
+"""Greatest last step of Newton's method: beyond it a path's end may belong to another pose."""
 
 _POLISHING = 8
-"""Most of Newton's steps to a real pose."""
+"""Greatest number of Newton's steps to a real pose."""
 
 _NO_ROTATION = 1e-7
 """Size of z's rotation part x, |z| = 1, below which P would be at infinity; of an end |x.x|."""
@@ -76,13 +76,13 @@ class Generic(NamedTuple):
 
 @lru_cache
 def generic(closed: Closed) -> Generic:
-    """Return what is kept of a kind of closures."""
+    """Return the start machine of a kind of closures, from the file."""
     with np.load(FILE) as file:
         return Generic(closed, *(file[f"{part} {key_of(closed)}"] for part in ("machine", "poses")))
 
 
 def key_of(closed: Closed) -> str:
-    """Return what stands for a kind of closures in the file."""
+    """Return the name of a kind of closures in the file."""
     return "-".join(str(int(part)) for part in closed)
 
 
@@ -90,11 +90,11 @@ class RealPoses(NamedTuple):
     """The real poses of machines."""
 
     which: NDArray[np.int64]
-    """(K,): which machine each is of, in order."""
+    """(K,): the number of the machine of each pose, ascending."""
     poses: Array
     """(K, d): z, |z| = 1."""
     move: NDArray[np.bool_]
-    """(B,): whether poses of a machine form a curve, a self-motion; none of it is then listed."""
+    """(B,): whether poses of a machine form a curve, a self-motion; its points are not listed."""
 
 
 def real_poses(closed: Closed, machines: Array) -> RealPoses:
@@ -136,7 +136,7 @@ def _real_poses(known: Generic, machines: Array, first: int) -> RealPoses:
         kept = ~_found_twice(which, poses, certain)
         which, poses, certain = which[kept], poses[kept], certain[kept]
         missing = ~(converged.all(axis=-1) & _all_differ(ends))
-        if trial:  # paths that are always lost lead nowhere
+        if trial:  # paths that are lost in every attempt lead to no pose
             missing &= (np.bincount(which, minlength=len(machines)) > counts)[left]
         else:
             turns = np.abs((ends[..., :4] ** 2).sum(axis=-1)) > _NO_ROTATION
@@ -169,7 +169,7 @@ def followed(
 ) -> tuple[Complex, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the ends z (B, N, d) of the paths to machines (B, k, 7).
 
-    With them come whether each has arrived, and whether Newton's steps then converge.
+    Two arrays (B, N) follow: whether a path has arrived, and whether Newton's steps then converge.
     """
     count, d = known.poses.shape
     machines = targets.reshape(len(targets), 7 * known.closed.equations)
@@ -201,7 +201,7 @@ def _arrived(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, NDArr
         at, _ = step(at, target)
         there = at[:, -2] >= 1.0
         over = there | ~(at[:, -1] >= _LEAST)
-        # Those that are there go on to stay: it costs less than to leave them out one by one.
+        # Paths that have arrived stay in the batch: that costs less than to remove each.
         if 8 * over.sum() >= len(over) or k == _STEPS - 1:
             arrived[rows], ends[rows] = there, at[:, : 2 * d]
             at, target, rows = at[~over], target[~over], rows[~over]
@@ -228,14 +228,14 @@ def _whole(parts: Array, d: int) -> Complex:
 
 
 def _all_differ(ends: Complex) -> NDArray[np.bool_]:
-    """Return whether all of z (B, N, d) differ; where they do all poses are found."""
+    """Return whether all ends z (B, N, d) of a machine differ: then all poses are found."""
     alike = np.abs(ends.conj() @ np.swapaxes(ends, -1, -2)) ** 2
     pairs = np.triu(np.ones(alike.shape[1:], dtype=bool), 1)
     return np.asarray(~((alike > 1.0 - _ALIKE**2) & pairs).any(axis=(-2, -1)))
 
 
 def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
-    """Return those of z (B, N, d) that may be real: which machine's (K,), and z (K, d)."""
+    """Return the ends z (K, d) of (B, N, d) that may be real, and their machines' numbers (K,)."""
     turned = _largest_real(ends)
     real = arrived & (np.abs(turned.imag).max(axis=-1) <= _REAL)
     return np.nonzero(real)[0], of_length_one(turned.real[real])
@@ -259,7 +259,7 @@ def _refined(step: _Step, target: Array, z: Array) -> tuple[Array, NDArray[np.bo
 
 
 def _polished(closed: Closed, machines: Array, z: Array) -> Array:
-    """Return real poses z (K, d) after those of Newton's steps that lessen what they miss."""
+    """Return real poses z (K, d) after those of Newton's steps that reduce their residuals."""
     numbers = machines.reshape(len(z), 7 * closed.equations)
     best, least = z, np.full(len(z), np.inf)
     for _ in range(_POLISHING):
@@ -278,8 +278,8 @@ def _polished(closed: Closed, machines: Array, z: Array) -> Array:
 def _proved(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
     """Return which z (K, d) are poses, and within which radius they are the only ones.
 
-    By Kantorovich's theorem. A pose next to a singularity, where it proves nothing, counts if it
-    misses the closures by rounding alone; the radius is then 0.
+    The proof is Kantorovich's theorem. A pose next to a singularity, where it proves nothing,
+    counts if its residuals are rounding alone; the radius is then 0.
     """
     if not len(z):
         return np.zeros(0, dtype=bool), np.zeros(0)
@@ -308,7 +308,7 @@ def _inverted(matrices: Array) -> Array:
 
 
 def _found_twice(which: NDArray[np.int64], z: Array, radius: Array) -> NDArray[np.bool_]:
-    """Return which poses (K, d) another before them is, of the same machine; in order."""
+    """Return which poses (K, d), in order, equal an earlier one of the same machine."""
     count = np.arange(len(which)) - np.searchsorted(which, which)
     found = np.zeros(len(which), dtype=bool)
     for back in range(1, int(count.max(initial=0)) + 1):
@@ -364,7 +364,7 @@ def rotation(x: Array) -> Array:
 
 
 def placed(z: Array) -> tuple[Array, Array]:
-    """Return P (K, 3), the origin where it stays, and the rotation (K, 3, 3) of poses z (K, d)."""
+    """Return P (K, 3), 0 if it is fixed, and the rotation (K, 3, 3) of poses z (K, d)."""
     x, square = z[:, :4], (z[:, :4] ** 2).sum(axis=-1)[:, None]
     place = np.zeros((len(z), 3))
     if z.shape[1] > 4:

@@ -26,7 +26,11 @@ def held_plane(leg: Any) -> HeldPlane:
 def ball_cone(
     cone: Cone | None, motion: LegMotion, socket: Expression, length: float
 ) -> list[Passive]:
-    """Return the lean of a leg's last link at the platform, against a cone."""
+    """Return the angle between a leg's last link and the platform's socket, with its cone as limit.
+
+    The columns of `socket` (3, 3) are the platform's axes in the base frame; `length`, m, is that
+    of the link.
+    """
     link = motion.links[1]
     assert link is not None
     return within_cone("link at the platform", cone, socket, -link, length)

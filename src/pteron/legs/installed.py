@@ -43,7 +43,7 @@ def kind_names() -> tuple[str, ...]:
 
 
 def kind_named(name: str) -> type[LegKind] | None:
-    """Return a kind of leg by its name, from an installed package if need be; None: there is none.
+    """Return a kind of leg by its name, of an installed package too; None if there is none.
 
     Raises
     ------

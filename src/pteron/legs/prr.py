@@ -38,7 +38,7 @@ def _check_elbow(limits: tuple[float, float] | None) -> None:
 class PRR(SlideLeg):
     """A planar P-R-R leg that carries one point of the platform.
 
-    Places along `direction` do not count: the leg moves in a plane of its own.
+    Coordinates along `direction` do not count: the leg moves in a plane of its own.
     """
 
     lower: PlanarInertia
@@ -137,7 +137,7 @@ class PRREquations(SlideEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the needs of slider and link, with what m gamma_y of the link adds.
+        """Return the forces that slider and link need, with the part of the link's m gamma_y.
 
         With nu = m gamma_y / ll: nu d x (c'' - g) at the tip t, -nu d x (t'' - g) at the platform.
         """

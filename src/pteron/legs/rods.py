@@ -36,18 +36,19 @@ class RodLeg(LegKind):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         """Return the axes about which rods let the platform turn; `axis` is its own, if it turns.
 
-        Parallel rods keep the bar at their ends, on a hinge where the platform turns; one alone
-        keeps nothing. Where the bar is not told, nothing is held against the machine.
+        Parallel rods keep the direction of the bar at their ends, on a hinge where the platform
+        turns; a single rod keeps none. Without a bar direction in the file only `axis` is
+        known to be free.
         """
         if self.rods == 1:
             return (1, 0, 0), (0, 1, 0), (0, 0, 1)
         return tuple(v for v in (self.bar, axis) if v is not None)
 
     def couples(self, motion: LegMotion, axis: Vector | None) -> list[Expression] | None:
-        """Return the couple about bar x rod that parallel rods hold: both push along themselves.
+        """Return the couple about bar x rod that parallel rods transmit by opposite forces.
 
-        Its length is the sine between bar and rod: it is lost where the parallelogram is flat. What
-        turns the bar about the rods they do not hold. None where the bar is not told.
+        Its length is the sine of the angle between bar and rod, 0 where the parallelogram is flat.
+        The rods transmit no couple about themselves. None where the bar's direction is not known.
         """
         if self.rods == 1:
             return []
@@ -57,7 +58,7 @@ class RodLeg(LegKind):
         """Return the ball joints at the ends of the rod that have cones.
 
         The columns of `still` and `turned` are the platform's axes. The bars of parallel rods do
-        not turn, nor does what has a fixed offset.
+        not turn, nor do parts with a fixed offset.
         """
         rod, length = motion.links[1], self.lower_length
         assert rod is not None
@@ -69,9 +70,9 @@ class RodLeg(LegKind):
         ]
 
     def rod_couple(self, motion: LegMotion) -> Expression:
-        """Return the couple of parallel rods, across their plane; zero for one.
+        """Return the couple of parallel rods, normal to their plane; zero for a single rod.
 
-        Where the bar is not told it is taken along the leg's first passive joint.
+        A bar whose direction is not known is taken along the leg's first passive joint.
         """
         if self.rods == 1:
             return ca.SX(3, 1)
@@ -79,10 +80,10 @@ class RodLeg(LegKind):
         return ca.cross(bar, motion.links[1])
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
-        """Yield it where parallel rods would keep their end of the platform from turning.
+        """Yield a warning if parallel rods would keep their end of the platform from turning.
 
-        The file does not tell whether their bar is on a hinge at the platform point; of an
-        articulated platform it is where the fixed offset begins.
+        The file does not say whether their bar is on a hinge at the platform point; on an
+        articulated platform it is, where the fixed offset begins.
         """
         x, y, _ = self.platform_point
         alone = self.rods == 1 or any(self.fixed_offset) or x == y == 0.0

@@ -35,8 +35,8 @@ from pteron.legs.ram import RamLeg
 class RPR(RamLeg):
     """A planar R-P-R leg that carries one point of the platform.
 
-    Its joint coordinate is the length of the ram, from `guide_point` to the platform point. Places
-    along `direction` do not count: the leg moves in a plane of its own.
+    Its joint coordinate is the length of the ram, from `guide_point` to the platform point. The
+    coordinates along `direction` do not count: the leg moves in a plane of its own.
     """
 
     upper: PlanarInertia
@@ -179,8 +179,8 @@ class RPREquations(LegEquations):
     ) -> Needs:
         """Return the forces that cylinder and piston need: all of them at the platform point.
 
-        With h and dh = d x h their first moments, the force h_l'' of the piston and y / L times
-        (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, beside the mass that rides.
+        With h and dh = d x h their first moments, it is the force h_l'' of the piston and y / L
+        times (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, beside that of the mass at the point.
         """
         at, upper, lower = self._ram(point), inertia["u"], inertia["l"]
         ddc, weight = (ca.mtimes(self.plane.T, v) for v in (point.acceleration, gravity))

@@ -26,7 +26,7 @@ from pteron.legs.circles import quarter_turn
 
 
 class TwoBar(Protocol):
-    """The attributes of a leg's equations that `two_bar_needs` reads."""
+    """The attributes of a leg's equations that `two_bar_needs` uses."""
 
     lu: Expression
     ll: Expression
@@ -44,10 +44,10 @@ def two_bar_needs(
     gravity: Expression,
     inertia: tuple[Moments, Moments],
 ) -> tuple[Expression, Expression]:
-    """Return what a leg needs along its slider beside its masses, (1, K), and across R3, (2, K).
+    """Return the forces that a leg's links need along the slider, (1, K), and across R3, (2, K).
 
     `u` is u, u' and u'', `sliding` is rho'', `gravity` its part in the plane. The lower link's
-    m gamma_x must be zero; its mass, and the upper link's, are left out.
+    m gamma_x must be zero; the masses of both links are left out, for others to add.
     """
     u, du, ddu = u
     upper, lower = inertia

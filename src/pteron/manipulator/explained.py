@@ -1,4 +1,4 @@
-"""`explained`: the text of a file for a machine of one's own, which says what every key is."""
+"""`explained`: the text of a robot file with a comment that explains each key, to begin with."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ _FOLLOWS = {
 """The sentence of the file for each argument of `with_dimensions`."""
 
 LEVEL = "horizontal"
-"""The word for cranks that point neither up nor down at 0."""
+"""The direction, in words, of cranks that point neither up nor down at 0."""
 
 
 def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
-    """Return the text of a file of a machine like a given one, which says what every key is.
+    """Return the text of a robot file like a given one, with a comment that explains each key.
 
     Parameters
     ----------
     name_or_path : str or path
         A catalog name, or the path of a file.
     dimensions : mapping, optional
-        What is to be otherwise, as arguments of `with_dimensions`.
+        Dimensions to change, as arguments of `with_dimensions`.
 
     Raises
     ------
@@ -60,7 +60,10 @@ def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = N
 
 
 def kept(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
-    """Return a sentence on what stays as in a machine, though dimensions change."""
+    """Return a sentence on the numbers of a machine that a change of dimensions keeps.
+
+    The list is empty where nothing is changed, or nothing kept.
+    """
     if not dimensions:
         return []
     made = with_dimensions(robot, **dimensions)
@@ -79,14 +82,17 @@ def kept(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
 
 
 def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
-    """Return the masses of links that no stock is given for, of the first leg."""
+    """Return in words the masses of the first leg's links for which no stock is given."""
     leg: Any = robot.legs[0]
     links = {key: leg.bodies[letter].mass for letter, (key, *_) in leg.extents.items()}
     return " and ".join(f"{mass:.4g} kg ({key})" for key, mass in links.items() if key not in stock)
 
 
 def pointing(robot: Manipulator) -> str:
-    """Return where cranks point at 0 against gravity: 5.33 deg below horizontal; "" if none do."""
+    """Return the direction of cranks at 0 in words: "5.33 deg below horizontal"; "" without cranks.
+
+    It is "" without gravity, too.
+    """
     down = np.array(robot.gravity)
     zeros = [leg.at_zero for leg in robot.legs if leg.at_zero is not None]
     if not zeros or not down.any():

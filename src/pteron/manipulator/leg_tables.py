@@ -22,7 +22,7 @@ from pteron.toml import refuse
 
 
 def _no_truth(given: Any) -> Any:
-    if isinstance(given, bool):  # which Python takes for 1 or 0
+    if isinstance(given, bool):  # Python counts it as 1 or 0
         raise ValueError(f"{given} given, 1 or -1 expected")
     return given
 
@@ -44,12 +44,12 @@ _TYPES: dict[KeyRole, Any] = {
 }
 
 FORMER = {"limits": "slider_limits"}
-"""Keys by their names in files of version 0.1."""
+"""Keys that had another name in files of version 0.1, with that name."""
 
 
 @lru_cache(maxsize=16)
 def leg_table(kind: type[LegKind]) -> type[Table]:
-    """Return what a table of `[[legs]]` may hold, for a kind of leg."""
+    """Return the pydantic model of a table of `[[legs]]` for a kind of leg."""
     fields: dict[str, Any] = {"type": (str, Field(kind.type, description="the kind of leg"))}
     for key, about in kind.every_key().items():
         held, former = _TYPES[about.role], FORMER.get(key)
@@ -68,7 +68,7 @@ def leg_table(kind: type[LegKind]) -> type[Table]:
 
 @lru_cache(maxsize=16)
 def part_of(model: type[Table]) -> type[Table]:
-    """Return the same table, in which no key must be given: what is missing is None."""
+    """Return the model with all keys optional: a missing one is None."""
     required: dict[str, Any] = {
         key: (field.rebuild_annotation() | None, None)
         for key, field in model.model_fields.items()
@@ -78,7 +78,7 @@ def part_of(model: type[Table]) -> type[Table]:
 
 
 def toml_key(name: str, key: Key) -> str:
-    """Return how a file calls a field of a leg: a slider is a table with its mass."""
+    """Return the key in a file of a leg's field: that of a slider's mass is `slider`, a table."""
     return "slider" if key.role == "slider" else name
 
 
@@ -89,23 +89,23 @@ _ORDINARY: dict[KeyRole, Any] = {
     "planar": PlanarInertia(1.0, (0.0, 0.0), 1.0),
     "rod": RodInertia(1.0, (0.0,), 1.0),
 }
-"""Ordinary values in the place of those with a fault, while the rest of the machine is checked."""
+"""Valid values that replace those with a fault while the rest of the machine is checked."""
 
 
 def leg_of(
     kind: type[LegKind], table: Any, tilts: bool = False
 ) -> tuple[LegKind | None, list[str]]:
-    """Build a leg from its table, in which keys that must be given may be None.
+    """Build a leg from its table, in which required keys may be None; collect its faults.
 
-    `tilts` tells whether its platform does.
+    `tilts` tells whether its platform tilts.
 
     Returns
     -------
     leg : leg or None
-        With faults it is one with ordinary values for those that cannot be, where a direction or a
-        point is not among them.
+        The leg; if values have faults, one with valid values in their place; None if a direction or
+        a point has a fault.
     faults : list of str
-        Each begins with its key; what is missing is none of them.
+        The faults, each beginning with its key; a missing key is not among them.
     """
     keys = kind.every_key()
     given = {name: getattr(table, toml_key(name, key)) for name, key in keys.items()}
@@ -136,7 +136,7 @@ def leg_of(
 
 
 def _held(given: Any, name: str, key: Key) -> Any:
-    """Return what a leg holds of what its table does."""
+    """Return the value of a leg's field from that of its table."""
     if key.role == "slider":
         return given.mass
     if key.body:
@@ -145,7 +145,7 @@ def _held(given: Any, name: str, key: Key) -> Any:
 
 
 def _built(kind: Any, table: Table, key: str) -> Any:
-    """Return a part of a leg from its table; `key` goes before what an error names."""
+    """Return a part of a leg from its table; errors name its keys with `key` before them."""
     faults, given = list[str](), {name: getattr(table, name) for name in type(table).model_fields}
     for name, value in given.items():
         try:
@@ -170,7 +170,7 @@ def _built(kind: Any, table: Table, key: str) -> Any:
 
 
 def _beyond_ends(leg: LegKind, letter: str, body: Any) -> str | None:
-    """Return what is said of a body that cannot be as its centre of mass is beyond its ends."""
+    """Return the fault of a body whose centre of mass is beyond its ends, or None."""
     if not letter or body.center_of_mass is None or min(body.mass, body.inertia) <= 0.0:
         return None
     text = leg.beyond_ends(letter, body.center_of_mass[0])
@@ -178,7 +178,7 @@ def _beyond_ends(leg: LegKind, letter: str, body: Any) -> str | None:
 
 
 def leg_items(leg: LegKind) -> Mapping[str, Any]:
-    """Return a leg's fields by their keys in a file, bodies as they are."""
+    """Return a leg's fields by their keys in a file; bodies stay objects."""
     found: dict[str, Any] = {"type": leg.type}
     for name, key in leg.every_key().items():
         found[toml_key(name, key)] = leg.bodies[key.body] if key.body else getattr(leg, name)

@@ -29,10 +29,10 @@ _HEAVY = 100.0
 """Mass of a platform over that of its legs, beyond which grams are likelier."""
 
 _LEGS = 3
-"""Fewest legs of which one may be told from the others."""
+"""Least number of legs among which one can be the odd one."""
 
 _SAME = 1e-6
-"""Greatest difference of directions that are one."""
+"""Greatest difference of directions that count as equal."""
 
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
@@ -42,7 +42,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     """Return warnings about a machine's file, one line each.
 
     Each begins with the place: ``leg 2: lower: center_of_mass: ...``. Masses and inertias are
-    looked at where `bodies` says so.
+    checked if `bodies` is set.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def _grams(platform: Platform, legs: Sequence[LegKind]) -> Iterator[str]:
 
 
 def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
-    """Return, by leg from 1 or 0 for the platform, what lies beyond `_LARGE`, by its key; m."""
+    """Return the lengths beyond `_LARGE`, m, by leg (from 1; 0: the platform) and by key."""
     platform = robot.platform
     given: dict[int, dict[str, Sequence[float]]] = {
         0: {
@@ -142,7 +142,7 @@ def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
 
 
 def _in_millimetres(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[str]:
-    """Return the question whether lengths are in millimetres: one, since the cause is one."""
+    """Return one warning that lengths look like millimetres, with all their legs and keys."""
     if not far:
         return []
     alike: dict[tuple[str, ...], list[int]] = {}
@@ -178,7 +178,7 @@ def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[st
 
 
 def _turning_offsets(legs: Sequence[LegKind], axis: Vector, angle: str) -> Iterator[str]:
-    """Yield the legs whose fixed offset is kept from turning by no leg at the same hinge."""
+    """Yield the legs whose fixed offset no leg at the same hinge keeps from turning."""
     keeps: dict[Vector, bool] = {}
     for leg in legs:
         free = np.array(leg.free_axes(None)).reshape(-1, 3)
@@ -193,7 +193,7 @@ def _turning_offsets(legs: Sequence[LegKind], axis: Vector, angle: str) -> Itera
 
 
 def _unlike_a_bar(body: Any, length: float) -> Iterator[str]:
-    """Yield what in a link's inertia is far from that of a bar of its length."""
+    """Yield the parts of a link's inertia that are far from those of a bar of its length."""
     beside = hypot(*body.center_of_mass[1:])
     if beside > length:
         yield f"center_of_mass: {beside:g} m beside it: are these mm?"
@@ -209,7 +209,7 @@ def _unlike_a_bar(body: Any, length: float) -> Iterator[str]:
 
 
 def _spread(platform: Platform, radius: float) -> Iterator[str]:
-    """Yield what lies farther from P than a platform has it whose points are within a radius."""
+    """Yield the numbers that are too large for a platform whose points are within a radius, m."""
     body, size = platform.inertia, 3.0 * radius
     off = hypot(*body.center_of_mass)
     if off > size:

@@ -1,4 +1,4 @@
-"""The radii of the capsules that stand for a machine's bodies where legs may meet (clearances)."""
+"""The radii of the capsules that represent a machine's bodies, for clearances between them."""
 
 from __future__ import annotations
 

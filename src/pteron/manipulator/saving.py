@@ -1,4 +1,4 @@
-"""`save` writes a manipulator to a TOML file."""
+"""`save`: a manipulator written to a TOML file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def save(robot: RobotLike, path: str | Path) -> Path:
 
 
 def text_of(robot: Manipulator) -> str:
-    """Return the text of a manipulator's file: machines that differ in anything differ in it."""
+    """Return the text of a manipulator's file; different machines have different texts."""
     from pteron.manipulator.writing import written
 
     return written(document_of(robot))
@@ -68,7 +68,7 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Return what a file holds: a body as a table, a tuple as a list."""
+    """Return a value as TOML has it: a body as a table, a tuple as a list."""
     if isinstance(value, dict):
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):

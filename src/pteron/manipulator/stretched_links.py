@@ -1,9 +1,10 @@
 """Inertia of links whose length changes, in a design search or in a file of other dimensions.
 
-A longer or shorter link keeps its section and is drawn out along its own x: mass and the centre's
-distance along x grow with the length, distances across x stay. So the moment of inertia grows with
-the length's third power, as a slender rod's does, but for the share of the centre's distance across
-x, which grows with the mass. Sliders, platform and drives are kept.
+A longer or shorter link keeps its section and is stretched along its own x: mass and the centre's
+coordinate along x are proportional to the length, coordinates across x are constant. The moment of
+inertia is proportional to the third power of the length, as for a slender rod, except for the part
+by the centre's distance across x, which is proportional to the mass. Sliders, platform and drives
+are unchanged.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def with_stretched_bodies(before: LegKind, after: LegKind) -> LegKind:
 
 
 def stretched(body: Any, factor: float) -> Any:
-    """Return the inertia of a link drawn out along x by a factor, its section kept.
+    """Return the inertia of a link stretched along x by a factor, with the same section.
 
     Examples
     --------

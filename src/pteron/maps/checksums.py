@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 
 def checksum(about: Any, arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the SHA-256 of what JSON can hold and of arrays with their names, types and shapes.
+    """Return the SHA-256 of a JSON value and of arrays with their names, types and shapes.
 
-    The order of the arrays does not count, and a NaN is a NaN, whatever its bits.
+    The order of the arrays does not count, and all NaNs count as equal, whatever their bits.
     """
     total = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for name, values in sorted(arrays.items()):

@@ -13,7 +13,7 @@ from pteron.maps.surfaces import ENDINGS as SURFACES, checked_surfaces, save_sur
 from pteron.maps.table_file import read_map_table, write_map_table
 
 _TABLES = (".csv", ".parquet")
-"""Endings of tables."""
+"""File name endings of tables."""
 
 
 def save_map(given: Map, path: str | Path) -> Path:
@@ -40,9 +40,9 @@ def save_map(given: Map, path: str | Path) -> Path:
     Raises
     ------
     OutputError
-        If the ending is another one, or it cannot be written.
+        If the ending is none of these, or the file cannot be written.
     DataError
-        If it is for surfaces and the map has not three axes, or nothing in it is in reach.
+        If surfaces are asked for and the map does not have three axes, or no pose is in reach.
     ModelError
         If a library is missing: the message names the extra.
     """
@@ -56,17 +56,17 @@ def load_map(path: str | Path) -> Map:
     Parameters
     ----------
     path : str or Path
-        A file of `save_map` or `map_index`, but no surfaces.
+        A file of `save_map` or `map_index`; files of surfaces cannot be read.
 
     Returns
     -------
     Map
-        For a table the machine's name is the file's.
+        The map; for a table the name of the file stands for the machine's name.
 
     Raises
     ------
     DataError
-        If there is no such file, or it holds no whole map.
+        If there is no such file, or it does not hold a whole map.
     """
     source = Path(path)
     ending = source.suffix.lower()

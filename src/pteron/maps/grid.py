@@ -27,13 +27,13 @@ _POINTS = {1: 400, 2: 200, 3: 100, 4: 40, 5: 16, 6: 10}
 """Points along each axis, by the number of axes, where none is given: enough for a picture."""
 
 _TURNS = 5
-"""Values of one varying angle at which the reach is boxed in; the grid spans all these boxes."""
+"""Values of one varying angle at which the box of the reach is found; the grid spans all boxes."""
 
 _HUGE = float_info.max
 """The largest finite number."""
 
 _CHUNK = 1 << 17
-"""Poses of a chunk at most: a second's work or less, and a megabyte of each index."""
+"""Greatest number of poses of a chunk: a second's work or less, a megabyte for each index."""
 
 Region = tuple[slice, ...]
 """A part of a grid: a slice of each axis."""
@@ -55,7 +55,7 @@ class Axis:
     Raises
     ------
     DataError
-        If the name is none of these, the values do not ascend, or the count is none.
+        If the name is no coordinate, the values do not ascend, or the count is below 2.
     """
 
     name: str
@@ -105,16 +105,16 @@ class Grid:
     coordinates : tuple of str
         All coordinates of a pose, in order.
     pose : tuple of float
-        A pose with the values that are held, m and rad; at the places of those that vary it has the
-        middle.
+        A pose with the values that are held, m and rad; coordinates that vary are at the middle of
+        their range.
     axes : tuple of Axis
         The coordinates that vary, in the order of the pose; one array axis each.
 
     Raises
     ------
     DataError
-        If the pose has not a finite number for each coordinate, or an axis is none of them, there
-        twice, or not in their order.
+        If the pose does not have a finite number for each coordinate, or the axes are not some of
+        the coordinates, each once and in their order.
     """
 
     coordinates: tuple[str, ...]
@@ -140,12 +140,12 @@ class Grid:
 
     @classmethod
     def of_plain(cls, given: Mapping[str, Any]) -> Self:
-        """Return the grid of which `plain` was."""
+        """Return the grid from its `plain` form."""
         axes = tuple(Axis(**axis) for axis in given["axes"])
         return cls(tuple(given["coordinates"]), tuple(given["pose"]), axes)
 
     def plain(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the grid as plain data for JSON."""
         return {
             "coordinates": list(self.coordinates),
             "pose": list(self.pose),
@@ -179,7 +179,7 @@ class Grid:
         return tuple(sides)
 
     def regions(self) -> list[Region]:
-        """Return the chunks, in an order that depends on the grid's shape alone."""
+        """Return the chunks as parts of the grid; their order depends on its shape alone."""
         cuts = [
             [slice(i, min(i + side, count)) for i in range(0, count, side)]
             for side, count in zip(self.chunk, self.shape, strict=True)
@@ -214,17 +214,18 @@ def pose_grid(
     robot : Manipulator, name or path
         The machine.
     held : mapping, optional
-        Coordinates that do not vary, with their values, m or rad. All others vary. Where it is left
-        out those in `ranges` vary, or else the first two lengths (two angles where there are not
-        two lengths), and the others are held at `center`.
+        Coordinates that do not vary, with their values, m or rad. All others vary. If it is left
+        out, those in `ranges` vary, by default the first two lengths (or two angles where there are
+        not two lengths), and the others are held at `center`.
     ranges : mapping, optional
-        Least and greatest value of coordinates that vary, m or rad, and how many values if it is
-        not `points`. Other lengths that vary do so over the bounding box of the reach, an angle
-        over its limits or else a whole turn, of a platform that tilts half a turn.
+        Least and greatest value of coordinates that vary, m or rad, and the number of values where
+        it is not `points`. Other lengths vary over the bounding box of the reach, angles over their
+        limits, without limits over a whole turn, or half a turn where the platform tilts.
     points : int, optional
         Number of values along each axis; by default 200 in a plane, 100 in three dimensions.
     center : array, shape (m,), optional
-        Gives what is held where `held` is left out, m and rad; by default the home pose.
+        Pose with the values that are held where `held` is left out, m and rad; by default the home
+        pose.
     rim : float
         Share of the bounding box by which lengths go beyond it on each side: pictures show where
         the reach ends.
@@ -236,7 +237,7 @@ def pose_grid(
     Raises
     ------
     DataError
-        If a coordinate is unknown, nothing varies, or a value is no sensible length or angle.
+        If a coordinate is unknown, none varies, or a value is not a sensible length or angle.
     ModelError
         If a range is left to the reach and no position is in reach at this orientation.
 
@@ -256,7 +257,7 @@ def pose_grid(
     names = robot.coordinates
     pose = np.zeros(len(names))
     if held is None:
-        # What varies needs no more than where to begin to look for the reach.
+        # A coordinate that varies is needed only as the start of the search for the reach.
         pose = home_pose(robot) if center is None else checked_one(robot, center, "center").copy()
         platform = robot.platform
         pair = platform.lengths if len(platform.lengths) > 1 else platform.angles
@@ -320,7 +321,7 @@ def _number(key: str, value: object) -> float:
 def expect_coordinates(
     robot: Manipulator, held: Mapping[str, float], ranges: Mapping[str, tuple[float, ...]]
 ) -> None:
-    """Refuse coordinates that the machine has not, and values that are none or in another unit."""
+    """Refuse coordinates that the machine does not have, and values not finite or of wrong unit."""
     names = robot.coordinates
     for name in (*held, *ranges):
         if name not in names:

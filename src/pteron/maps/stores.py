@@ -48,11 +48,11 @@ class MemoryStore:
         self._status = np.empty(grid.shape, dtype=np.int8)
 
     def finished(self) -> tuple[int, ...]:
-        """Return no chunk: nothing is there before the sweep begins."""
+        """Return the numbers of no chunks: nothing is there before the sweep begins."""
         return ()
 
     def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
-        """Keep what a chunk gave."""
+        """Keep a chunk's values."""
         region = self._regions[number]
         for name, values in self._values.items():
             values[region] = result[name]
@@ -65,13 +65,16 @@ class MemoryStore:
 
 @dataclass(frozen=True)
 class MapStore:
-    """A map in a Zarr store, which is a folder: a file a chunk and index, so that tasks share none.
+    """A map in a Zarr store: a folder with one file for each chunk of each index.
 
-    It is an array of the grid's shape for each index, one for `status`, one for each axis's values,
-    and `checksum`, a number a chunk: written last, it says that the chunk is whole, and what it
-    holds. Arrays carry the names of their axes and their units, so that xarray reads the store.
+    No two chunks share a file, so that workers write at the same time. The store has an array of
+    the grid's shape for each index and for `status`, one array for each axis's values, and
+    `checksum`, one number for each chunk. That number is written last: it shows that the chunk is
+    whole and holds the values that were written. Arrays carry the names of their axes and their
+    units, so that xarray reads the store.
 
-    `seal` is the checksum of all that the store is made of before its first chunk.
+    `seal` is the checksum of the machine's name, the plan, the arrays' metadata and the axes: of
+    the store as it was made, before its first chunk.
     """
 
     path: Path
@@ -83,9 +86,10 @@ class MapStore:
     def of(
         cls, path: Path, robot: str, grid: Grid, names: tuple[str, ...], plan: Mapping[str, Any]
     ) -> MapStore:
-        """Return the store of a map of a machine of that name, made if it is not there.
+        """Return the store of a map at a path; it is made if there is none.
 
-        Where the same map was begun, it goes on. The plan is all else that the numbers depend on.
+        A store of the same map is continued. `robot` is the machine's name, `names` are those of
+        the indices, and `plan` is all else that the numbers depend on.
         """
         wanted = {**plan, "index": list(names), "grid": grid.plain()}
         if not path.exists():
@@ -107,7 +111,7 @@ class MapStore:
         return frozenset(k for k in range(count) if self._read(k) is not None)
 
     def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
-        """Write what a chunk gave, each array's part through a temporary file and a rename."""
+        """Write a chunk's values, each array's part through a temporary file and a rename."""
         region, group = self.grid.regions()[number], _group(self.path)
         held = {name: np.asarray(result[name], dtype=_dtype(name)) for name in self._arrays}
         for name, values in held.items():
@@ -149,7 +153,7 @@ class MapStore:
         return found if told == self._checksum(number, found) else None
 
     def _checksum(self, number: int, values: Mapping[str, NDArray[Any]]) -> int:
-        """Return a number above zero for what a chunk holds: this one, of this store."""
+        """Return the checksum, above 0, of a chunk's values, its number and the store's seal."""
         return int(checksum([self.seal, number], values)[:15], 16) or 1
 
 
@@ -225,7 +229,7 @@ def _seal(path: Path, attributes: Mapping[str, Any]) -> str:
 
 
 def _checked_seal(path: Path, attributes: Mapping[str, Any]) -> str:
-    """Return a store's seal after a check that what it was made of is as it was."""
+    """Return a store's seal, after a check that its plan, arrays and axes are unchanged."""
     try:
         seal = _seal(path, attributes)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -243,7 +247,7 @@ def _dtype(name: str) -> str:
 
 @contextmanager
 def _beside(path: Path) -> Iterator[Path]:
-    """Yield a folder beside a path, for what takes its place; what is left of it goes."""
+    """Yield a temporary folder beside a path; it is removed at the end, unless it was renamed."""
     try:
         work = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
     except OSError as error:
@@ -255,7 +259,7 @@ def _beside(path: Path) -> Iterator[Path]:
 
 
 def _placed(work: Path, path: Path) -> None:
-    """Give a store that is made its place, unless another process has just made it."""
+    """Rename a finished store to its path, unless another process has just made it there."""
     try:
         work.chmod(0o755)
         work.rename(path)
@@ -266,12 +270,12 @@ def _placed(work: Path, path: Path) -> None:
 
 @lru_cache(maxsize=8)
 def _group(path: Path) -> Any:
-    """Return an open store; it is opened once a process."""
+    """Return an open store; each process opens it once."""
     return _zarr().open_group(path, mode="r+")
 
 
 def _attributes(path: Path) -> dict[str, Any]:
-    """Return a store's attributes as they are in its file; none of what is no store."""
+    """Return a store's attributes as its file has them, or none where the path is no store."""
     _zarr()
     try:
         found = json.loads((path / "zarr.json").read_bytes())["attributes"]

@@ -1,8 +1,9 @@
 """Washout: the accelerations and turns of a vehicle as a motion of its simulator's platform.
 
-A classical washout (L. D. Reid, M. A. Nahon, UTIAS Report 296, 1985): the platform moves with quick
-accelerations, tilts where they last, so that gravity stands for them, and always returns to the
-middle. Its poses are then compressed into a box of poses that is proved to lie in the workspace.
+A classical washout (L. D. Reid, M. A. Nahon, UTIAS Report 296, 1985): the platform follows quick
+accelerations by moving and lasting ones by tilting, so that a part of gravity replaces them, and it
+always returns to the middle. Its poses are then compressed into a box of poses that is proved to
+lie in the workspace.
 """
 
 from __future__ import annotations
@@ -33,20 +34,20 @@ COLUMNS = ("t", "ax", "ay", "az", "wx", "wy", "wz")
 rad/s, both in its own axes: x ahead, y to the left, z up."""
 
 _GRAVITY = 9.81
-"""m/s^2, by which an acceleration that lasts becomes a tilt."""
+"""Gravity, m/s^2: a lasting acceleration over it is the sine of the tilt."""
 
 _DAMPING = 1.0
 """Damping ratio of the filters: critical."""
 
 _ROOM = 3.0
-"""Greatest size of the box, as a multiple of what the vehicle's motion demands."""
+"""Greatest size of the box, over the range of the uncompressed motion."""
 
 _SAMPLES, _HALVINGS = 2048, 8
-"""Random poses of the box, and bisections, by which its size is found before it is proved."""
+"""Number of random poses of the box, and of bisections, for its size before the proof."""
 
 _TRIES = 30
-"""Each size tried until one is proved is nine tenths of the last; below this power the cue is
-refused."""
+"""Sizes for which a proof is tried, each nine tenths of the one before; if none is proved, the cue
+is refused."""
 
 
 @checked_arguments
@@ -59,17 +60,17 @@ class Washout:
     scale : float
         Share of the vehicle's accelerations and rates that is shown.
     translation : float
-        rad/s: with accelerations quicker than that the platform moves.
+        Cut-off, rad/s, of the high-pass filter of accelerations, by which the platform moves.
     return_speed : float
-        rad/s, with which the platform comes back to the middle.
+        Cut-off, rad/s, of the filter that returns the platform to the middle.
     tilting : float
-        rad/s: accelerations slower than that tilt it.
+        Cut-off, rad/s, of the low-pass filter of accelerations, by which the platform tilts.
     tilt_rate : float
-        Greatest rate of that tilt, rad/s: people do not notice what is slower than some 0.05.
+        Greatest rate of that tilt, rad/s: people do not notice one below some 0.05.
     rotation : float
-        rad/s: with turns quicker than that the platform turns.
+        Cut-off, rad/s, of the high-pass filter of the vehicle's turns, by which the platform turns.
     smoothing : float
-        rad/s, above which nothing is shown.
+        Cut-off, rad/s, of the low-pass filter of the platform's turns.
     """
 
     scale: float = 0.5
@@ -87,16 +88,16 @@ class Washout:
 
 @dataclass(frozen=True, repr=False)
 class Cue(Motion):
-    """A motion of the platform that shows a vehicle's, within a box that is proved.
+    """A motion of the platform that shows a vehicle's, within a proved box of poses.
 
     Attributes
     ----------
     region : Box
-        The poses that it keeps within.
+        The box of poses that the motion stays in.
     proof : Proof
-        That all of them lie in the workspace.
+        The proof that all poses of the box lie in the workspace.
     pressed : float
-        The largest share of its demand that the box took away, of any coordinate; 0 where it fits.
+        The largest share of a coordinate's uncompressed motion that compression removed, 0 to 1.
     """
 
     region: Box
@@ -130,12 +131,12 @@ def cue(
     Returns
     -------
     Cue
-        With the table's own times.
+        The motion, at the times of the table.
 
     Raises
     ------
     ModelError
-        If the platform is another, or no box about the middle is proved.
+        If the platform does not move freely, or no box about the middle is proved.
     DataError
         If a column is missing, or times do not ascend.
     """
@@ -162,13 +163,16 @@ def cue(
 
 
 def _filtered(time: Array, given: Array, washout: Washout) -> Array:
-    """Return the demand (3, T, 6): x y z roll pitch yaw from the middle, with two derivatives."""
+    """Return the uncompressed motion, x y z roll pitch yaw from the middle, and two derivatives.
+
+    The array is (3, T, 6), in m, rad and s.
+    """
     accelerations, rates = (washout.scale * part for part in (given[:, :3], given[:, 3:]))
     w, s = washout.translation, washout.smoothing
     resonance = [1.0, 2.0 * _DAMPING * w, w * w]
     quick = np.polymul(resonance, [1.0, washout.return_speed])
     moved = [_shown(time, a, [1.0, 0.0], quick) for a in accelerations.T]
-    # A level platform feels g along z; leaning it feels a share of it ahead or to the side.
+    # On a level platform g acts along z, on a tilted one a part of it ahead or to the side.
     lasting = [
         _shown(time, a, [1.0], [1 / washout.tilting**2, 2 * _DAMPING / washout.tilting, 1.0])[0]
         for a in (accelerations[:, 1], -accelerations[:, 0])
@@ -189,7 +193,7 @@ def _filtered(time: Array, given: Array, washout: Washout) -> Array:
 
 
 def _shown(time: Array, value: Array, above: Sequence[float], below: Any) -> Array:
-    """Return a filter's output and two derivatives (3, T), of a value that was 0 before."""
+    """Return a filter's output and two derivatives (3, T), for an input that was 0 before."""
     return np.array(
         [
             scipy.signal.lsim((np.polymul(above, [1.0] + [0.0] * order), below), value, time)[1]
@@ -209,7 +213,10 @@ def _pressed(demand: Array, half: Array) -> Array:
 
 
 def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tuple[Box, Proof]:
-    """Return a box about the middle, of the demand's proportions, that is proved to serve."""
+    """Return a box about the middle, proved to lie in the workspace, and its proof.
+
+    Its sides are in proportion to the ranges of the uncompressed motion.
+    """
     asked: tuple[Condition, ...] = conditions(robot, type_ii=type_ii)
     least = 1e-3 * max(float(demand.max()), 1e-3)
     ways = np.random.default_rng(0).uniform(-1.0, 1.0, (_SAMPLES, len(middle)))

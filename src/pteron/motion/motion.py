@@ -20,14 +20,14 @@ class Motion:
     Attributes
     ----------
     time : array, shape (T,)
-        s, ascending.
+        Times of the samples, s, ascending.
     pose, velocity, acceleration : array, shape (T, m)
-        m, rad and s.
+        The platform's motion at these times; m, rad and s.
 
     Raises
     ------
     DataError
-        If there is no sample, or not a row of pose, velocity and acceleration for each time.
+        If there is no sample, or the rows of pose, velocity and acceleration are not T.
     """
 
     time: Array
@@ -51,7 +51,7 @@ class Motion:
                 )
 
     def __repr__(self) -> str:
-        """Return the motion in a line."""
+        """Return a summary of the motion in one line."""
         rows = f"{len(self.time)} samples of {self.pose.shape[1]} coordinates"
         return f"<{type(self).__name__}: {self.duration:.6g} s, {rows}>"
 
@@ -72,7 +72,7 @@ class Motion:
         Raises
         ------
         DataError
-            If they are not.
+            If there are fewer than two times, or they do not ascend.
         """
         if len(self.time) < 2 or not (np.diff(self.time) > 0.0).all():
             raise DataError("motion.time: two or more times expected that ascend, in seconds")
@@ -117,7 +117,7 @@ class Motion:
         span = (self.time[k + 1] - self.time[k])[..., None]
         u = (within - self.time[k])[..., None] / span
         p, v, a = self.pose[k], span * self.velocity[k], 0.5 * span**2 * self.acceleration[k]
-        # What is left for the terms of third to fifth degree, at the next sample.
+        # The remainder at the next sample, for the terms of third to fifth degree.
         dp = self.pose[k + 1] - p - v - a
         dv = span * self.velocity[k + 1] - v - 2.0 * a
         da = 0.5 * span**2 * self.acceleration[k + 1] - a
@@ -131,7 +131,7 @@ class Motion:
         return pose, np.where(moving, velocity, 0.0), np.where(moving, acceleration, 0.0)
 
     def repeated(self, count: int) -> Motion:
-        """Return the motion done several times, one after the other; it must end where it begins.
+        """Return the motion repeated `count` times without a pause; it must end where it begins.
 
         Raises
         ------

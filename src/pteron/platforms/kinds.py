@@ -40,12 +40,12 @@ _EQUATIONS: dict[str, type[PlatformEquations]] = {
     "1T2R": Tripod,
 }
 XYZ: dict[str, type[PlatformEquations]] = {"3T3R": TurnsXYZ, "3R": CentredXYZ}
-"""Those whose angles are rx, ry and rz."""
+"""The classes for the angle order "xyz"."""
 
 
 @cache
 def equations_class(motion: str, angle_order: str, slides: bool) -> type[PlatformEquations]:
-    """Return the kind of equations of a platform with such a freedom, angles and halves."""
+    """Return the class of equations for a motion, an order of angles, and sliding halves or not."""
     if slides:
         return Sliding
     turns = XYZ if angle_order == "xyz" else _EQUATIONS

@@ -1,4 +1,4 @@
-"""The protocol of platforms' equations: read this page before writing another kind of platform.
+"""The protocol of platforms' equations: the page to read before writing a kind of platform.
 
 From the pose x and its derivatives the equations give the motion of the platform's points, one a
 leg, and the wrench that the platform's own weight and inertia need. A kind is a subclass of
@@ -50,18 +50,18 @@ class PlatformMotion(NamedTuple):
     """(6, m), one a leg: (c', omega) = matrix x'."""
     rotation: RotationMotion
     axes: Expression
-    """(3, 3): x, y and z of the platform's frame, as the joints of its legs see them."""
+    """(3, 3): columns x, y and z of the platform's frame at the joints of the legs."""
     body: BodyMotion
-    """The platform itself, its rows against (p', omega)."""
+    """The motion of the platform itself as a body, with its rows against (p', omega)."""
     matrix: Expression
     """(6, m): (p', omega) = matrix x'."""
     spatial: SpatialMotion | None = None
-    """Its body where that turns about any axis."""
+    """The same for a platform that tilts."""
     point_twists: tuple[Expression, ...] = ()
-    """(6, 6), one a leg, where it tilts: (c', omega) of the twist (v, omega) of P."""
+    """(6, 6), one a leg, of a platform that tilts: (c', omega) from the twist (v, omega) of P."""
     angular: Expression | None = None
-    """E (k, k), of quasi-velocities that are E times the angles' rates, and the lengths' rates
-    before them: every x' above is then of quasi-velocities. None where those are the pose's."""
+    """E (k, k): the quasi-velocities are the rates of the pose's lengths, then E times those of its
+    k angles, and x' above stands for them. None where they are the pose's rates."""
 
     def pose_rows(self, rows: Expression) -> Expression:
         """Return rows (j, m) against x' from rows against the quasi-velocities."""
@@ -88,9 +88,9 @@ class PlatformMotion(NamedTuple):
         return self.pose_rows(self.matrix)
 
     def velocity_of(self, twist: Expression) -> tuple[Expression, Expression]:
-        """Return x' (m, 1) of a twist of P (6, 1), and what is left of the twist at it.
+        """Return x' (m, 1) nearest to a twist of P (6, 1), and the remaining twist (6, 1).
 
-        What the motion cannot have of it is left, by the least squares of the quasi-velocities.
+        The nearest is that of least squares; the platform cannot have the remaining part.
         """
         square, across = ca.mtimes(self.matrix.T, self.matrix), ca.mtimes(self.matrix.T, twist)
         quasi = across if square.is_constant() else ca.mtimes(ca.inv_minor(square), across)
@@ -98,7 +98,7 @@ class PlatformMotion(NamedTuple):
 
     @property
     def angle_measure(self) -> Expression:
-        """Det E: 0 where the angles are singular, which the machine need not be; 1 at best."""
+        """Det E: 0 where the angles are singular, though the machine may not be; 1 at best."""
         if self.angular is None:
             return ca.SX(1)
         a, b, c = ca.horzsplit(self.angular)
@@ -119,7 +119,7 @@ class PlatformMotion(NamedTuple):
         return across.T / ca.dot(a, across[:, 0])
 
     def rotation_at(self, point: PointMotion, fixed: Expression) -> RotationMotion:
-        """Return the rotation as the leg at a point sees it, whose fixed offset is given."""
+        """Return the rotation for the leg at a point; its fixed offset is `fixed` (3, 1), m."""
         return self.rotation._replace(hinge=point.position - fixed)
 
 
@@ -135,14 +135,14 @@ class PlatformEquations(ABC):
     kinds: ClassVar[tuple[str, ...]] = PlanarInertia.kinds
     """The kinds of its inertial parameters."""
     slides: ClassVar[bool] = False
-    """Whether phi slides what the legs carry, and does not turn it."""
+    """Whether phi makes parts of the platform slide instead of turning it."""
     on_legs_alone: ClassVar[bool] = True
-    """Whether its legs alone hold it, and no joint with the base."""
+    """Whether the legs alone hold it, without a joint between it and the base."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()
-    """The names of a wrench at P that acts on it; none where they are the coordinates' own."""
+    """The names of the components of a wrench at P; none where they follow from the coordinates."""
     joints: ClassVar[tuple[str, ...]] = ()
-    """The slides and turns that lead from the base to it, in their order: named by coordinates,
-    also where planes hold some of them; none where they are the pose's own."""
+    """The prismatic and revolute joints of a chain from base to platform, in order, by the names of
+    their coordinates, those that planes hold included; none where they are the pose's own."""
 
     def __init__(
         self,
@@ -160,17 +160,17 @@ class PlatformEquations(ABC):
         along = {"x": x0, "y": y0, "z": k}
         lengths = [along[name] for name in self.coordinates if name in along]
         self.directions = ca.SX.eye(3) if len(lengths) == 3 else ca.horzcat(ca.SX(3, 0), *lengths)
-        """(3, l): along which the pose's lengths count; P is at directions (x, y, ...), where they
-        tell its place."""
+        """(3, l): unit vectors along which the pose's l lengths count; P is at directions @ lengths
+        where the lengths determine its place."""
 
     def offset(self, s: Expression, t: Expression) -> Offset:
-        """Return the offset of a platform point: s in the platform's frame, t that is still."""
+        """Return the offset of a platform point: s in the platform's frame, t its fixed offset."""
         x0, y0, k = self.frame
         return Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
 
     @classmethod
     def angles(cls) -> list[int]:
-        """Return where the pose's angles stand."""
+        """Return the places of the angles in a pose."""
         return np.flatnonzero(are_angles(cls.coordinates)).tolist()
 
     def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
@@ -203,7 +203,7 @@ class PlatformEquations(ABC):
         return needed_wrench(motion.body, inertia, gravity)
 
     def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
-        """Return Om_e (m, k) of Eq. (15): what acts on it, per unit of each of its parameters."""
+        """Return Om_e (m, k) of Eq. (15): the wrench on it per unit of each of its k parameters."""
         return -self.needs(motion, gravity, self.moments(ca.vertsplit(ca.SX.eye(len(self.kinds)))))
 
     @abstractmethod
@@ -219,7 +219,10 @@ class PlatformEquations(ABC):
         return wrench
 
     def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return how well planes hold what the pose does not move: 1 at best, 0 if not at all."""
+        """Return the constraint measure of planes that hold the freedoms not in the pose.
+
+        It is 1 at best, 0 where a freedom is not held.
+        """
         return ca.SX(1)
 
     def held_rows(self, motion: PlatformMotion) -> Expression | None:

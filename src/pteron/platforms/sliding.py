@@ -1,6 +1,6 @@
 """The platform of an I4 robot: two halves that slide along each other, by phi times a length.
 
-A rack and a pinion turn the tool by phi as they slide. Nothing that the legs carry turns.
+A rack and a pinion turn the tool by phi as the halves slide. The halves do not turn.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from pteron.platforms.motion import Offset, PlatformEquations, PlatformMotion
 
 
 class Sliding(PlatformEquations):
-    """A leg's point c = p + t0 + phi v, v its platform point in m/rad, t0 its fixed offset.
+    """The equations of a sliding platform: a leg's point is c = p + t0 + phi v.
+
+    v is the leg's platform point, m/rad, t0 its fixed offset, m.
 
     The first moment of the halves is phi times (m gamma_x, m gamma_y), kg m/rad, and I is the sum
     of m v^2 of what slides and of the inertia of what turns, kg m^2: both per radian.
@@ -42,7 +44,7 @@ class Sliding(PlatformEquations):
             points.append(PointMotion(p + still + v * phi, dp + v * rate, ddp + v * growth))
             matrices.append(self._matrix(v))
         x0, y0, k = self.frame
-        # The first moment of the halves is along axes that do not turn, but grow with phi.
+        # The first moment of the halves has axes that do not turn; its size grows with phi.
         grows = x0 * phi, y0 * phi, x0 * growth, y0 * growth
         body = BodyMotion(p, point_rows(ca.SX.eye(3)), ddp, k, ca.SX(1, 6), *grows)
         at_p, axes = self._matrix(ca.SX(3, 1)), ca.horzcat(*self.frame)
@@ -51,11 +53,11 @@ class Sliding(PlatformEquations):
         )
 
     def _matrix(self, way: Expression) -> Expression:
-        """Return the matrix (6, m) of a point that slides so far per radian."""
+        """Return the matrix (6, m) of a point that slides by `way` (3, 1), m, per radian."""
         return ca.blockcat([[ca.SX.eye(3), way], [ca.SX(3, 3), ca.SX(3, 1)]])
 
     def _moment(self, inertia: Moments) -> Expression:
-        """Return the first moment per radian (3, K)."""
+        """Return the first moment of the halves per radian (3, K), kg m/rad."""
         x0, y0, _ = self.frame
         return ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
 

@@ -33,10 +33,7 @@ if TYPE_CHECKING:
         power_figure as power_figure,
     )
     from pteron.plots.films import Film as Film, film as film
-    from pteron.plots.forces import (
-        forces_figure as forces_figure,
-        regularity_figure as regularity_figure,
-    )
+    from pteron.plots.forces import forces_figure as forces_figure
     from pteron.plots.front import front_figure as front_figure, fronts_figure as fronts_figure
     from pteron.plots.index_maps import map_figure as map_figure
     from pteron.plots.jacobian_maps import (
@@ -62,6 +59,7 @@ if TYPE_CHECKING:
         operations_figure as operations_figure,
         parameters_figure as parameters_figure,
     )
+    from pteron.plots.singular_orientations import regularity_figure as regularity_figure
     from pteron.plots.tracking import tracking_figure as tracking_figure
     from pteron.plots.trajectories import (
         joints_figure as joints_figure,

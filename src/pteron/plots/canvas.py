@@ -16,7 +16,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.ticker import AutoLocator, FixedLocator, FuncFormatter, NullLocator, ScalarFormatter
+from matplotlib.ticker import (
+    AutoLocator,
+    FixedLocator,
+    FuncFormatter,
+    MaxNLocator,
+    NullLocator,
+    ScalarFormatter,
+)
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
@@ -204,6 +211,9 @@ def log_scale(axes: Axes, low: float, high: float) -> None:
     ticks = 10.0**powers
     if len(ticks) < 3:
         fine = np.outer(10.0 ** np.arange(first - 1, last + 1), (1.0, 2.0, 5.0)).ravel()
+        ticks = fine[(fine >= low) & (fine <= high)]
+    if len(ticks) < 2:  # one number tells no scale
+        fine = np.array(MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high))
         ticks = fine[(fine >= low) & (fine <= high)]
     axes.xaxis.set_major_locator(FixedLocator(ticks.tolist()))
     axes.xaxis.set_minor_locator(NullLocator())

@@ -56,8 +56,8 @@ def draw(
 ) -> Figure:
     """Return the machine in one pose: in space with the vertical upwards, or in its plane.
 
-    Gravity is an arrow; a planar machine's only if its plane has it. `robot_figure` draws the same
-    from points that are known.
+    Gravity is drawn as an arrow, for a planar machine only if it lies in its plane. `robot_figure`
+    draws the same from given points.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ def draw(
     pose : array, shape (m,), optional
         m and rad; by default the home pose.
     along : array, shape (T, m), optional
-        Poses of a motion, m and rad: the tool's way is drawn as a dotted line.
+        Poses of a motion, m and rad: the tool's path is drawn as a dotted line.
     angle : str
-        What stands beside the platform frame's x axis, such as "\u03c6 = 10\u00b0".
+        Label of the platform frame's x axis, such as "\u03c6 = 10\u00b0".
 
     Returns
     -------
@@ -119,9 +119,9 @@ def robot_figure(
     """Return the machine in one pose: in space with the vertical upwards, or in its plane.
 
     The points are those of one pose, the guides those of `pteron.motion.joint_guides`; the `path`
-    (T, 3) of a point in the base frame is in m. Gravity (3,) is drawn as an arrow, where the
-    picture's plane has it; in space without it the platform frame's z points up. The `angle`
-    stands, in words, beside the platform frame's x axis.
+    (T, 3) of a point in the base frame is in m. Gravity (3,), m/s^2, is drawn as an arrow if it
+    lies in the picture's plane; a picture in space without gravity has the platform frame's z
+    upwards. `angle` is the label of the platform frame's x axis.
     """
     scene = scene_of(points, guides, gravity)
     sheet = machine_figure(scene)
@@ -157,8 +157,8 @@ def poses_figure(
 ) -> Figure:
     """Return a machine in several poses beside each other, all seen from one place.
 
-    So are the moments of a motion, and the assembly modes of a machine, to be compared; its working
-    modes are robots of their own.
+    They may be instants of a motion, or assembly modes of one machine; its working modes are robots
+    of their own.
 
     Parameters
     ----------
@@ -167,11 +167,11 @@ def poses_figure(
     poses : array, shape (K, m)
         m and rad; one pose (m,) serves all robots.
     titles : sequence of str
-        What stands over each.
+        The title over each picture.
     columns : int, optional
-        How many stand in a row; by default up to four.
+        Number of pictures in a row; by default up to four.
     along : array, shape (T, m), optional
-        Poses of a motion, whose tool's way is drawn in each.
+        Poses of a motion, m and rad, whose tool's path is drawn in each picture.
 
     Returns
     -------
@@ -250,7 +250,7 @@ def poses_figure(
 
 
 def _alike(scenes: list[Scene]) -> list[Scene]:
-    """Return scenes that are as large as the largest of them."""
+    """Return the scenes, each extended to the size of the largest one."""
     low = np.min([scene.low for scene in scenes], axis=0)
     high = np.max([scene.high for scene in scenes], axis=0)
     step = max(scene.step for scene in scenes)
@@ -258,6 +258,6 @@ def _alike(scenes: list[Scene]) -> list[Scene]:
 
 
 def _columns(count: int) -> int:
-    """Return the columns for so many pictures: up to four, and rows of one length."""
+    """Return the number of columns for `count` pictures: up to four, so that rows are equal."""
     rows = -(-count // 4)
     return -(-count // rows)

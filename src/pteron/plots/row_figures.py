@@ -33,7 +33,7 @@ _ROW = 0.185
 """Height of a row, inches."""
 
 _HEAD = 0.5
-"""Height of the scale below the rows of one unit, inches."""
+"""Height of the axis labels below the rows of one unit, inches."""
 
 
 def parameters_figure(
@@ -49,16 +49,16 @@ def parameters_figure(
     Parameters
     ----------
     names : sequence of str
-        Of the p parameters.
+        Names of the p parameters.
     values : array, shape (p,)
-        In their units.
+        The values, in `units`.
     intervals : array, shape (p,), optional
         Half the width of each interval, such as 1.96 standard deviations; NaN where it is unknown.
     units : sequence of str, optional
-        Of each; without them all share one scale.
+        Unit of each parameter; without units all share one scale.
     reference : array, shape (p,), optional
-        What the values are compared with, such as the drawing's: open rings. A value whose
-        interval does not hold its reference is red.
+        Values to compare with, such as the drawing's, shown as open rings. A value whose interval
+        does not hold its reference is red.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def parameters_figure(
     Raises
     ------
     DataError
-        If there is not one of each for each name.
+        If values, intervals, units or reference are not p, one for each name.
 
     Examples
     --------
@@ -110,9 +110,9 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
     Parameters
     ----------
     names : sequence of str
-        What is counted, from the top.
+        Names of the p rows, from the top.
     counts : array, shape (p,)
-        0 or more.
+        The counts, 0 or more.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
     Raises
     ------
     DataError
-        If there is not one for each name.
+        If there is not one count for each name.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Lengths and unit vectors in exact numbers, for exact ranks: square roots of fractions (surds).
 
 A float is recognised where it is near a simple surd, such as sqrt(3)/2, else approximated by a
-fraction. Parallel directions stay parallel; right angles that approximations lose are told.
+fraction. Parallel directions stay parallel; right angles that approximations lose are reported.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FINE = 10**12
 """Largest denominator of an approximation, whose error is then below 1e-12."""
 
 _NOISE = 1e-14
-"""Difference of a recognised direction from its floats that is rounding, and not reported."""
+"""Greatest difference of a recognised direction from its floats that counts as rounding."""
 
 _NEARLY = 1e-5
 """Angle, rad, within which a relation that does not hold was perhaps meant to hold."""
@@ -69,7 +69,7 @@ class Notes:
         return vector
 
     def planar(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
-        """Return a vector in the platform's plane; where only its length is simple, keep that."""
+        """Return a vector in the platform's plane; its exact length is kept where it is simple."""
         simple = length(x), length(y)
         radius = length(float(np.hypot(x, y)))
         if None in simple and radius is not None and radius.q != 0:
@@ -144,7 +144,7 @@ def lost_right_angles(given: dict[str, Array], exact: dict[str, ExactVector]) ->
 
 
 def near_relations(given: dict[str, Array]) -> list[str]:
-    """Return in words the directions that are parallel, or at right angles, but for a little."""
+    """Return in words the pairs of directions that are nearly parallel or at right angles."""
     found = []
     for (a, u), (b, v) in combinations(given.items(), 2):
         for relation, angle in (
@@ -157,7 +157,7 @@ def near_relations(given: dict[str, Array]) -> list[str]:
 
 
 def _perpendicular(a: ExactVector, b: ExactVector) -> bool:
-    """Say whether a . b = 0 exactly: the terms of each radicand must cancel by themselves."""
+    """Say whether a . b = 0 exactly: for each radicand its terms must sum to zero."""
     sums: dict[int, Fraction] = {}
     for x, y in zip(a, b, strict=True):
         term = Surd.root(Fraction(x.s * y.s), 1.0)

@@ -22,7 +22,7 @@ from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.exact_geometry import ExactGeometry
 
 _ATTEMPTS = 20000
-"""Poses tried before it is concluded that none serves."""
+"""Poses tried before it is concluded that none can be used."""
 Element = TypeVar("Element")
 
 
@@ -31,13 +31,13 @@ def modular_rows(
 ) -> list[list[int]]:
     """Return the regressor's rows at random states modulo a prime, for the machine's own guides.
 
-    A pose is taken if every leg's Delta is a square, as it is for one pose in 2^n; velocity and
-    acceleration are free.
+    A pose can be used if every leg's discriminant Delta is a square, as for one pose in 2^n;
+    velocity and acceleration are free.
 
     Raises
     ------
     ZeroDivisionError
-        If no pose serves, as for a machine that is singular everywhere.
+        If no pose can be used, as for a machine that is singular everywhere.
     """
     field = PrimeField(prime)
     vector = geometry.within(field)
@@ -64,8 +64,9 @@ def rational_rows(
 ) -> list[list[Fraction]]:
     """Return the regressor's rows, as fractions, at random rational configurations.
 
-    Each leg is closed without a root, in a random pose of its own; the guide points follow. None
-    where a kind of leg does not say how, or planes hold the platform, whose poses have a root.
+    Each leg is closed in a random configuration without a root, from which its guide point follows.
+    No rows are returned where a kind of leg has no such closing, or planes hold the platform, whose
+    poses have a root.
     """
     if topology.platform.planes:
         return []
@@ -114,19 +115,19 @@ def _split(values: Sequence[Element], topology: Manipulator) -> list[list[Elemen
 
 
 class _Degree(NamedTuple):
-    """A bound on the degree of a value: of its numerator, over powers of known denominators."""
+    """A bound on the degree of a value: a numerator over powers of earlier divisors."""
 
     numerator: int
     powers: dict[int, int]
-    """By the number of a value that was divided by, the power that the denominator has of it."""
+    """The power of each divisor in the denominator, by the divisor's number."""
     name: int
-    """The same for values that are worked out alike."""
+    """A number that is equal for values computed by the same operations."""
 
 
 class _DegreeField:
-    """Degrees in place of numbers; a root of Delta counts half of Delta's degree.
+    """Arithmetic on bounds of degrees in place of numbers; a square root halves the degree.
 
-    Fractions are brought to the least denominator that divisions as written allow.
+    A sum of fractions has the least common denominator of those that its terms are written with.
     """
 
     def __init__(self) -> None:
@@ -134,11 +135,11 @@ class _DegreeField:
         self.names: dict[Any, int] = {}
 
     def of(self, numerator: int, powers: dict[int, int], *told: Any) -> _Degree:
-        """Return a value that is worked out as told."""
+        """Return a value that is computed by the operation and operands `told`."""
         return _Degree(numerator, powers, self.names.setdefault(told, len(self.names)))
 
     def over(self, powers: Mapping[int, int], a: _Degree) -> int:
-        """Return the degree of a value's numerator over a denominator that its own divides."""
+        """Return the degree of a value's numerator over a multiple of its denominator."""
         more = (n - a.powers.get(k, 0) for k, n in powers.items())
         pairs = zip(powers, more, strict=True)
         return a.numerator + sum(self.degrees[k] * n for k, n in pairs)
@@ -181,7 +182,7 @@ class _DegreeField:
 
 
 def common_powers(values: Iterable[_Degree]) -> dict[int, int]:
-    """Return the least denominator of some values."""
+    """Return the least common denominator of some values, as powers of divisors."""
     found: dict[int, int] = {}
     for value in values:
         for k, n in value.powers.items():
@@ -193,8 +194,8 @@ def common_powers(values: Iterable[_Degree]) -> dict[int, int]:
 def degree_bound(topology: Manipulator) -> int:
     """Return a bound on the degree of any combination of a regressor row's entries.
 
-    In the pose (angles through the tangents of their halves), velocity and acceleration, the
-    geometry being constants.
+    The variables are the pose (angles by the tangents of their halves), velocity and acceleration;
+    the geometry is constant.
     """
     program = general_program(topology, "regressor").function
     field = _DegreeField()

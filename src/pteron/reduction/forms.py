@@ -42,13 +42,13 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
     Parameters
     ----------
     base : BaseParameters
-        The base parameters, and with them the machine.
+        The base parameters, which hold the machine too.
 
     Returns
     -------
     dict of Kernel
-        By form and parameter set; each is called with pose, velocity and acceleration, and has the
-        parameters as an input that is fixed.
+        The kernels by form and parameter set; each is called with pose, velocity and acceleration,
+        with the parameters as a fixed input.
     """
     robot = base.robot
     machine = Machine.of(robot)

@@ -1,6 +1,6 @@
 """The regressor's columns where legs share parameters, and the order in which columns are kept.
 
-Legs share parameters as equal legs do: the columns of their like parameters add up to one.
+Legs that are built alike share parameters: the columns of a parameter of several legs are added.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameter_data
 
 Sharing = bool | Sequence[Sequence[int]]
-"""False: no legs share parameters. True: all do. Or groups of legs, counted from 1, that do."""
+"""False: no legs share parameters. True: all do. Else groups of legs, from 1, that share theirs."""
 
 
 def leg_groups(robot: Manipulator, shared: Sharing) -> list[tuple[int, ...]]:
-    """Return the legs, counted from 1, in groups with one parameter set each."""
+    """Return groups of legs, counted from 1; the legs of a group share their parameters."""
     legs = range(1, len(robot.legs) + 1)
     if isinstance(shared, bool):
         groups = [tuple(legs)] if shared else []
@@ -48,7 +48,7 @@ def leg_groups(robot: Manipulator, shared: Sharing) -> list[tuple[int, ...]]:
 def share(
     robot: Manipulator, groups: Sequence[tuple[int, ...]]
 ) -> tuple[tuple[Parameter, ...], Array]:
-    """Return the columns, and the matrix (N, columns) that adds parameters into them."""
+    """Return the K parameters of the columns, and the matrix (N, K) of ones that adds N columns."""
     everything = parameter_data(robot)
     columns = parameter_data(robot, groups)
 
@@ -59,7 +59,7 @@ def share(
 
 
 def default_order(columns: Sequence[Parameter]) -> list[int]:
-    """Return the columns in order of preference, those to keep first in front."""
+    """Return the numbers of the columns in order of preference: the first are kept first."""
     given = {(parameter.kind, parameter.body) for parameter in columns}
     preference = PREFERENCE if given <= set(PREFERENCE) else TILTING_PREFERENCE
 

@@ -68,8 +68,8 @@ class Orientations:
     """The type-II measure (A,) over the platform's angle, as a share of its best; NaN out of reach.
 
     `coordinate` is the place of the angle in a pose, `singular` has the type-II singular
-    orientations; angles are in rad. They are those of every position, or, if not `everywhere`, of
-    the home position.
+    orientations; angles are in rad. The measure is the same at every position if `everywhere`, else
+    it is that of the home position.
     """
 
     coordinate: int
@@ -86,9 +86,10 @@ class Orientations:
 
 @dataclass(frozen=True)
 class Measures:
-    """Both measures (B, A) on a slice; NaN out of reach.
+    """Both singularity measures (B, A) on a slice; NaN out of reach.
 
-    Of type I it is the least of the legs', of type II the share of its best.
+    `type_i` is the least of the legs' type-I measures, `type_ii` the type-II measure as a share of
+    its best.
     """
 
     cut: ReachSlice
@@ -100,15 +101,16 @@ class Measures:
 class Report:
     """The contents of a machine's page; the cycle has T samples.
 
-    The cycle is the standard one, which keeps the margin `least`, or a motion that was given, from
-    `source`; `shown` are the moments of it that the moving picture has. `sizing` is what it asks of
-    the drives: forces, in N or N m, include friction and the motors' inertia where the file tells
-    of them (`driven`).
-    The slices go through the home pose; those of lengths are all of one width. `volume` is None
-    where the pose has fewer lengths than two, `tilt` (rad, to every side at the home pose's place,
-    proved) where the platform does not tilt from the level. Of `orientations` and `measures`
-    there is what the type-II measure depends on; neither where J is constant. `passive` has the
-    passive joints that have limits, at home.
+    `cycle` is the standard one, which keeps the margin `least`, or a given motion, from the file
+    `source`; `shown` are the instants of it in the moving picture. `sizing` has the loads of the
+    drives in it: forces, in N or N m, include friction and the motors' inertia where the machine's
+    file has these (`driven`).
+    The slices go through the home pose; those over two lengths are all of one width. `volume` is
+    None where the pose has fewer than two lengths. `tilt` is the angle, rad, by which the platform
+    is proved to tilt to every side at the home position; None where it does not tilt from the
+    level. `orientations` is there where the type-II measure depends on one angle, `measures` where
+    it depends on the position; neither where J is constant. `passive` has the passive joints with
+    limits, at the home pose.
     """
 
     robot: Manipulator
@@ -138,7 +140,7 @@ class Report:
 
     @property
     def driven(self) -> bool:
-        """Whether the file tells of the drives."""
+        """Whether the machine's file has drives."""
         return any(leg.drive is not None for leg in self.robot.legs)
 
     @property
@@ -153,13 +155,13 @@ class Report:
 
     @property
     def limited_drives(self) -> bool:
-        """Whether the file tells what a drive can do."""
+        """Whether the machine's file has a limit of a drive."""
         drives = self.sizing.drives
         return any(drive.max_force or drive.max_speed or drive.rated_force for drive in drives)
 
     @property
     def geared(self) -> bool:
-        """Whether the file tells of a motor's inertia."""
+        """Whether the machine's file has a motor's inertia."""
         return any(drive.rotor_inertia > 0.0 for drive in self.sizing.drives)
 
 
@@ -206,7 +208,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
 
 
 def _slices(robot: Manipulator, home: Array, volume: ReachVolume | None) -> tuple[ReachSlice, ...]:
-    """Return the slices through home; those of lengths are of one width, so that they compare."""
+    """Return the slices through home; those over two lengths are of one width, to be compared."""
     found = []
     for plane in slice_planes(robot):
         extent = None
@@ -231,21 +233,24 @@ def _extent(box: Array, plane: Plane, half: Sequence[float]) -> tuple[float, flo
 
 
 def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Measures | None:
-    """Return the measures on a plane of home, upright if it may be, where type II varies in it."""
+    """Return the measures on a plane through home, a vertical one if possible.
+
+    None where the type-II measure is constant or depends on the orientation alone.
+    """
     closure = closure_of(robot)
     if closure.orientation is not None or closure.vanishes() is False:
         return None
     if volume is None:
         cut = reach_slice(robot, home, slice_planes(robot)[0], points=_FINE)
     else:
-        # The plane of the base frame that holds the vertical best, x before y.
+        # The plane of two axes of the base frame that is nearest to vertical, x before y.
         vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
         upright = not robot.platform.planar and vertical[1] <= vertical[2]
         plane, box = "xz" if upright else "xy", volume.box
         half = (0.5 + _RIM) * (box[1] - box[0])
         extent = _extent(box, plane, half.tolist())
         whole = reach_slice(robot, home, plane, extent=extent, points=_FINE)
-        # The box is that of all planes: this one may be reached in a small part of it.
+        # The box holds the whole reach: this plane may reach a small part of it.
         cut = reach_slice(robot, home, plane, extent=reached(whole), points=_FINE)
     type_i = numeric(robot, "reach")(cut.poses)[1].min(axis=-1)
     type_ii = _type_ii(robot, cut.poses)

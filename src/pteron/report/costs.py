@@ -23,7 +23,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Cost:
-    """One form of the model: its name, operations of one state, and how it compares if reduced."""
+    """One form of the model: its name, operations for one state, and a note on its reduction."""
 
     form: str
     operations: int
@@ -50,7 +50,7 @@ def costs(base: BaseParameters) -> tuple[Cost, ...]:
 
 
 def fewer(value: float, reference: float, less: str = "fewer") -> str:
-    """Return by how many percent a value is below, or above, a reference."""
+    """Return in words the percentage by which a value is below, or above, a reference."""
     percent = 100.0 * (1.0 - value / reference)
     return f"{abs(percent):.0f} % {less if percent >= 0.0 else 'more'}"
 

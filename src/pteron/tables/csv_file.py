@@ -28,6 +28,9 @@ _HEAD = 1 << 20
 _END = b"\nEOF"
 """A last line that marks the end, as TwinCAT Scope writes it."""
 
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+"""A number, which is no name of a column."""
+
 
 class CsvFile:
     """A CSV file that is open for reading; each pass over its tables reads it anew.
@@ -175,9 +178,10 @@ class CsvFile:
             raise DataError(f"{self.source}: is empty; its first line must name the columns")
         twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
         if twice is not None:
-            raise DataError(
-                f"{self.source}: two columns are called {shown(twice)}; rename or remove one"
-            )
+            fault = f"two columns are called {shown(twice)}; rename or remove one"
+            if all(_NUMBER.fullmatch(name) for name in names):
+                fault = "its first line has numbers; it must name the columns"
+            raise DataError(f"{self.source}: {fault}")
         read = records.line_num
         return names, sum(map(len, lines[:read])), read + 1
 

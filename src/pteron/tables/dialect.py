@@ -1,4 +1,4 @@
-"""The dialect of a CSV file as far as declared: separator, decimal sign, encoding, header lines."""
+"""The declared dialect of a CSV file: separator, decimal sign, encoding and header lines."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ class Dialect:
     Parameters
     ----------
     separator : {",", ";", tab, "|", blank}, optional
-        The character between cells; of blanks there may be several.
+        The character between cells; several blanks count as one separator.
     decimal : {".", ","}, optional
         The decimal sign.
     encoding : str, optional
-        A text encoding that Python knows.
+        The name of a text encoding in Python.
     header_lines : int, optional
-        Lines above the data, of which the last names the columns; units may stand in the line after
-        these names.
+        Number of lines above the data; the last names the columns. A line of units after the names
+        may be counted or not.
     """
 
     separator: Separator | None = None
@@ -63,7 +63,7 @@ PLAIN = Dialect(",", ".", "utf-8")
 
 
 def declaration(table: str, **entries: object) -> str:
-    """Return lines for the TOML file beside a log, for the end of a message.
+    """Return lines for the TOML file beside a log, to be put at the end of a message.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """The layout of a CSV file, found from its beginning: dialect, names, and where its rows begin.
 
-What cannot be known for certain is refused with what to declare; nothing is guessed but the
-encoding of a file that is not UTF-8.
+A part that the file leaves ambiguous is refused, with the lines that declare it; only the encoding
+of a file that is not UTF-8 is guessed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pteron.tables.dialect import SEPARATORS, Dialect, declaration
 from pteron.tables.table import listed
 
 _LINES = 1000
-"""Lines of a file from which its layout is found."""
+"""Number of lines of a file from which its layout is found."""
 
 _WITH_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 """A number with a decimal comma."""
@@ -36,9 +36,9 @@ _UNIT = re.compile(
 """A cell in a line of units below the names."""
 
 _KEYS = {"SymbolName", "SymbolComment", "SampleTime[ms]", "Data-Type", "Unit", "NetID"}
-"""First cells of lines above the data in an export of TwinCAT Scope; that of the names is Name."""
+"""First cells of the lines above the data in an export of TwinCAT Scope, beside Name."""
 _TICKS = 10**15
-"""Time stamps above this, in ms, must be ticks of 100 ns: no export lasts that long."""
+"""Time stamps above this are ticks of 100 ns, not ms: no export lasts that long."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +48,16 @@ class Layout:
     Attributes
     ----------
     dialect : Dialect
-        Its separator, decimal sign, encoding and lines above the data, all known.
+        Separator, decimal sign, encoding and number of lines above the data; none is None.
     names, units : tuple of str
-        Of the columns; a name that occurs again has its number behind it, and a unit is empty where
-        no line of its own says it.
+        Names and units of the columns; a repeated name has a number at its end, and a unit is empty
+        where the file has no line of units.
     repeated : dict
-        The names that occur again, as keys, and what the file calls them.
+        The numbered names of repeated columns, with their names in the file.
     start : int
-        Bytes of the text in UTF-8 above the first row.
+        Number of bytes, as UTF-8, before the first row.
     first_line : int
-        The line of the first row, from 1.
+        Number of the first row's line, from 1.
     found : tuple of str
         Differences from a plain CSV file that were not declared, in words.
     """
@@ -72,7 +72,7 @@ class Layout:
 
 
 def find_encoding(head: bytes, declared: str | None, source: str) -> str:
-    """Return the encoding of a text: as declared, as its mark says, UTF-8, or else cp1252."""
+    """Return the encoding: the declared one, that of a byte order mark, UTF-8, or else cp1252."""
     if declared is not None:
         return declared
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -93,7 +93,7 @@ def find_encoding(head: bytes, declared: str | None, source: str) -> str:
 def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> Layout:
     """Return the layout of a CSV file.
 
-    `head` is the beginning of its text, in UTF-8; `declared` are the parts that are known.
+    `head` is the beginning of its text, in UTF-8; `declared` has the parts that are declared.
     """
     lines = io.BytesIO(head).readlines()
     text = [line.decode() for line in lines[:_LINES]]
@@ -131,7 +131,7 @@ def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> L
 
 
 def _check_commas(rows: Cut, source: str) -> None:
-    """Refuse numbers with commas that may be decimal commas or marks of thousands."""
+    """Refuse numbers whose commas may be decimal commas or thousands separators."""
     if rows.decimal != ",":
         return
     cells = [cell for one in rows.records if rows.is_row(one) for cell in one.cells]
@@ -145,7 +145,7 @@ def _check_commas(rows: Cut, source: str) -> None:
 
 
 def _first_row(rows: Cut, header_lines: int | None) -> int:
-    """Return the line, from 0, that the rows begin with."""
+    """Return the line of the first row, from 0."""
     if header_lines is not None:
         below = [one for one in rows.records if one.line >= header_lines]
         return below[0].after if below and _are_units(below[0]) else header_lines
@@ -164,7 +164,7 @@ def _names(
 ) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
     """Return names and units of the columns, and whether the units have a line of their own."""
     width = rows.width
-    # Rows may end in a separator that the names have not.
+    # Rows may end in a separator where the line of names does not.
     fitting = [one for one in above if len(one.cells) in (width, width - 1)]
     fitting = [one for one in fitting if 2 * sum(map(bool, one.cells)) > width] or fitting[-1:]
     if not rows.columns:
@@ -193,7 +193,7 @@ def _are_units(record: Record) -> bool:
 def _of_scope(
     rows: Cut, title: Record, keyed: Sequence[Record]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units in an export of TwinCAT Scope, whose lines have keys over the times.
+    """Return names and units in an export of TwinCAT Scope: its lines begin with a key.
 
     Times are in milliseconds from the start, or full stamps in ticks of 100 ns; a unit is written
     like "mm (Length)" or "(None)".
@@ -224,7 +224,7 @@ def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
 
 
 def _told_apart(names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return names that are all different, and which of them the file calls alike."""
+    """Return the names, repeated ones numbered, and the numbered ones with those in the file."""
     apart: list[str] = []
     repeated: dict[str, str] = {}
     seen: Counter[str] = Counter()

@@ -173,7 +173,7 @@ class Table:
             expected = "a number" if is_text else "a finite number"
             comma = " with a decimal comma" if is_text and self.decimal == "," else ""
             given = f"{shown(str(cell).strip())} given, {expected}{comma} expected"
-        leave = ", or choose on-failure nan to leave such rows empty" if choice else ""
+        leave = ", or leave such rows empty with --on-failure nan" if choice else ""
         return f"{self.place(row)}, column {name}: {given}; correct the cell{leave}"
 
 

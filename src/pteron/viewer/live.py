@@ -1,4 +1,4 @@
-"""A session that tabs look at and act on: the one thread that moves it, and tells what it shows."""
+"""A session that tabs show and act on: the one thread that changes it and sends what they show."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ _ONE = 1.0
 """Time, s, within which actions of one name are undone as one."""
 
 _LONGEST = 0.1
-"""Longest time that a motion goes on at once, s."""
+"""Greatest step of time of a motion between two pictures, s."""
 
 _UNDONE = ("pose", "joint", "drag", "type", "payload", "home", "mode", "assembly", "move_to")
 """Beginnings of the names of actions that can be undone."""
 
 
 class Live:
-    """A session, what its pages show, and the actions that wait for it.
+    """A session with the tabs that show it, and a queue of actions for it.
 
     Attributes
     ----------
     session : Session
     name : str
-        The machine's.
+        The machine's name.
     idle : Event
-        Set while all that was asked for is done.
+        Set while no action waits.
     faults : list of str
         Tracebacks of unexpected failures.
     """
@@ -60,7 +60,7 @@ class Live:
         self.session, self._compared = session, compared
         self.name = session.state.robot.name
         self.idle, self.faults = threading.Event(), list[str]()
-        self._run_name = token_hex(8)  # a page that another run gave is loaded anew
+        self._run_name = token_hex(8)  # a page of an earlier run is loaded again
         self._actions: dict[str, Callable[[], object]] = {}
         self._wake = threading.Condition()
         self._closed = False
@@ -74,11 +74,11 @@ class Live:
         self._thread = threading.Thread(target=self._run, name="pteron viewer", daemon=True)
 
     def start(self) -> None:
-        """Let time go on."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Do nothing more."""
+        """Stop the thread."""
         with self._wake:
             if self._closed:
                 return
@@ -87,7 +87,7 @@ class Live:
         self._thread.join()
 
     def do(self, name: str, act: Callable[[], object]) -> None:
-        """Do something with the session soon; of actions with one name only the last is done."""
+        """Queue an action; of waiting actions with one name only the last is done."""
         with self._wake:
             self._actions.pop(name, None)
             self._actions[name] = act
@@ -105,20 +105,20 @@ class Live:
         )
 
     def entered(self, tab: Tab) -> None:
-        """Send a tab what it is to show."""
+        """Send a new tab its contents."""
         with self._wake:
             self._tabs.add(tab)
             for kind, message in self._kept.items():
                 tab.send(kind, message)
 
     def left(self, tab: Tab) -> None:
-        """Send a tab no more."""
+        """Forget a tab that is closed."""
         with self._wake:
             self._tabs.discard(tab)
             self._files.pop(tab, None)
 
     def told(self, tab: Tab, message: str | bytes) -> None:
-        """Do what a tab asks for; a file comes after its name."""
+        """Handle a message of a tab; a file comes after its name."""
         session = self.session
         if isinstance(message, bytes):
             name = self._files.pop(tab, "")
@@ -140,7 +140,7 @@ class Live:
         self.do(name, act)
 
     def _push(self, drives: str) -> None:
-        """Compile the equations of motion, for which others do not wait, and begin."""
+        """Compile the equations of motion in a thread of its own, then begin the push."""
         session = self.session
 
         def prepare() -> None:
@@ -153,7 +153,7 @@ class Live:
             session.begin_push(drives)
 
         def compile_equations() -> None:
-            with suppress(Exception):  # `begin` meets it again, and tells it
+            with suppress(Exception):  # `begin` raises it again, and reports it
                 session.prepare_push(drives)
             self.do("push", begin)
 
@@ -224,7 +224,7 @@ class Live:
         act()
 
     def _guard(self, act: Callable[[], object]) -> None:
-        """Act; a failure is reported on the page, and the last good state stays."""
+        """Run an action; a failure is reported on the page, and the last good state stays."""
         try:
             act()
         except PteronError as error:

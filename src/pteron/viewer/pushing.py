@@ -1,4 +1,4 @@
-"""A machine that a spring pulls at its platform: forward dynamics, its drives free or holding."""
+"""Forward dynamics of a machine whose platform a spring pulls, with drives off or controlled."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DRIVES = {
     "computed torque": ComputedTorque(_PERIOD, bandwidth=8.0),
     "off: no force": None,
 }
-"""Controllers of the drives while somebody pulls, by names for people; the first is usual."""
+"""Controllers of the drives during a pull, by their names on the page; the first is the default."""
 
 _STEP = 5e-4
 """Longest step of the integration, s."""
@@ -35,7 +35,7 @@ _RATE = 9.0
 """Least rate of the spring with the machine's moving mass, where none is given, rad/s."""
 
 _SAG = 0.1
-"""Most that the spring gives way under that mass, as a share of the machine's size."""
+"""Greatest sag of the spring under that mass, as a share of the machine's size."""
 
 _DAMPING = 0.3
 """Damping of the spring, over the critical one for that mass."""
@@ -49,13 +49,13 @@ class Push:
     pose, velocity : array, shape (m,)
         m, rad and s.
     forces : array, shape (n,)
-        Of the drives, N or N m.
+        Forces of the drives, N or N m.
     does : str
-        What the machine does by itself, in words.
+        The state of the drives, in words.
     stops : str
-        What stopped the platform in the last span; empty where nothing did.
+        The limit or obstacle that stopped the platform in the last span, in words; else empty.
     stiffness : float
-        Of the spring, N/m.
+        Stiffness of the spring, N/m.
     spring : (array, array) or None
         Its ends, m: on the platform, and where it is held.
     """
@@ -71,7 +71,7 @@ class Push:
         self._step = allowed_step(robot, pose, _STEP, usual=True)
         bodies = [body for leg in robot.legs for body in leg.bodies.values()]
         self._mass = sum(body.values[0] for body in (*bodies, robot.platform.joined))
-        # A small machine falls as fast as a large one: a spring as slow would not lift it.
+        # All machines fall equally fast: under a small one the spring must be stiffer to lift it.
         sag = _SAG * max(leg.size for leg in robot.legs)
         pull = float(np.linalg.norm(robot.platform.directions @ np.array(robot.gravity)))
         rate = max(_RATE, np.sqrt(pull / sag))
@@ -81,7 +81,7 @@ class Push:
         self.does = off if self._law is None else "The drives hold its pose"
         self._arm: Array | None = None
         self._held = np.zeros(3)
-        self._move(_PERIOD)  # compiles it
+        self._move(_PERIOD)  # the first call compiles
         self._begin(pose, still)
 
     @property
@@ -90,7 +90,7 @@ class Push:
         return None if self._arm is None else (self._grip()[0], self._held)
 
     def pull(self, grip: Array, held: Array) -> None:
-        """Hold the spring, which begins at a point of the platform (3,), at another point, m."""
+        """Attach the spring at `grip` (3,), m, if it is loose; hold its end at `held` (3,), m."""
         if self._arm is None:
             place, axes = self._robot.platform.at(self.pose)
             self._arm = axes @ (grip - place)
@@ -101,9 +101,9 @@ class Push:
         self._arm = None
 
     def go(self, span: float) -> None:
-        """Let time go on by a span, s.
+        """Simulate a span of time, s.
 
-        The platform slides along what it meets, and loses the speed towards it: it has no more
+        At a limit the platform slides along it, and loses the speed towards it: it has no more
         energy than it would have had behind it.
         """
         self.stops, robot = "", self._robot
@@ -113,7 +113,7 @@ class Push:
             whole = self._move(_PERIOD)
             if whole and allowed(robot, self.pose):
                 continue
-            # What it meets is met once for the rest of the span, as a slide takes milliseconds.
+            # A limit is handled once for the rest of the span: a slide takes milliseconds.
             whole = whole and self._move((rest - 1) * _PERIOD)
             energy = self._energy(self.pose, self.velocity) if whole else np.nan
             if not np.isfinite(energy):
@@ -128,12 +128,12 @@ class Push:
             return
 
     def _begin(self, pose: Array, velocity: Array) -> None:
-        """Put the machine into a state, in which drives that bend hold it."""
+        """Put the machine into a state, with transmissions bent as they are in equilibrium."""
         self.pose, self.velocity = pose, velocity
         self._drives = drive_states(self._robot, pose, velocity)
 
     def _move(self, span: float) -> bool:
-        """Go on by a span under the forces as they are; return whether it was made whole."""
+        """Integrate over a span, s, under constant forces; return whether all of it succeeded."""
         count = int(np.ceil(span / self._step - 1e-9))
         state, step = (self.pose, self.velocity), span / max(count, 1)
         given = self._robot, *state, self.forces, step, count, self._wrench()
@@ -169,7 +169,7 @@ class Push:
         return place + arm, arm
 
     def _wrench(self) -> Array:
-        """Return the spring's load on the platform at P, in the components of its wrenches."""
+        """Return the spring's wrench on the platform at P, in the platform's wrench components."""
         platform, force = self._robot.platform, np.zeros(3)
         grip, arm = self._grip()
         if self._arm is not None:

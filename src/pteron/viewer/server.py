@@ -1,6 +1,6 @@
-"""The viewer's server: pages and their sockets, on the first free port from the one asked for.
+"""The viewer's server: pages and their web sockets, on the first free port from a given one on.
 
-It answers no page of another server; see `guard`.
+Requests from pages of another server are refused; see `guard`.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
 
 _PORTS_TRIED = 100
-"""Most ports that are tried in turn before the server is refused."""
+"""Number of ports that are tried in turn."""
 
 _LAST_PORT = 65535
-"""The largest port there is."""
+"""The greatest port number."""
 
 _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
-"""Error numbers for an address that is none of this machine's."""
+"""Error numbers for an address that does not belong to this machine."""
 
 _LARGEST = (100 << 20) + (1 << 16)
 """Largest message, bytes: a file with a motion."""
 
 _GONE = 2.0
-"""Time after which a tab that does not answer is left at the end, s."""
+"""Time, s, for which closing waits for a tab that does not answer."""
 
 
 class Room(Protocol):
@@ -44,17 +44,17 @@ class Room(Protocol):
         """Return the page, HTML."""
 
     def entered(self, tab: Tab) -> None:
-        """Send a tab what it is to show."""
+        """Send a new tab its contents."""
 
     def left(self, tab: Tab) -> None:
-        """Send a tab no more."""
+        """Forget a tab that is closed."""
 
     def told(self, tab: Tab, message: str | bytes) -> None:
-        """Take a message of a tab."""
+        """Handle a message from a tab."""
 
 
 class Tab:
-    """One connected page: of messages of one kind that it has not taken, only the last is sent."""
+    """A connected page; of unsent messages of one kind only the last is sent."""
 
     def __init__(self, connection: ServerConnection) -> None:
         self._connection = connection
@@ -65,13 +65,13 @@ class Tab:
         self._thread.start()
 
     def send(self, kind: str, message: str) -> None:
-        """Send a message soon."""
+        """Queue a message to be sent."""
         with self._wake:
             self._messages[kind] = message
             self._wake.notify()
 
     def close(self) -> None:
-        """Send nothing more."""
+        """Stop sending messages."""
         with self._wake:
             self._over = True
             self._wake.notify()
@@ -94,10 +94,10 @@ class Tab:
 
 
 class Server:
-    """A running server of pages by their paths; `port` is where it is."""
+    """A running server of pages by their paths; `port` is its port."""
 
     def __init__(self, host: str, port: int, rooms: Mapping[str, Room | Callable[[], str]]) -> None:
-        """Serve; `port` is the first that is tried, and 0 takes any that is free."""
+        """Start the server on the first free port from `port` on, or if it is 0 on any."""
         from websockets.sync.server import serve
 
         self._rooms, self._host, self._here = rooms, host, is_here(host)
@@ -123,7 +123,7 @@ class Server:
         self._thread.start()
 
     def stop(self) -> None:
-        """Close all connections, and serve no more."""
+        """Close all connections and stop the server."""
         self._server.shutdown()
         for connection in list(self._tabs):
             connection.close(1001)
@@ -210,5 +210,5 @@ def _is_free(family: int, address: Any, port: int) -> bool:
 
 
 def _worth_telling(record: logging.LogRecord) -> bool:
-    """Say whether a line of the server's log is: browsers open connections that they do not use."""
+    """Say whether a record of the log matters: browsers open connections that they do not use."""
     return record.levelno >= logging.ERROR and record.getMessage() != "opening handshake failed"

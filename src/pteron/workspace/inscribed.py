@@ -24,15 +24,15 @@ from pteron.workspace.smooth_conditions import smooth_conditions
 from pteron.workspace.volume import bounding_box, expect_places
 
 _STARTS = 3
-"""Places of a search grid from which the shape is enlarged."""
+"""Number of places of the search grid from which the shape is enlarged."""
 
 _SHARES = 40
-"""Most times that a shape is made smaller by the tolerance until it is proved, or refused."""
+"""Greatest number of times that a shape is made smaller by the tolerance until it is proved."""
 
 
 @dataclass(frozen=True)
 class Inscribed:
-    """A shape in the workspace, as large as was found.
+    """The largest shape that was found in the workspace.
 
     Attributes
     ----------
@@ -68,8 +68,8 @@ def largest_cube(
     """Return the largest cube in the workspace at the orientation of a pose, and its proof.
 
     Its edges are along the pose's coordinates; in a plane it is a square. A search by ordinary
-    evaluation, from the best places of a lattice, finds it: no larger one is known, but that there
-    is none is not proved. That all of it lies in the workspace is.
+    evaluation, from the best places of a lattice, finds it. It is proved that all of it lies in the
+    workspace; it is not proved that there is no larger one.
 
     Parameters
     ----------
@@ -78,9 +78,9 @@ def largest_cube(
     pose : array, shape (m,)
         Gives the orientation, m and rad.
     tolerance : float
-        By which share the cube may be smaller than the one that was found, so that it is proved.
+        Share by which the cube may be made smaller than the one that was found, to be proved.
     proved : bool
-        Whether it is proved; else it is what the search found, so much smaller.
+        Whether to prove it; else the cube that was found is made smaller by `tolerance`.
     given : tuple of Condition, optional
         The conditions on a pose; by default `conditions(robot)`: reach and limits.
 
@@ -91,7 +91,7 @@ def largest_cube(
     Raises
     ------
     ModelError
-        If there is none: no position is in reach at this orientation, or next to none.
+        If none is found: no position is in reach at this orientation, or hardly any.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def _largest(
         fit = around(search_ball(robot), failing)
         if fit.edge > 0.0:
             return fit
-        # A grid through the ball of every orientation may pass by what one of them leaves.
+        # A grid for all orientations may miss the small part that one of them leaves.
         low, high = bounding_box(robot, at)
         return around((0.5 * (low + high), 0.5 * float((high - low).max())), failing)
 

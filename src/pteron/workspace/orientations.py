@@ -24,9 +24,9 @@ class VolumesOverAngles:
     angles : array, shape (A,)
         The platform's angle, rad.
     elbows : tuple of tuple of int
-        The modes, S of them: each leg's elbow.
+        The S working modes: the elbow, 1 or -1, of each leg.
     inner, outer : array, shape (S, A)
-        The volume is proved to be between them; 0 where nothing is in reach.
+        Proved lower and upper bounds on the volume, in `unit`; 0 where no position is in reach.
     unit : {"m^3", "m^2"}
         Unit of both.
     """
@@ -53,13 +53,13 @@ def over_angles(
     robot : Manipulator, name or path
         The machine, whose platform turns.
     pose : array, shape (m,)
-        Any pose; its angle does not matter.
+        A pose of the machine, m and rad; its angle does not matter.
     angles : array, shape (A,)
         The platform's angle, rad.
     tolerance : float
         Greatest gap between the bounds, as a share of the inner one.
     modes : bool
-        Whether every working mode is asked, or the machine's own alone.
+        Whether all working modes are evaluated, or the machine's own alone.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def over_angles(
     ModelError
         If the platform does not turn, or the reach has no end.
     DataError
-        If the angles are no row of finite numbers.
+        If the angles are not a row of finite numbers.
 
     Examples
     --------

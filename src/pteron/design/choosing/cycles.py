@@ -24,13 +24,13 @@ from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
 
 _DIRECTIONS = 4
-"""Directions of a cycle in half a turn."""
+"""Number of directions of a cycle in half a turn."""
 
 _PLACES = 64
-"""Most places of a cycle that a search looks at."""
+"""Greatest number of places of a cycle in a search."""
 
 _IN_CYCLE, _IN_CYCLE_LAST = 49, 129
-"""Samples of a cycle, in a search and at last: peaks at a rounded corner are short."""
+"""Samples of a cycle in the search, and in the final check: peaks at a rounded corner are short."""
 
 _SHARES = np.linspace(1.0, 0.0, 21)
 """Shares of the way to a corner at which a cycle is tried."""
@@ -45,21 +45,21 @@ class Places:
     name : str
         The cycle's name.
     robot : Manipulator
-        Of the kind, with its tool.
+        A machine of the kind, with its tool.
     path : Path
-        That of the tool, as it is given, from the middle.
+        The given path of the tool, from the middle of the workspace.
     shifts, turns : array, shape (B, m) and (B,)
-        Where its points' origin is, m and rad, and by how much it is turned, rad.
+        The B shifts of the path, m and rad, and its turns, rad.
     duration : float or None
-        s; None: as fast as the motors can.
+        Duration of the path, s; None: as short as the motors allow.
     dwell : float
-        s.
+        Rest after the path, s.
     share : float
-        How often it is done in a duty cycle of all; 0 where each counts by itself.
+        Share of this cycle in a duty cycle of all; 0 where each counts alone.
     anywhere : bool
         Whether it may be at other places and in other directions.
     samples : int
-        In time.
+        Number of samples in time.
     """
 
     name: str
@@ -82,16 +82,16 @@ class Places:
         return f"{self.name} at ({at}) mm{told}, turned by {np.degrees(self.turns[k]):.0f} deg"
 
     def some(self) -> Places:
-        """Return it at no more places than a search looks at, evenly chosen."""
+        """Return the cycle at the greatest number of places of a search, evenly chosen."""
         chosen = np.unique(np.linspace(0, len(self.turns) - 1, _PLACES).round().astype(int))
         return self.at(chosen)
 
     def at(self, chosen: Array) -> Places:
-        """Return it at some of its places."""
+        """Return the cycle at some of its places."""
         return replace(self, shifts=self.shifts[chosen], turns=self.turns[chosen])
 
     def both_ways(self) -> Places:
-        """Return it, finer in time, at its places and, turned round, at those opposite."""
+        """Return the cycle, finer in time, at its places and, turned by pi, at opposite ones."""
         fine = replace(self, samples=_IN_CYCLE_LAST)
         if not self.anywhere:
             return fine
@@ -139,7 +139,7 @@ def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
     points[:, : job.lengths] = given[:, : job.lengths]
     angles = given[:, job.lengths :]
     points[:, robot.freedom - angles.shape[1] :] = angles
-    # The path is that of the tool, which of this machine is P.
+    # The path is that of the tool, which is at P of this machine.
     bare = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
     path: Path = line_path(bare, points, cycle.corner)
     path = there_and_back(path) if cycle.back else path
@@ -158,7 +158,7 @@ def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
 
 
 def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> Places:
-    """Return a cycle at neighbours of some of its places, which they may be themselves.
+    """Return a cycle at neighbours of some of its places, these places included.
 
     A neighbour is turned by a part of the angle between directions, or shifted by that part of
     half the workspace or of the range of turns.
@@ -225,7 +225,7 @@ def _fitting(
 
 
 def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
-    """Yield angles (a,) by which a cycle's may be shifted: to the ends of the turn, to each tilt.
+    """Yield shifts (a,) of a cycle's angles: to the ends of the turn, to each tilt.
 
     A cycle that tilts by itself keeps its tilts.
     """

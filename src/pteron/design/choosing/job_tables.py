@@ -15,20 +15,20 @@ from pteron.kernels import Array
 from pteron.manipulator.dimensions import Stock
 
 _FAR = 20.0
-"""Metres from which on a workspace or a cell was probably given in millimetres."""
+"""Length, m, from which a workspace or a cell was probably given in millimetres."""
 
 _COARSE = 0.02
-"""Metres from which on an error was probably given in millimetres."""
+"""Error, m, from which it was probably given in millimetres."""
 
 _LEANS = 1.5
-"""Radians that a tilt is below."""
+"""Angle, rad, that a tilt must be below."""
 
 _TURNS = 7.0
-"""Radians from which on a turn was probably given in degrees."""
+"""Angle, rad, from which a turn was probably given in degrees."""
 
 
 def _near(given: Any) -> Any:
-    """Refuse lengths, m, that are those of no cell."""
+    """Refuse lengths, m, that are too large for a cell."""
     lengths = np.abs(given).ravel()
     if lengths.max() > _FAR:
         raise ValueError(f"{lengths.max():g} m given: are these mm?")
@@ -36,7 +36,7 @@ def _near(given: Any) -> Any:
 
 
 def _fine(given: float) -> float:
-    """Refuse errors, m, that are those of no machine."""
+    """Refuse errors, m, that are too large for a machine."""
     if given > _COARSE:
         raise ValueError(f"{given:g} m given: is this mm?")
     return given
@@ -49,13 +49,13 @@ def _leaning(given: float) -> float:
 
 
 def _near_points(given: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    """Refuse points, of which two lengths or more come first, that are those of no cell."""
+    """Refuse points whose first two coordinates, lengths in m, are too large for a cell."""
     _near([point[:2] for point in given])
     return given
 
 
 Names = Annotated[list[str], BeforeValidator(listed), Field(min_length=1)]
-"""One name, or some."""
+"""One name, or a list of names."""
 
 Near = Annotated[Positive, AfterValidator(_near)]
 """A length above 0 and of a cell's size, m."""
@@ -68,7 +68,7 @@ Place = Annotated[Three, AfterValidator(_near)]
 
 
 class WorkspaceTable(Table):
-    """`[workspace]`: where the tool's centre point must work; it has one of three shapes."""
+    """`[workspace]`: the positions of the tool's centre point: a box, a cylinder or a list."""
 
     size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = key(
         "sides of a box, m; two for a flat one", None
@@ -111,7 +111,7 @@ class WorkspaceTable(Table):
 
     @property
     def half(self) -> Array:
-        """Half the sides (3,) of the box about it, m."""
+        """Half the sides (3,) of the box around the workspace, m."""
         if self.poses is not None:
             sides = np.ptp(np.array(self.poses), axis=0)
         elif self.radius is not None and self.height is not None:
@@ -121,7 +121,7 @@ class WorkspaceTable(Table):
         return np.pad(0.5 * sides, (0, 3 - len(sides)))
 
     def meets(self, low: Array, high: Array) -> bool:
-        """Say whether its tool enters a box (3,) from its middle, m."""
+        """Say whether the tool may enter a box, corners (3,) from the workspace's middle, m."""
         if self.poses is not None:
             poses = np.pad(self.poses, ((0, 0), (0, 3 - len(self.poses[0]))))
             poses = poses - 0.5 * (poses.min(axis=0) + poses.max(axis=0))
@@ -134,12 +134,12 @@ class WorkspaceTable(Table):
 
     @property
     def tilts(self) -> bool:
-        """Whether it asks for tilts."""
+        """Whether the platform must tilt."""
         return self.tilt is not None or self.directions is not None
 
     @property
     def words(self) -> str:
-        """Its shape in words."""
+        """The shape of the workspace in words."""
         if self.size is not None:
             return f"workspace {' x '.join(f'{1e3 * x:g}' for x in self.size)} mm"
         if self.poses is not None:
@@ -148,7 +148,7 @@ class WorkspaceTable(Table):
 
 
 class LoadTable(PayloadTable):
-    """`[payload]`: what the platform carries, a tool with its centre point among it."""
+    """`[payload]`: the body that the platform carries, with the tool's centre point."""
 
     tool: Place = key(
         "the tool's centre point in the platform's frame, m: what must reach", (0.0, 0.0, 0.0)
@@ -156,7 +156,7 @@ class LoadTable(PayloadTable):
 
 
 class CycleTable(Table):
-    """`[[cycles]]`: a path of the tool through points, again and again."""
+    """`[[cycles]]`: a path of the tool through points, repeated without end."""
 
     name: str | None = None
     points: Annotated[
@@ -180,14 +180,14 @@ class CycleTable(Table):
 
 
 class MotionTable(Table):
-    """`[motion]`: what the platform must be able to do everywhere, in every direction."""
+    """`[motion]`: speed and acceleration that are required everywhere, in every direction."""
 
     speed: Least = key("of P, m/s", 0.0)
     acceleration: Least = key("of P, m/s^2", 0.0)
 
 
 class AccuracyTable(Table):
-    """`[accuracy]`: how far the tool may be from where it should be."""
+    """`[accuracy]`: the greatest position error of the tool, and the tolerances of parts."""
 
     most: Fine = key("m")
     counted: Literal["deviation", "worst"] = key(
@@ -201,12 +201,12 @@ class AccuracyTable(Table):
 
     @property
     def of_parts(self) -> bool:
-        """Whether errors of the machine's parts count, beside those of its drives."""
+        """Whether any tolerance of the machine's parts is given, beside errors of its drives."""
         return bool(self.point or self.length or self.angle)
 
 
 class StiffnessTable(Table):
-    """`[stiffness]`: how far the tool may give way."""
+    """`[stiffness]`: the greatest deflection of the tool under a force."""
 
     force: Positive = key("in any direction, N")
     most: Fine = key("m")
@@ -226,7 +226,7 @@ class KeepOutTable(Table):
 
 
 class CellTable(Table):
-    """`[cell]`: the room for the machine."""
+    """`[cell]`: the space for the machine."""
 
     footprint: tuple[Near, Near] | None = key("along x and y, m", None)
     height: Near | None = key("m", None)
@@ -236,7 +236,7 @@ class CellTable(Table):
 
 
 class MotorsTable(Table):
-    """`[motors]`: what the drives are chosen from."""
+    """`[motors]`: the lists of motors and gearboxes to choose from."""
 
     list: str | None = key("CSV or TOML file; else the package's examples", None)
     gearboxes: str | None = key("CSV file; else the package's examples", None)
@@ -249,7 +249,7 @@ class MotorsTable(Table):
 
 
 class LinksTable(Table):
-    """`[links]`: what the moving parts are made of."""
+    """`[links]`: the materials and sizes of the moving parts."""
 
     upper: Names = key("stock of cranks, to choose", ["aluminium-tube:40x2", "aluminium-tube:60x3"])
     lower: Names = key("stock of rods, to choose from", ["carbon-tube:12x1", "carbon-tube:20x1.5"])
@@ -277,14 +277,14 @@ class FloorsTable(Table):
 
 
 class SearchTable(Table):
-    """`[search]`: how long, and by what chance."""
+    """`[search]`: the length of the search, and its seed of random numbers."""
 
     evaluations: Count = key("designs of each kind", 800)
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
 class BoundTable(Table):
-    """`[most]`: greatest values of what else is asked."""
+    """`[most]`: greatest values of other quantities."""
 
     price: Positive | None = None
     rated_power: Positive | None = None

@@ -18,13 +18,13 @@ from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
 
 DENSE = 7
-"""Poses along each side of a box at which a design is looked at last, before ever nearer places."""
+"""Poses along each side of the box at which a design is last evaluated, before refinement."""
 
 _ROUNDS, _KEPT = 4, 3
-"""Times that worse places of a cycle are looked for, ever nearer, about so many of the worst."""
+"""Rounds of refinement of a cycle's places, each about so many of the worst ones."""
 
 _NOTHING = 1e-9
-"""Least force, speed or torque by which a limit is divided."""
+"""Least force, speed or torque by which a limit is divided, against 0/0."""
 
 
 @dataclass
@@ -34,13 +34,13 @@ class Margins:
     Attributes
     ----------
     figures : dict
-        The least of rated torque, peak torque and speed.
+        The least margin of rated torque, of peak torque and of speed, by name.
     least : float
-        That of all.
+        The least of them all.
     worst : str
-        Where it is, in words.
+        The motion and place of the least margin, in words.
     place : tuple of Places and int, or None
-        The cycle's place at which its margin is least, and its number.
+        The places of the cycle with the least margin, and the number of the worst one.
     """
 
     figures: dict[str, float] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Margins:
     place: tuple[Places, int] | None = None
 
     def take(self, name: str, limits: Array, asked: Array) -> Array:
-        """Take limits (n,) over what is asked (B, n); return the margins (B,)."""
+        """Return the margins (B,), limits (n,) over loads (B, n), and keep the least."""
         found = np.asarray((limits / np.maximum(asked, _NOTHING)).min(axis=-1))
         self.note(name, float(found.min()))
         return found
@@ -60,9 +60,11 @@ class Margins:
 
 
 def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None) -> Margins:
-    """Return the margins of a machine that carries the payload and has its drives.
+    """Return the margins of the drives of a machine that carries the job's payload.
 
-    Friction and rotors count, and cycles at all their outermost places.
+    Friction and rotors count, and cycles that may be anywhere are taken at all their outermost
+    places. `middle` (m,) is the pose in the middle of the workspace; `time`, s, is the duration of
+    cycles that are given none.
     """
     drives = [leg.drive for leg in robot.legs if leg.drive is not None]
     most, rated, fastest = (

@@ -17,22 +17,23 @@ from pteron.platforms import Platform
 from pteron.workspace import Box, Cylinder, Proof, Region, interference, prove
 
 _BOXES, _BOXES_CLEAR = 60_000, 1_000
-"""Boxes after which a proof is given up; one that no two bodies touch, which takes longer."""
+"""Boxes after which a proof of reach is given up, and a proof that no two bodies touch, whose
+boxes take longer."""
 
 _LONGER = 0.05
-"""Share of its travel by which a guide or ram goes further where a proof meets its end."""
+"""Share of its travel by which a guide or ram is lengthened where a proof fails at its end."""
 
 
 @dataclass(frozen=True)
 class TurnedTool:
-    """Poses whose tool is in a box while the platform turns about its axis, the tool off that.
+    """Poses whose tool is in a box, for a platform that turns about an axis beside the tool.
 
     Parameters
     ----------
     of_tool : Box
-        The tool's places, as `tool_motion` has them, and the turn, the last coordinate.
+        Positions of the tool, as `tool_motion` has them, then the angle of the turn, m and rad.
     platform : Platform
-        What carries the tool.
+        The platform that carries the tool.
     """
 
     of_tool: Box
@@ -51,14 +52,14 @@ class TurnedTool:
         return self.of_tool.holds(tool_motion(self.platform, poses, rest, rest)[0])
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which boxes with corners (B, m) surely have no pose of it."""
+        """Return which boxes with corners (B, m) certainly have none of these poses."""
         at, away = self._arm(low, high)
         return self.of_tool.misses(low + at - away, high + at + away)
 
     def _arm(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the arm (B, m) from P to the tool at the middle turn, and how far it may be off.
+        """Return the arm (B, m) from P to the tool at a box's middle angle, and its greatest error.
 
-        The arm's end goes no further than its length times the turn.
+        Over half the box's range of angles the arm's end moves by its length times that at most.
         """
         platform, angular = self.platform, self.platform.angular
         middle, half = 0.5 * (low + high)[:, angular], 0.5 * (high - low)[:, -1:]
@@ -70,9 +71,9 @@ class TurnedTool:
 
 
 def proofs_of(case: Case, one: Rating) -> tuple[list[Proof], Manipulator]:
-    """Return proofs of the workspace, and the machine, its guides and rams longer if need be."""
+    """Return proofs of the workspace, and the machine, its guides and rams lengthened if needed."""
     robot, floors = one.robot, case.job.floors
-    assert robot is not None  # it keeps all that is asked
+    assert robot is not None  # a design that keeps all requirements has one
     found: list[Proof] = []
     for _ in range(4):
         found = [
@@ -94,9 +95,9 @@ def proofs_of(case: Case, one: Rating) -> tuple[list[Proof], Manipulator]:
 
 
 def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
-    """Return the workspace as regions: each pose of a list, else a body at each orientation.
+    """Return the workspace as regions: each pose of a list, else a box or cylinder an orientation.
 
-    A range of turns without tilts is part of a box.
+    A range of turns without tilts is a coordinate of one box.
     """
     space, count = case.job.workspace, len(robot.platform.lengths)
     if space.poses is not None:
@@ -115,9 +116,9 @@ def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
 
 
 def _turning(case: Case, robot: Manipulator, middle: Array) -> Region:
-    """Return the box of a workspace with its range of turns."""
+    """Return the box of positions and turns of a workspace with a range of turns."""
     platform, count = robot.platform, len(robot.platform.lengths)
-    assert case.job.workspace.turn is not None  # who asks has some
+    assert case.job.workspace.turn is not None  # the caller has checked it
     rest = np.zeros((1, robot.freedom))
     level = tool_motion(platform, middle[None], rest, rest)[0][0]
     low, high = level.copy(), level.copy()
@@ -146,7 +147,7 @@ def told(case: Case, proofs: Sequence[Proof]) -> str:
 
 
 def is_clear(case: Case, robot: Manipulator, middle: Array) -> bool:
-    """Say whether it is proved that no two bodies come nearer than is asked."""
+    """Say whether it is proved that no two bodies come nearer than the least clearance."""
     radii, least = robot.radii or Radii(), case.job.floors.clearance / 2.0
     parts = (radii.guide, radii.upper, radii.lower, radii.platform)
     asked = interference(robot, Radii(*(part + least for part in parts)))

@@ -12,10 +12,10 @@ from pteron.design.choosing.rating import Case, Rating
 from pteron.kernels import Array, alike
 
 _POPULATION = 3
-"""Designs that evolve, for each number of one."""
+"""Size of the population, for each number that a design has."""
 
 _SPREAD = 6
-"""Designs that are drawn at first, for each that evolves."""
+"""Random designs at the start, for each member of the population."""
 
 _REFINED = 0.25
 """Share of the evaluations for Nelder and Mead's method."""
@@ -27,11 +27,12 @@ _WEIGHT, _CROSSING = (0.4, 0.9), 0.8
 def search_kind(
     case: Case, evaluations: int, seed: int, progress: Callable[[float], None] | None = None
 ) -> list[Rating]:
-    """Return all designs that were rated, for every objective a share of them.
+    """Return all designs that the search rated; each objective gets an equal share of them.
 
-    Differential evolution (Storn and Price, Journal of Global Optimization 11, 1997) towards the
-    best, from the best of designs that are drawn evenly; then every stock of the links is tried,
-    and Nelder and Mead's method improves the other numbers.
+    For each objective a Latin hypercube of designs gives the first population of differential
+    evolution (Storn and Price, Journal of Global Optimization 11, 1997); then every stock of the
+    links is tried, and Nelder and Mead's method improves the other numbers. `progress` is called
+    with the share of the evaluations that is done.
     """
     found: list[Rating] = []
     low, high = case.kind.ranges
@@ -62,14 +63,17 @@ def _evolved(
     objective: str,
     ranges: tuple[Array, Array],
 ) -> None:
-    """Rate designs until few of so many are left: what is known already counts."""
+    """Rate designs by differential evolution, until `_REFINED` of those up to `end` are left.
+
+    The population begins with the best designs rated so far, whatever they were rated for.
+    """
     size = len(ranges[0])
     count = _POPULATION * size
     first = min(_SPREAD * count, (end - len(found)) // 2)
     strata = rng.permuted(np.tile(np.arange(max(first, 1)), (size, 1)), axis=1).T
     for units in (strata + rng.random(strata.shape)) / max(first, 1):
         rated(units)
-    # The best so far, of all objectives.
+    # The best so far, whichever objective they were sought for.
     known = sorted(found, key=lambda one: one.cost(objective))[:count]
     low, high = ranges
     units = np.array([(one.values - low) / (high - low) for one in known])
@@ -97,7 +101,10 @@ def _refined(
     objective: str,
     counts: Array,
 ) -> None:
-    """Improve a design until so many are found; `counts` are those of what is chosen, or 0."""
+    """Improve a design from `start` until `end` designs are rated.
+
+    `counts` are the numbers of choices of each of its values, 0 for one that varies freely.
+    """
 
     def cost(units: Array) -> float:
         return rated(units).cost(objective)
@@ -134,7 +141,7 @@ def _refined(
 
 
 def front(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
-    """Return the designs that keep all that is asked and that no other betters in everything."""
+    """Return the Pareto front: designs that keep all requirements and that no other dominates."""
     good = [one for one in ratings if not one.misses]
     costs = np.array([[one.figures[name] for name in objectives] for one in good])
     _, first = np.unique(costs, axis=0, return_index=True)

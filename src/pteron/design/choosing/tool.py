@@ -1,4 +1,7 @@
-"""Errors of the tool and how it gives way, in parts that hold for whatever drives are chosen."""
+"""Position error and compliance of the tool, as the parts of drives and of all else.
+
+The parts are computed once for a machine; from them follow error and compliance with any drives.
+"""
 
 from __future__ import annotations
 
@@ -23,24 +26,27 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.dimensions import Stock
 
 MATERIALS = {"steel": STEEL, "aluminium": ALUMINIUM, "carbon": Material(120e9, 5e9)}
-"""Moduli of stock, for stiffness; carbon is fibre in resin, most of it along the tube."""
+"""Moduli of the stock's materials; carbon is fibre in resin, mostly along the tube."""
 
 _SOFT, _HARD = 1e4, 1e7
-"""Stiffnesses of drives, N/m or N m/rad, between whose compliances others lie."""
+"""Two stiffnesses of drives, N/m or N m/rad, from which the line of compliances is found."""
 
 
 def tolerances(asked: AccuracyTable, joints: float | Sequence[float]) -> Tolerances:
-    """Return the tolerances that are asked for, with these errors of the joints."""
+    """Return the tolerances of the job's file, with given errors of the joints, m or rad."""
     return Tolerances(joints, 0.0, asked.point, asked.length, asked.angle)
 
 
 def joint_errors(asked: AccuracyTable, ratios: Array, backlash: Array) -> Array:
-    """Return errors of joints, m or rad: half a count of the encoder, and half the backlash."""
+    """Return errors of joints, m or rad: half a count of the encoder plus half the backlash.
+
+    `ratios` are motor radians per joint unit, `backlash` is at the joint, m or rad.
+    """
     return np.asarray(np.pi / asked.counts_per_turn / ratios + 0.5 * asked.backlash * backlash)
 
 
 def unit_errors(asked: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
-    """Return the tool's error at poses (N,) by a joint error of 1, and by all else, m."""
+    """Return the tool's errors at poses, (N,) each, m: by joint errors of 1, and by all else."""
     joints = greatest_errors(asked, robot, poses, Tolerances(joints=1.0))
     if not asked.of_parts:
         return joints, np.zeros_like(joints)
@@ -50,7 +56,10 @@ def unit_errors(asked: AccuracyTable, robot: Manipulator, poses: Array) -> tuple
 def greatest_errors(
     asked: AccuracyTable, robot: Manipulator, poses: Array, given: Tolerances
 ) -> Array:
-    """Return the tool's error at poses (N,), m, as it is to be counted."""
+    """Return the tool's error at poses, (N,), m: the worst case or the standard deviation.
+
+    `asked.counted` says which of both.
+    """
     if asked.counted == "worst":
         return worst_position_errors(robot, poses, given)
     return np.asarray(pose_error(robot, poses, given).position)
@@ -59,14 +68,17 @@ def greatest_errors(
 def errors_with(
     asked: AccuracyTable, units: tuple[Array, Array], ratios: Array, backlash: Array
 ) -> Array:
-    """Return the greatest error of the tool (O,) with each of several drives, m."""
+    """Return the greatest error of the tool with each of O choices of drives, (O,), m.
+
+    `units` are those of `unit_errors`.
+    """
     joint = joint_errors(asked, ratios, backlash)[:, None] * units[0]
     whole = joint + units[1] if asked.counted == "worst" else np.hypot(joint, units[1])
     return np.asarray(whole.max(axis=1))
 
 
 def link_sections(robot: Manipulator, stocks: Mapping[str, str]) -> dict[str, Section]:
-    """Return the sections of upper and lower links that are cut from stock."""
+    """Return the sections of links made of stock; `stocks` has its name for "upper", "lower"."""
     found = {}
     for key, name in stocks.items():
         stock = Stock.of(name)
@@ -87,7 +99,11 @@ def elasticity(sections: Mapping[str, Section], actuators: float | Sequence[floa
 def compliances(
     robot: Manipulator, poses: Array, sections: Mapping[str, Section]
 ) -> tuple[Array, Array]:
-    """Return the worst compliance at poses (N,): with rigid drives, and by that of the drives."""
+    """Return the greatest compliance at poses in parts, (N,) each.
+
+    The first, m/N, is that with rigid drives; the second is the slope by the compliance of the
+    drives.
+    """
     soft, hard = (
         np.asarray(1.0 / stiffness(robot, poses, elasticity(sections, k)).least)
         for k in (_SOFT, _HARD)
@@ -97,5 +113,5 @@ def compliances(
 
 
 def compliance_with(given: tuple[Array, Array], actuators: Array) -> Array:
-    """Return the greatest compliance (O,) with each of several drives' stiffnesses, m/N."""
+    """Return the greatest compliance with each of O stiffnesses of the drives, (O,), m/N."""
     return np.asarray((given[0] + given[1] / actuators[:, None]).max(axis=1))

@@ -15,10 +15,10 @@ from pteron.kernels import Array
 from pteron.kinematics.limits import limited_joints
 
 _DIGITS = 15
-"""Decimals that are written, of m, rad or components of a unit vector: others are rounding."""
+"""Decimals of lengths in m, angles in rad and components of unit vectors; more are rounding."""
 
 COLORS = ("0.13 0.47 0.71 1", "0.84 0.37 0.05 1", "0.17 0.55 0.24 1", "0.55 0.35 0.64 1")
-"""Colours of the legs, in turn: red, green, blue and opacity."""
+"""Colours of the legs, used in turn: red, green, blue and opacity."""
 
 PLATFORM_COLOR = "0.78 0.66 0.21 1"
 """Colour of the platform."""
@@ -28,7 +28,7 @@ BASE_COLOR = "0.45 0.46 0.48 1"
 
 
 def number(value: float) -> str:
-    """Return a coordinate in the shortest form that reads back as the same, to 1e-15."""
+    """Return a coordinate, rounded to 1e-15, in the shortest form that reads back unchanged."""
     return repr(round(float(value), _DIGITS) + 0.0).removesuffix(".0")
 
 
@@ -43,7 +43,7 @@ def row(values: Sequence[float] | Array) -> str:
 
 
 def look(values: Sequence[float] | Array | float) -> str:
-    """Return numbers of a shape, to six decimals."""
+    """Return the sizes or colours of a drawn shape as text, to six decimals."""
     return " ".join(f"{round(float(value), 6) + 0.0:g}" for value in np.ravel(values))
 
 
@@ -80,7 +80,10 @@ def material(body: TreeBody) -> str:
 
 
 def left_out(opened: Tree, kept: Sequence[str]) -> list[str]:
-    """Return a note on numbers of drives and passive joints that a file lacks; `kept` it has."""
+    """Return a note on numbers of drives and passive joints that a file leaves out.
+
+    `kept` are the keys of a drive that the file has.
+    """
     found = [
         told
         for key, told in TEXTS["left_out"].items()
@@ -93,7 +96,7 @@ def left_out(opened: Tree, kept: Sequence[str]) -> list[str]:
 
 
 def head(opened: Tree, language: str) -> list[str]:
-    """Return the first lines of every file: its machine, and what was completed."""
+    """Return the first lines of every file: its machine, and the numbers that are made up."""
     robot = opened.robot
     name = re.sub(r"[^\w ,.+-]|--+", "?", " ".join(robot.name.split()))
     pairs = zip(robot.coordinates, opened.home, strict=True)
@@ -129,4 +132,4 @@ FORMATS: dict[str, Any] = {
     "platform_color": PLATFORM_COLOR,
     "base_color": BASE_COLOR,
 }
-"""Names that every template of an engine's file knows."""
+"""Names that every template of an engine's file can use."""

@@ -1,7 +1,7 @@
 """Export to Pinocchio: the opened mechanism as a model, and the constraints that close its loops.
 
-Joints that are coupled to others are no part of Pinocchio's constrained dynamics. What a gear turns
-with the platform is therefore in the platform's inertia: the square of its ratio times its own.
+Pinocchio's constrained dynamics has no coupled joints. The inertia of a body that a gear turns with
+the platform is therefore added to the platform's, times the square of the gear's ratio.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from pteron.shapes import PoseLike
 def export_pinocchio(
     robot: RobotLike, folder: str | Path = ".", *, home: PoseLike | None = None
 ) -> list[Path]:
-    """Write a Python file whose `build()` returns a Pinocchio model with its loops' constraints.
+    """Write a Python file whose `build()` returns a Pinocchio model with its loop constraints.
 
-    The file needs Pinocchio and NumPy only. What `build` returns has the model, its constraints and
-    their data, the matrix of the motors, and the coordinates at the home pose. Joints have the
+    The file needs Pinocchio and NumPy only. `build` returns the model, its constraints and their
+    data, the matrix of the motors, and the coordinates at the home pose. Joints have the
     names and coordinates of the machine's logs; a point of each leg is held to the platform in
     three directions.
 
@@ -107,7 +107,7 @@ def pinocchio_model(robot: RobotLike, *, home: PoseLike | None = None) -> Any:
             f"{install_command('oracles')}, or pip install pin"
         ) from None
     source = pinocchio_source(tree(robot, home))
-    # What is returned in this process is what the written file returns: one code for both.
+    # The text of the exported file is run, so that both return the same.
     module: dict[str, Any] = {"__name__": f"{identifier(robot)}_pinocchio"}
     exec(compile(source, f"<{robot.name} for Pinocchio>", "exec"), module)
     return module["build"]()
@@ -149,7 +149,7 @@ def pinocchio_source(opened: Tree) -> str:
 
 
 def _without_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
-    """Return the bodies with what gears turn in the inertia of what carries them."""
+    """Return the bodies without geared ones, whose inertia is added to that of their parents."""
     kept = []
     for k, body in enumerate(bodies):
         if body.joints[0].follows is not None:
@@ -164,9 +164,9 @@ def _without_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
 
 
 def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
-    """Return a body that turns with a gear's part, balanced at its origin, turning `ratio` faster.
+    """Return a body joined with a balanced one at its origin that turns `ratio` times faster.
 
-    Its moment about z, which alone acts, is exact.
+    Only the moment about z acts, and it is exact.
     """
     mass = body.mass + gear.mass
     center = (body.mass * body.center + gear.mass * gear.center) / mass

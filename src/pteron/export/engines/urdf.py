@@ -1,4 +1,4 @@
-"""Export to URDF: the opened mechanism, and a YAML file beside it that says how its loops close."""
+"""Export to URDF: the opened mechanism, and a YAML file with the closures of its loops."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 _MOST = 1e6
-"""Stand-in for no limit of effort (N, N m) or velocity, which URDF requires."""
+"""Limit of effort (N, N m) or velocity where there is none: URDF requires one."""
 
 _FAR = 1e3
-"""Stand-in for no limit of a joint that slides, m."""
+"""Limit, m, of a joint that slides where there is none: URDF requires one."""
 
 
 def export_urdf(
     robot: RobotLike, folder: str | Path = ".", *, home: PoseLike | None = None
 ) -> list[Path]:
-    """Write the opened machine as URDF, and a closure file, YAML, that says how its loops close.
+    """Write the opened machine as URDF, and a YAML file with the closures of its loops.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def urdf(opened: Tree) -> str:
 
 
 def closure_yaml(opened: Tree) -> str:
-    """Return the closure file: which points of the URDF's links are one."""
+    """Return the text of the closure file: pairs of points of the URDF's links that coincide."""
     return rendered(
         "pteron.export",
         "closure.yaml.j2",
@@ -110,7 +110,7 @@ def closure_yaml(opened: Tree) -> str:
 
 
 def _real(value: float) -> str:
-    """Return a number that YAML takes for one: with a point, also before an exponent."""
+    """Return a number as text that YAML reads as a float: with a point, before an exponent too."""
     text = number(value)
     head_, mark, tail = text.partition("e")
     return text if "." in head_ else f"{head_}.0{mark}{tail}"

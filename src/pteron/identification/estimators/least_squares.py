@@ -12,17 +12,17 @@ from pteron.identification.signals.filters import MEDIAN_SIZE
 from pteron.kernels import Array
 
 _SETTLED_NOISE = 1e-3
-"""Relative change of the noise that no longer matters: weights hardly touch the values."""
+"""Relative change of the noise at which iterations end: values hardly depend on the weights."""
 
 _SETTLED_VALUES = 1e-6
-"""Change of Huber's values, in what it does to the forces relative to their noise, likewise."""
+"""Change of Huber's values at which iterations end: that of their forces over the noise."""
 
 _NOISELESS = 1e-10
-"""Residuals, relative to the forces, below which weights would be made of rounding."""
+"""Residuals, relative to the forces, that count as rounding and get no weights from it."""
 
 
 def ordinary(observations: Observations) -> Estimate:
-    """Return the values of ordinary least squares: all actuators count alike.
+    """Return the values of ordinary least squares: all actuators have equal weights.
 
     Parameters
     ----------
@@ -42,19 +42,19 @@ def ordinary(observations: Observations) -> Estimate:
 def weighted(
     observations: Observations, *, iterations: int = 20, triangles: Observations | None = None
 ) -> Estimate:
-    """Return the values of weighted least squares, iterated: an actuator counts by its noise.
+    """Return the values of weighted least squares, iterated: weights are 1 / variance an actuator.
 
-    This is the default: actuators differ in their noise, and equal weights would let the worst
-    spoil the rest.
+    This is the default: actuators differ in their noise, and with equal weights the noisiest would
+    spoil the values.
 
     Parameters
     ----------
     observations : Observations
         From `observations_of`.
     iterations : int
-        How many times the noise is estimated anew at most.
+        Greatest number of times that the noise is estimated again.
     triangles : Observations, optional
-        Their `actuator_factors`, where these are known.
+        The `actuator_factors` of the observations, where they are known.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def huber(
     threshold : float
         In standard deviations; 1.345 costs 5 % of efficiency where there are no outliers.
     iterations : int
-        How many times rows are weighted anew at most.
+        Greatest number of times that the rows are weighted again.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def huber(
     for _ in search.steps(iterations):
         rest = residuals_of(observations, values)
         scale = median_noise(observations, rest)
-        # An actuator without equations has a scale all the same.
+        # An actuator without equations needs a scale too: any positive one.
         scale = np.where(scale > 0.0, scale, actuator_noise(observations, values))
         reduction = np.minimum(1.0, threshold / np.maximum(np.abs(rest) / scale, 1e-300))
         factor = qr_factor(observations, np.sqrt(reduction) / scale)
@@ -114,7 +114,7 @@ def huber(
     standard = residuals_of(observations, values) / scale
     pull = np.clip(standard, -threshold, threshold)
     # Huber (1981), section 7.6: variance of the pull over the square of its mean slope, with the
-    # correction for the values that few equations have been spent on.
+    # correction for a small number of equations for each value.
     used = observations.gain > 0.0
     slope = float((np.abs(standard)[used] < threshold).mean())
     spent = 1.0 + len(values) / observations.rows * (1.0 - slope) / slope
@@ -123,7 +123,7 @@ def huber(
 
 
 def actuator_noise(observations: Observations, values: Array) -> Array:
-    """Return the standard deviation (n,) of what values fitted to observations leave, N."""
+    """Return the standard deviation (n,) of the residuals of fitted values, N or N m."""
     rest = residuals_of(observations, values)
     spent = len(values) / observations.rows
     used = np.maximum(observations.used, 1)

@@ -19,7 +19,7 @@ from pteron.motion import Motion
 from pteron.motion.trajectories.fourier import fourier_curve
 
 Space = Literal["platform", "joints"]
-"""Whose coordinates the series are of: the platform's pose, or the joints'."""
+"""The coordinates of a series: those of the platform's pose, or of the joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,18 +39,18 @@ class FourierMotion:
     period : float
         The time after which the motion repeats, s.
     center : array, shape (n,)
-        The coordinates that the motion goes about, m and, for a platform that turns, rad.
+        The mean coordinates, m or rad.
     cosines, sines : array, shape (H, n)
         The coefficients a_h and b_h of the harmonics h = 1 ... H, in the units of `center`.
     mode : int
-        The assembly mode that the joints' motion is of, a column of direct kinematics in closed
-        form, counted from 0; that of the home pose unless given.
+        The assembly mode of a motion of the joints: the number, from 0, of its solution of direct
+        kinematics in closed form; by default that of the home pose.
 
     Raises
     ------
     DataError
-        If the period is not above 0, the shapes do not fit, or the joints' motion does not tell the
-        platform's.
+        If the period is not above 0, the shapes do not fit, or joints are given for a machine whose
+        direct kinematics have no closed form.
 
     Examples
     --------
@@ -118,7 +118,7 @@ class FourierMotion:
         Raises
         ------
         UnreachablePose
-            If a motion of the joints leaves what the machine can do.
+            If no pose has the joint coordinates of a motion of the joints.
         """
         times = _times(time)
         found = self.states(times)
@@ -147,8 +147,9 @@ class FourierMotion:
     def states(self, phase: Array, rate: ArrayLike = 1.0, gain: ArrayLike = 0.0) -> FullMotion:
         """Return the motion of platform and joints at phases (T,), s.
 
-        The phase itself may go on at another rate than 1 s a second, (T,), and gain speed, (T,) in
-        1/s: q' = dq/dphase rate, and q'' = d2q/dphase2 rate^2 + dq/dphase gain.
+        `rate` (T,) is the derivative of the phase by time, 1 if the motion goes at its own speed,
+        `gain` (T,), 1/s, the second derivative: q' = dq/dphase rate, and
+        q'' = d2q/dphase2 rate^2 + dq/dphase gain.
         """
         robot = self.robot
         q, first, second = fourier_curve(self.coefficients, self.period, phase)
@@ -165,7 +166,7 @@ class FourierMotion:
         return FullMotion(pose, velocity, acceleration, q, dq, ddq)
 
     def uniform_times(self, count: int) -> Array:
-        """Return so many times (count,) evenly over one period, without its end."""
+        """Return `count` times, s, evenly over one period, without its end."""
         return np.asarray(np.arange(count) * (self.period / count), dtype=np.float64)
 
 

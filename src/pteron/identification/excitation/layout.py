@@ -1,4 +1,4 @@
-"""Layout of the file by which a controller gets a motion: columns, units, dialect of CSV."""
+"""Layout of the file of a motion for a controller: columns, units, dialect of CSV."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PER_UNIT: dict[str, float] = {**PER_SECOND, "mm": 1e3, "um": 1e6, "deg": 180.0 
 """Units by name, each with the number that makes one SI unit."""
 
 _MOST_SAMPLES = 10_000_000
-"""Most samples of a file; more are refused."""
+"""Greatest number of samples of a file."""
 
 _ROUNDING = 1e-6
 """Share of a sample that counts as rounding."""
@@ -45,13 +45,14 @@ class Layout:
     joint_columns : sequence of n str, optional
         Names of the joint coordinates' columns, in the order of the legs.
     length_unit : {"m", "mm", "um"}
-        Of sliders and poses. Rates and accelerations are in that unit a second, forces in N (N m).
+        Unit of sliders and poses. Rates and accelerations are in that unit a second, forces in N or
+        N m.
     angle_unit : {"rad", "deg"}
-        Of cranks and the pose's angles.
+        Unit of cranks and the pose's angles.
     time_unit : {"s", "ms", "us"}
-        Of the column t.
+        Unit of the column t.
     separator : str, optional
-        Of a CSV file's cells: ``,`` unless given, and ``;`` with a decimal comma.
+        Separator of a CSV file's cells: by default ``,``, or ``;`` with a decimal comma.
     decimal : {".", ","}
         The decimal sign.
 
@@ -76,18 +77,18 @@ class Layout:
         expect_one_of(get_args(TimeUnit), time_unit=self.time_unit)
         if self.joint_columns is not None:
             object.__setattr__(self, "joint_columns", tuple(self.joint_columns))
-        _ = self.dialect  # which refuses signs that cannot be
+        _ = self.dialect  # it refuses signs that are not possible together
 
     @property
     def dialect(self) -> Dialect | None:
-        """Dialect of CSV; None as usual, so that a log's own dialect can be found."""
+        """Dialect of CSV; None for the default, so that a log's own dialect is found."""
         if self.separator is None and self.decimal == ".":
             return None
         separator = self.separator or (";" if self.decimal == "," else ",")
         return Dialect(cast(Any, separator), cast(Any, self.decimal))
 
     def description(self, robot: Manipulator) -> Description:
-        """Return what a log in this layout is described by.
+        """Return the description of a log in this layout.
 
         Raises
         ------
@@ -115,7 +116,7 @@ class Layout:
         return found
 
     def frame(self, movement: Movement, rate: float) -> pl.DataFrame:
-        """Return a movement from its beginning to its end, at so many samples a second.
+        """Return a movement from beginning to end as a data frame, `rate` samples a second.
 
         Raises
         ------
@@ -139,7 +140,7 @@ class Layout:
         return pl.DataFrame(columns)
 
     def _columns(self, robot: Manipulator) -> list[tuple[str, str]]:
-        """Return the columns behind t, and what they are in, in SI units."""
+        """Return the names of the columns after t, with their SI units."""
         names = self.joint_columns or robot.joint_names
         joints = [(name, leg.joint.unit) for name, leg in zip(names, robot.legs, strict=True)]
         pose: list[tuple[str, str]] = list(zip(robot.coordinates, robot.units, strict=True))
@@ -159,7 +160,7 @@ class Layout:
 
 
 def check_sampling(period: float, rate: float, periods: int) -> None:
-    """Refuse, before any work, a period and samples a second that give no table."""
+    """Refuse, before any work, a period and a rate, samples a second, that give no table."""
     expect(0.0 < period < np.inf, "period", f"{period} s", "a number above 0")
     expect(0.0 < rate < np.inf, "rate", rate, "samples a second above 0")
     expect(periods >= 1, "periods", periods, "1 or more")

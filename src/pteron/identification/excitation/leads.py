@@ -1,11 +1,12 @@
-"""Lead-in and lead-out: an exciting motion starts from rest, and comes to rest, on its own path.
+"""Lead-in and lead-out of a periodic motion: from rest and to rest, on its own path.
 
 The machine goes along the closed curve of the periodic motion from the first sample to the last;
 only its speed along the curve changes. Its poses are thus those of the periodic motion, and with
-them all limits of the geometry are kept. The phase s starts smoothly, s' = 0 ... 1 over some
-periods: then q' = p' s' and q'' = p'' s'^2 + p' s'', of which the last part is small if the lead is
-long. Forces of rigid bodies are those at rest times 1 - s'^2, those of the motion times s'^2, and
-what s'' adds: since the motion keeps its limits at rest too, long enough leads keep them as well.
+them all limits of the geometry are kept. The rate s' of the phase grows smoothly from 0 to 1 over
+some periods. With p(s) the periodic motion, q' = p' s' and q'' = p'' s'^2 + p' s'', whose last term
+is small if the lead is long. Forces of rigid bodies are the sum of those at rest times 1 - s'^2,
+those of the motion times s'^2, and a part by s''. Both rest and motion keep the limits, and so does
+a lead that is long enough.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import quintic
 
 _LENGTHS = (1, 2, 4, 8)
-"""Periods that a lead takes, tried in turn: a whole number ends where it began. One has sufficed
-for every machine of the catalog."""
+"""Lengths of a lead in periods, tried in turn: after a whole number it ends where it began. One is
+enough for every machine of the catalog."""
 
 _PHASES = 48
 """Phases that are tried for the end of the lead-in."""
@@ -45,7 +46,7 @@ _CLEAR = 1e-4
 that."""
 
 _TRIED = 4
-"""Phases of a length that are checked, the best ones."""
+"""Number of phases, the best ones of each length, that are checked."""
 
 
 class Lead(NamedTuple):
@@ -54,9 +55,9 @@ class Lead(NamedTuple):
     Attributes
     ----------
     duration : float
-        Of the lead-in and of the lead-out, s; half of it passes in phase.
+        Duration of the lead-in, and of the lead-out, s; the phase advances by half of it.
     phase : float
-        Of the periodic motion where the lead-in ends, s.
+        Phase of the periodic motion at the end of the lead-in, s.
     """
 
     duration: float
@@ -65,19 +66,19 @@ class Lead(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LedMotion:
-    """Rest, lead-in, some periods, lead-out, rest: what a machine can be told to do.
+    """Rest, lead-in, some periods, lead-out, rest: a motion that a controller can run.
 
-    Where the lead takes whole periods, as those of `found_lead` do, it rests in the end in the pose
-    in which it began. Position, velocity, acceleration and jerk are continuous.
+    If the lead takes whole periods, as from `found_lead`, the motion ends in the pose in which it
+    began. Position, velocity, acceleration and jerk are continuous.
 
     Attributes
     ----------
     motion : FourierMotion
         The periodic motion.
     lead : Lead
-        How it sets off and comes to rest.
+        The lead-in and, reversed, the lead-out.
     periods : int
-        How many whole periods lie between lead-in and lead-out.
+        Number of whole periods between lead-in and lead-out.
 
     Examples
     --------
@@ -104,12 +105,12 @@ class LedMotion:
 
     @property
     def start(self) -> float:
-        """When the periodic part begins, s."""
+        """Time at which the periodic part begins, s."""
         return self.lead.duration
 
     @property
     def end(self) -> float:
-        """When it ends, s."""
+        """Time at which the periodic part ends, s."""
         return self.start + self.periods * self.motion.period
 
     @property
@@ -134,9 +135,9 @@ class LedMotion:
         return self.motion.states(phase, rate_in * rate_out, gain_in - gain_out)
 
     def margins(self, limits: Limits, rate: float = 1000.0) -> Margins:
-        """Return its margins, at ten times as many samples a second.
+        """Return its margins to limits, evaluated at ten times `rate` samples a second.
 
-        One of its periods is looked at, as they are all alike.
+        One of its periods is evaluated, as all are alike.
         """
         once = LedMotion(self.motion, self.lead)
         return margins(once, limits, max(round(10.0 * rate * once.duration), 4000))
@@ -145,13 +146,13 @@ class LedMotion:
 def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
     """Return the shortest lead with which a motion keeps its limits from rest to rest.
 
-    It takes as few periods as may be; where in the period it ends is chosen for the largest margin
-    of speed, acceleration and force.
+    It takes as few periods as possible; the phase of its end is chosen for the largest margin of
+    speed, acceleration and force.
 
     Raises
     ------
     ModelError
-        If there is none, as of a motion that does not keep the limits itself.
+        If there is none, such as for a motion that does not keep the limits itself.
     """
     fine, coarse = (count * motion.harmonics for count in (_FINE, _COARSE))
     phases = [float(phase) for phase in motion.uniform_times(_PHASES)]
@@ -169,13 +170,13 @@ def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
 
 
 def _room(led: LedMotion, limits: Limits, samples: int) -> float:
-    """Return the least relative margin of a movement to what depends on how fast it goes."""
+    """Return the least relative margin to limits of speed, acceleration and force."""
     found = relative_margins(led, limits, np.linspace(0.0, led.duration, samples))
     return min(float(found[name].min()) for name in PER_JOINT if name in found)
 
 
 def _set_off(times: Array, span: float) -> tuple[Array, Array, Array]:
-    """Return how far the phase is from where the lead ends, s, its rate and its gain, (T,) each."""
+    """Return the phase less that at the lead's end, s, its rate and its gain, 1/s, (T,) each."""
     u = np.clip(times / span, 0.0, 1.0)
     rate, gain, _ = quintic(u, 0.0, 1.0)
     return span * (u**4 * (2.5 - 3.0 * u + u**2) - 0.5), rate, gain / span

@@ -29,7 +29,7 @@ from pteron.manipulator import Manipulator
 from pteron.workspace.margins import joint_distances
 
 _REFINED = 33
-"""Samples between the neighbours of the tightest sample, for its exact place."""
+"""Samples between the neighbours of the tightest sample, by which its time is refined."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class Margin:
     limit : str
         The name of the limit, a field of `Limits`.
     least : float
-        The part of it that is left at the tightest instant, in `unit`; below 0 it is violated.
+        Distance to the limit at the tightest instant, in `unit`; below 0 it is violated.
     leg : int or None
-        The leg it happens to, counted from 1; None for the platform's orientation.
+        The leg with this margin, counted from 1; None for the platform's orientation.
     time : float
-        When, s.
+        The tightest instant, s.
     unit : str
         The unit of `least`.
     """
@@ -66,7 +66,7 @@ class Margins:
     each : tuple of Margin
         One for each limit.
     samples : int
-        Instants of the motion that were looked at; near the tightest ones, many more.
+        Instants of the motion at which limits are evaluated; more near the tightest ones.
     """
 
     each: tuple[Margin, ...]
@@ -92,9 +92,9 @@ def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
     motion : FourierMotion or another movement
         The motion; a `FourierMotion`, a `LedMotion` or a `RepeatedCycle`.
     limits : Limits
-        What it is to keep.
+        The limits.
     samples : int
-        Instants, evenly over the motion, at which every limit is looked at.
+        Instants, evenly over the motion, at which every limit is evaluated.
 
     Examples
     --------
@@ -128,7 +128,7 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
     relative = {}
     for name, values in found.items():
         size = np.broadcast_to(sizes.get(name, 1.0), values.shape[1:])
-        # Of no limit all is left.
+        # A limit that is infinite has its whole margin.
         relative[name] = np.divide(
             values, size, out=np.full(values.shape, np.inf), where=np.isfinite(size)
         )
@@ -136,7 +136,7 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
 
 
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
-    """Refuse limits that the machine at rest in its home pose does not keep, naming the limit."""
+    """Refuse limits that the machine violates at rest in its home pose; the message names one."""
     zero = np.zeros((1, len(home)))
     rest = FullMotion.of_platform(robot, home[None], zero, zero)
     for name, values in _margins_of(robot, limits, rest).items():
@@ -165,7 +165,7 @@ def _limits_passive(robot: Manipulator) -> bool:
 
 
 def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[str, Array]:
-    """Return every limit's margins (T, n) or (T, 1), -inf where the machine cannot be."""
+    """Return every limit's margins (T, n) or (T, 1), -inf at poses out of reach."""
     found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
     if closure_of(robot).vanishes() is None or robot.platform.angles:
         type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]

@@ -34,21 +34,21 @@ from pteron.kernels import Array
 from pteron.renamed import former_attribute
 
 _ROWS, _MORE = 20_000, 100_000
-"""Rows of all logs that are searched, those in which the joints move most; and how many where these
-show too little motion."""
+"""Number of rows of all logs that are searched, those in which the joints move most; and the number
+where these have too little motion."""
 
 _EXACT = 1e-7
 """Residuals, over the forces, below which they are rounding and show no faults."""
 
 _POINTS = 5
-"""States in a period of the highest frequency at which columns that take long are computed; between
-them they are interpolated."""
+"""States in a period of the highest frequency at which slow columns are computed; between them they
+are interpolated."""
 
 _MOTION = 0.3
 """Share of the band that the motion's own forces are in."""
 
 _ROUNDS = 6
-"""Times that a delay is taken out and looked for again, at most."""
+"""Greatest number of times that a delay is corrected and sought again."""
 
 _NAMED = 0.05
 """Percent of a cycle's forces from which a fault is named: statistics see smaller ones where a log
@@ -62,23 +62,23 @@ class FaultIsolation:
     Attributes
     ----------
     tried : tuple of str
-        The faults that were tried; none where the logs do not suffice for that.
+        The faults that were tried; none where the logs are too short for that.
     faults : tuple of IsolatedFault
-        Those that show, the clearest first, and change a reference cycle by 0.05 % or more.
+        The faults that show and change a reference cycle by 0.05 % or more, the clearest first.
     uncertain : array, shape (n,)
-        Error of a pick-and-place cycle's forces that the values' covariance leaves open, percent of
-        their standard deviation; NaN where no cycle fits into the machine's workspace.
+        Error of the forces in a pick-and-place cycle that the values' covariance allows, percent of
+        the forces' standard deviation; NaN where no cycle fits into the machine's workspace.
     spoiled : array, shape (n,)
-        Error that all faults together make in it, likewise.
+        Error that all faults together make in the same cycle, percent.
     why_not : str
-        Why nothing was tried, where that is so.
+        The reason why no fault was tried; empty where some were.
     hidden : tuple of {"gain", "clock", "scale", "play"}
-        Faults that these logs cannot tell by the rank of their equations: a factor that all forces
-        have, a clock at another rate, one force out of scale beside the others; and play, where no
-        drive's load changes direction often enough.
+        Faults that these logs cannot show: by the rank of their equations a common factor of all
+        forces, a clock at another rate, a wrong scale of one force; and play, where no drive's load
+        changes direction often enough.
     held : bool
-        Whether forces are seen to be half a sample early or late, as where they are held from
-        sample to sample: named or not, it moves values of a log without noise.
+        Whether forces are half a sample early or late, as where they are held from sample to
+        sample. In a log without noise this changes the values, even if too little to be named.
     """
 
     tried: tuple[str, ...]
@@ -103,7 +103,7 @@ class FaultIsolation:
 
     @property
     def understates(self) -> bool:
-        """Whether a fault shows for which the values' stated errors do not allow."""
+        """Whether a fault shows that the stated errors of the values do not include."""
         return any(one.understates for one in self.faults)
 
     def as_dict(self) -> dict[str, Any]:
@@ -119,7 +119,7 @@ class FaultIsolation:
 
 @dataclass(frozen=True)
 class _Part:
-    """A part of a recording that is looked at, its states, its model and its preprocessing."""
+    """A part of a recording that is searched, with its states, model and preprocessing."""
 
     model: FaultColumns
     log: Log
@@ -137,15 +137,15 @@ def isolate_faults(
     """Return the faults of logs and machine that a fit's residuals show.
 
     Each fault adds columns to the regressor (`families_of`). Those whose sizes the data tell from
-    zero are taken in one after the other, the clearest first. The errors that they make are worked
-    out on a pick-and-place cycle as fast as the logs' own motion.
+    zero join the fit one after the other, the clearest first. The errors that they make are
+    computed on a pick-and-place cycle as fast as the logs' motion.
 
     Parameters
     ----------
     model, estimate : Model, Estimate
         The fit.
     recordings : sequence of Recording
-        The fitted ones; 20 000 rows in all are looked at, with and without payload.
+        The fitted recordings; 20 000 rows in all are searched, with and without payload.
     preprocessing : sequence of Preprocessing
         Preprocessing of each.
     rotors : mapping of str to float, optional
@@ -178,7 +178,7 @@ def _isolated(
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
     plain, found = searched(columns, observations, () if exact else None)
     if any(one.family is DELAY for one in found):
-        # A long delay is no small one: the rest is told once forces are where they belong.
+        # Columns hold for small delays: other faults are sought after a long one is corrected.
         late, shifted = _delay(parts)
         rest = tuple(one for one in columns.families if one is not DELAY)
         fit, found = _searched_for(rest, shifted)
@@ -203,7 +203,7 @@ def _isolated(
             forces.append(with_fault)
         each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
         spoiled = cycle.share(forces[-1] - forces[0], forces[0])
-        # Unnamed, a fault is in the residuals, and with them in the covariance.
+        # A fault that is not named adds to the residuals, and so to the covariance.
         covariance = found[-1].fit.covariance[:p, :p] if found else estimate.covariance
         variance = np.einsum("rnp,pq,rnq->rn", matrix, covariance, matrix, optimize=True)
         uncertain = cycle.share(np.sqrt(np.maximum(variance, 0.0)), forces[0])
@@ -234,7 +234,7 @@ def _isolated(
     factor = factor_of_forces(model, fits[-1], known)
     if factor is not None:
         tried = (*tried, "gain")
-        # By a slow clock all inertia is too small, what is known as well.
+        # A slow clock makes all inertia too small, that of known rotors too.
         slow = [1.0 + float(one.sizes[0]) for one in faults if one.fault == "clock"]
         if factor.wrong and all(factor.times(s).wrong for s in slow):
             off = factor.value - 1.0
@@ -253,9 +253,9 @@ def _isolated(
 
 
 def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:
-    """Return that drives have play, and whether the load of any changes direction to tell.
+    """Return the play of drives, or None, and whether any load changes direction often enough.
 
-    It shows where residuals are large as loads change direction.
+    Play shows as large residuals where loads change direction.
     """
     records, band = [], max(part.how.band for part in parts)
     for part in parts:
@@ -273,7 +273,7 @@ def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedF
         return None, looked
     named = np.flatnonzero(~np.isnan(found.times)).tolist()
     labels = tuple(parts[0].model.model.robot.force_names[joint] for joint in named)
-    # Knocks come on a cycle as they do in the logs, as far as can be said.
+    # The knocks of a cycle are taken to be as strong as those of the logs.
     forces = np.concatenate([part.log.forces for part in parts])
     cycle = 100.0 * np.sqrt(found.power) / forces.std(axis=0)
     unknown = np.full(len(named), np.nan)
@@ -289,7 +289,7 @@ def delay_of(
     recordings: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
 ) -> float:
-    """Return the delay of recordings' forces that suits a fit best, s, beside that assumed."""
+    """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
     parts = _parts(model, estimate, recordings, preprocessing)
     _, shifted = _delay(parts)
     return shifted[0].how.delay - parts[0].how.delay
@@ -302,7 +302,7 @@ def _parts(
     preprocessing: Sequence[Preprocessing],
     most: int = _ROWS,
 ) -> list[_Part]:
-    """Return the parts of recordings that are looked at, `most` rows in all."""
+    """Return the parts of recordings that are searched, `most` rows in all."""
     rows = most // len(recordings)
     chosen = [
         (log, _unaveraged(model, log, how), part)
@@ -327,7 +327,10 @@ def _parts(
 
 
 def _moving_most(log: Log, rows: int) -> list[Log]:
-    """Return as many rows of a log, without and with payload, in which the joints move most."""
+    """Return the parts of a log, `rows` in all, in which the joints move most.
+
+    There is one part of each payload phase.
+    """
     if log.rows <= rows:
         return [log]
     steps = (np.diff(log.joints, axis=0) ** 2).sum(axis=1)
@@ -346,7 +349,7 @@ def _moving_most(log: Log, rows: int) -> list[Log]:
 
 
 def _unaveraged(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
-    """Return how a log is looked at: one period for all would not tell what comes and goes."""
+    """Return the preprocessing without averaging of periods, which would hide passing faults."""
     if how.derivatives != "periodic":
         return how
     wanted = Processing(derivatives="central")
@@ -361,13 +364,13 @@ def _observed(parts: Sequence[_Part]) -> Observations:
 def _searched_for(
     families: tuple[Family, ...], parts: Sequence[_Part]
 ) -> tuple[Estimate, list[FoundFault]]:
-    """Return the fit of parts without faults, and which of some faults they show."""
+    """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
     return searched(some[0].model, _observed(some))
 
 
 def _delay(parts: Sequence[_Part]) -> tuple[FoundFault | None, list[_Part]]:
-    """Return the whole delay of logs' forces, and the parts with it taken out."""
+    """Return the whole delay of the logs' forces, None if none shows, and the parts without it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
         _, found = _searched_for((DELAY,), shifted)

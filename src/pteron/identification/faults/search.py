@@ -1,4 +1,4 @@
-"""The search for faults that residuals show: columns of faults join the fit, the clearest first."""
+"""The search for faults that residuals show: their columns join the fit, the clearest first."""
 
 from __future__ import annotations
 
@@ -22,18 +22,17 @@ _CHANCE = 1e-6
 """Probability that a fault is named where there is none, for each fault."""
 
 _SEEN = 1e-3
-"""Part of a mixture of columns that the model's columns cannot make, as a share, from which it
-counts."""
+"""Least share of a combination of columns that is independent of the model's columns."""
 
 _AS_WELL = 0.7
-"""Share of the clearest fault's statistic with which one of fewer sizes is taken in its place. Of
-an exact one all must be explained but what noise makes."""
+"""Share of the clearest fault's statistic from which a fault of fewer sizes is preferred. Beside an
+exact one it must explain all but what noise makes."""
 
 _CLEAR = 3.0
-"""Standard deviations of a mixture's size from which it is more than noise."""
+"""Size of a combination, in standard deviations, from which it is more than noise."""
 
 _ENOUGH = 2
-"""Equations for each value, from which residuals tell of more values."""
+"""Least number of equations for each value."""
 
 _BESIDE = 0.1
 """Least statistic of a further fault, as a share of the first one's."""
@@ -42,40 +41,39 @@ _LENGTH = 0.01
 """Usual error of a length, over the legs' size: a larger one is more likely another fault."""
 
 _MOSTLY = 0.5
-"""Share of what lengths explain that errors of the usual size explain too, at least."""
+"""Least share of the effect of a fault of lengths that errors of the usual size explain too."""
 
 _TIMES = 3.0
-"""Greatest friction that falls with speed, over the dry friction that is left, for a fault to be
-that."""
+"""Greatest friction that falls with speed, over the remaining dry friction."""
 
 _MOST = 3
-"""Faults that are found at most."""
+"""Greatest number of faults that are found."""
 
 _NOISELESS = 1e-9
-"""Noise of a force, over that of the noisiest, that counts as at least."""
+"""Least noise of a force, over that of the noisiest one; a smaller one counts as this."""
 
 _INDEPENDENT = 1e-3
-"""Share of a column that the model's cannot make, from which it can be told from them."""
+"""Share of a column, independent of the model's columns, from which both can be told apart."""
 
 
 @dataclass(frozen=True)
 class FoundFault:
-    """A family that was taken in, the fit with it, and the families in before it.
+    """A family of fault columns that joined the fit, with that fit and the families before it.
 
     Parameters
     ----------
     family : Family
         The family.
     mix : array, shape (k, q)
-        The mixtures of its columns that are seen.
+        The q combinations of its k columns that the data show.
     sizes, deviations : array, shape (k,)
         Factors of its columns, and their standard deviations.
     statistic, chance : float
-        Wald's, and the probability that they seem so large by chance.
+        Wald's statistic, and the probability of sizes as large as these without the fault.
     fit : Estimate
-        The fit.
+        The fit with the family.
     likely : float
-        Share of what they explain that errors of a usual size explain too.
+        Share of the fault's effect that errors of a usual size explain too.
     others : tuple of (Family, array)
         The families before it, and their sizes in this fit.
     """
@@ -96,13 +94,13 @@ def searched(
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of the model without faults, and the faults that its observations show.
 
-    Only `families` are looked for, by default all of them.
+    Only `families` are tried, by default all of them.
     """
     p = len(model.model.names)
     found: list[FoundFault] = []
     first = 0.0
     wanted = model.families if families is None else families
-    # Fits ask for products of columns, and the columns' triangles have the same.
+    # A fit needs products of columns only, which are the same for their triangular factors.
     triangles = actuator_factors(observations)
     plain = weighted(observations.columns(range(p)), triangles=triangles.columns(range(p)))
     while len(found) < _MOST:
@@ -115,10 +113,10 @@ def searched(
                 clear.append(one)
         best = max((one.statistic for one in clear), default=0.0)
         first = first or best
-        # What is left beside a clear fault may be its own shape, which no column has exactly.
+        # Residuals beside a clear fault may come from its shape, which no column has exactly.
         if not best > _BESIDE * first:
             break
-        # Of those that explain as much, the one of fewest sizes.
+        # Of faults that explain about as much, the one of fewest sizes is taken.
         clearest = max(clear, key=lambda one: one.statistic)
         as_well = _AS_WELL * best
         if clearest.family.exact:
@@ -133,8 +131,8 @@ def cannot_be_told(
 ) -> list[FaultName]:
     """Return which of the clock and the scale of one force the equations leave open.
 
-    A fault is left open whose column the model's columns make, but for less than noise (n,) of
-    the forces hides.
+    A fault is left open if its column depends on the model's columns, but for a part below the
+    noise (n,) of the forces.
     """
     weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
     flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
@@ -159,10 +157,10 @@ def _taken_in(
     before: Sequence[FoundFault],
     k: int,
 ) -> FoundFault | None:
-    """Return a family, by its place, as it is seen beside those before it; None if it is not.
+    """Return the fault of family `k`, fitted beside the faults before it; None if it is not seen.
 
-    Mixtures of its columns that are at right angles to the model's and to each other are tried
-    together. Those whose sizes are clear are then kept, and fitted alone: the others are noise.
+    Combinations of its columns that are orthogonal to the model's and to each other are fitted
+    together. Those whose sizes are clear are then fitted alone: the others are noise.
     `triangles` are the `actuator_factors` of the observations.
     """
     p, family = len(model.model.names), model.families[k]
@@ -179,7 +177,7 @@ def _taken_in(
         return None
 
     def fitted(mix: Array) -> tuple[Estimate, Array, Array]:
-        """Return the fit with these mixtures, their sizes, and the sizes' covariance."""
+        """Return the fit with these combinations, their sizes, and the sizes' covariance."""
         chosen = [*zip(places, mixes, strict=True), (model.places[k], mix)]
 
         def mixed(rows: Observations) -> Observations:
@@ -211,17 +209,17 @@ def _taken_in(
 
 
 def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
-    """Return what share of Wald's statistic lengths explain that are off by usual errors alone."""
+    """Return the share of Wald's statistic that errors of lengths of the usual size explain."""
     spread = _LENGTH * float(np.mean([leg.size for leg in model.model.robot.legs]))
     back = spread * np.linalg.pinv(mix)
     both = back @ back.T + covariance
-    # The most likely sizes leave C (C0 + C)^-1 of what was found.
+    # Of the sizes, C (C0 + C)^-1 remains beside the most likely ones.
     left = np.linalg.solve(both, size)
     return 1.0 - float(left @ covariance @ left) / wald(size, covariance)
 
 
 def _is_possible(one: FoundFault, model: FaultColumns) -> bool:
-    """Say whether sizes can be those of the fault: friction brakes, errors of lengths are small."""
+    """Say whether the sizes are possible: friction must brake, errors of lengths be small."""
     family = one.family
     largest = family.largest
     if family.speed is not None:

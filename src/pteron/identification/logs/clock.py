@@ -24,8 +24,8 @@ _EPOCHS: tuple[tuple[float, float, TimeUnit], ...] = (
     (1.1e17, 1.5e17, "100 ns"),
     (2e17, 1e19, "ns"),
 )
-"""Least and greatest number that is a date of our days, and its unit: since 1970 or, in 100 ns,
-since 1601."""
+"""Least and greatest number that is taken as a present-day date, and its unit: since 1970 or, in
+100 ns, since 1601."""
 
 _DATES: dict[str, TimeFormat] = {
     r"\d{4}[-./]\d\d?[-./]\d\d?": "YYYY-MM-DD hh:mm:ss",
@@ -39,13 +39,13 @@ _DATE = ("YYYY", "MM", "DD")
 """Parts of a date."""
 
 _MONTH_FIRST: TimeFormat = "MM/DD/YYYY hh:mm:ss"
-"""The American format."""
+"""The format with the month first."""
 
 _TEXT = (
     r"^(?:(\d+)[-./](\d+)[-./](\d+)[T ] ?)?(\d\d?):(\d\d):(\d\d)(?:[.,:](\d{1,9}))?"
     r" ?([AaPp][Mm])?(?:[Zz]|([+-]\d\d):?(\d\d))?$"
 )
-"""A time as text: date, clock, fraction, half of the day, and zone."""
+"""Pattern of a time as text: date, time of day, fraction, AM or PM, and zone."""
 
 _DAY = 86_400
 """Seconds in a day."""
@@ -54,25 +54,25 @@ _NANO = 1_000_000_000
 """Nanoseconds in a second."""
 
 _EXACT = 1 << 53
-"""Whole numbers beyond which floats have gaps: they are counted from the first row's."""
+"""Whole numbers from which floats have gaps: larger ones are counted from the first row's."""
 
 Values = NDArray[np.float64]
 
 
 @dataclass
 class Clock:
-    """The format of a file's times; each pass over its rows takes a `fresh` one.
+    """The format of a file's times, and the state of a pass over its rows; a pass begins `fresh`.
 
     Parameters
     ----------
     columns : tuple of str
-        The column of the times, or those of whole seconds and of their nanoseconds.
+        The column of the times, or two: whole seconds, and nanoseconds.
     unit : {"s", "ms", "us", "ns", "100 ns"}
-        Unit of numbers.
+        Unit of times that are numbers.
     format : TimeFormat, optional
-        Format of text.
+        Format of times that are text.
     guessed : bool
-        Whether the size of the numbers alone tells their unit.
+        Whether the unit was inferred from the size of the numbers alone.
     """
 
     columns: tuple[str, ...]
@@ -84,13 +84,13 @@ class Clock:
     _days: int = field(default=0, repr=False)
 
     def fresh(self) -> Clock:
-        """Return the clock for the first row."""
+        """Return the clock as before the first row."""
         return replace(self, _origin=None, _last=0, _days=0)
 
     def seconds(self, table: Table) -> Values:
         """Return the times of the next rows, s.
 
-        Text counts from the midnight before the first row, and goes on where a midnight passes.
+        Times as text count from the midnight before the first row, past later midnights.
 
         Raises
         ------
@@ -116,14 +116,14 @@ class Clock:
         return numbers / PER_SECOND[self.unit]
 
     def _since(self, counts: pl.Series, per_second: float) -> Values:
-        """Return whole counts, which floats cannot hold, in seconds since the first row."""
+        """Return whole counts, too large for floats, in seconds since the first row."""
         if self._origin is None:
             self._origin = int(counts[0]) if len(counts) else 0
         return np.asarray((counts - self._origin).to_numpy() / per_second)
 
     def _whole(self, table: Table, name: str) -> pl.Series | None:
         """Return a column of whole numbers, or None where it has others."""
-        table.numbers([name])  # names the row of what is no number
+        table.numbers([name])  # raises, with the row of a cell that is no number
         cells = table.frame[name]
         if cells.dtype == pl.String:
             cells = cells.str.strip_chars().cast(pl.Int64, strict=False)
@@ -142,7 +142,7 @@ class Clock:
             )
         counts = stamps.to_numpy().astype(np.int64)
         if self.format == "hh:mm:ss" and len(counts):
-            # Half a day backward is a midnight that passed; less is a fault, told with its row.
+            # A step back of half a day is a midnight; a smaller one is a fault, reported later.
             before = self._last if self._origin is not None else int(counts[0])
             passed = np.diff(counts, prepend=before) < -_DAY * _NANO // 2
             days = self._days + np.cumsum(passed)
@@ -164,13 +164,13 @@ def find_clock(
     Parameters
     ----------
     table : Table
-        Its first rows.
+        The first rows of the file.
     columns : tuple of str
-        As of `Clock`.
+        As in `Clock`.
     unit : str, optional
-        As declared, or as the file says.
+        The unit that is declared, or that the file says.
     declared : TimeFormat, optional
-        As declared, for text.
+        The declared format of times that are text.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def find_clock(
 
 
 def _format_of(table: Table, name: str) -> TimeFormat | None:
-    """Return the format of times as text, or None where most are no such text."""
+    """Return the format of times as text, or None if most cells have none."""
     cells = table.frame[name].str.strip_chars()
     if cells.str.contains(_TEXT).sum() * 2 <= len(cells):
         return None

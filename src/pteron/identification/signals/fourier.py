@@ -21,17 +21,18 @@ _SIGNIFICANT = 5.0
 chance, one in a million does."""
 
 _SHARE = 0.4
-"""Harmonics, for each sample in a period, that can be told from noise."""
+"""Harmonics that a fit can tell from noise, for each sample in a period."""
 
 _ROUNDING = 1e-15
-"""Noise, relative to a signal's size, that is rounding."""
+"""Rounding of a signal, relative to its size: noise is taken to be at least this."""
 
 
 @dataclass(frozen=True)
 class Projection:
     """Least squares of samples at times (T,), s, onto the lowest harmonics of a period (s).
 
-    Over a period and more the basis is nearly orthogonal, so that normal equations lose nothing.
+    The basis is nearly orthogonal over a whole period or more, so that the normal equations are
+    well conditioned.
     """
 
     time: Array
@@ -47,7 +48,7 @@ class Projection:
 
     @cached_property
     def _first(self) -> Array:
-        """The basis functions at the first block of samples: of short logs, at all of them."""
+        """The basis functions at the first block of samples; a short log has only this block."""
         rows = next(row_blocks(len(self.time)))
         return fourier_basis(self.time[rows], self.harmonics, self.period)
 
@@ -65,7 +66,10 @@ class Projection:
         return np.asarray(scipy.linalg.cho_solve(self._normal, right))
 
     def noise(self, used: Array, kept: Array) -> Array:
-        """Return what is left at times `kept` of unit white noise on samples (T, n) that are 1."""
+        """Return the standard deviation (K, n) of the series at the times `kept` (K,).
+
+        The samples have white noise of unit variance where `used` (T, n) is 1, none where it is 0.
+        """
         at = scipy.linalg.cho_solve(
             self._normal, fourier_basis(kept, self.harmonics, self.period).T
         )
@@ -88,7 +92,7 @@ class FittedSeries(FourierSeries):
     noise: Array
 
     def later(self, delay: float) -> FittedSeries:
-        """Return the series of the same signals, late by a delay, s."""
+        """Return the series of the same signals, delayed by a time, s."""
         if not delay:
             return self
         turn = delay * 2.0 * np.pi / self.period * np.arange(1, self.harmonics + 1)[:, None]
@@ -103,7 +107,7 @@ def fitted_series(
 
     All periods count alike, so that noise is averaged over them, and samples (T, k) may stand at
     any times (T,), s. Harmonics above the last one that rises over the noise are left out, unless
-    `highest` (Hz) tells to take exactly those up to it.
+    `highest` (Hz) is given: then all up to that frequency are kept, and no others.
 
     Raises
     ------
@@ -125,34 +129,34 @@ def fitted_series(
     noise = np.maximum(noise, _ROUNDING * np.abs(signal).max(axis=0))
     if highest is None:
         amplitudes = np.hypot(found[1 : most + 1], found[most + 1 :])
-        # Of one period only: the rounding of an encoder comes again in every period.
+        # One period counts: the rounding of an encoder repeats in every period.
         samples = min(rate * period, len(time))
         shown = amplitudes > _SIGNIFICANT * noise * np.sqrt(2.0 / samples)
         last = int(np.flatnonzero(shown.any(axis=1)).max(initial=0)) + 1
         found = np.vstack([found[: last + 1], found[most + 1 : most + 1 + last]])
         if last < most:
-            # Uneven samples mix harmonics a little: what is kept is fitted by itself.
+            # Uneven samples mix harmonics a little: those that are kept are fitted again, alone.
             found, _ = _fitted(time, signal, period, last)
     last = len(found) // 2
     return FittedSeries(found[0], found[1 : last + 1], found[last + 1 :], period, noise)  # type: ignore[arg-type]
 
 
 def most_harmonics(time: Array, period: float) -> int:
-    """Return how many harmonics samples at these times tell apart: no wave may hide in a hole."""
+    """Return how many harmonics samples at these times determine: the largest gap limits them."""
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    # A hole of one step counts as even sampling does, whatever its rounding.
+    # A gap of one step counts as even sampling does, whatever its rounding.
     hole = max(_largest_hole(time, period), (1.0 - 1e-6) / rate)
     return int(_SHARE * period / hole + 1e-6)
 
 
 def _largest_hole(time: Array, period: float) -> float:
-    """Return the longest time (s) of the period that no sample falls in."""
+    """Return the longest part of the period without a sample, s."""
     phase = np.sort(np.remainder(time - time[0], period))
     return float(np.diff(phase, append=phase[0] + period).max())
 
 
 def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[Array, Array]:
-    """Return the coefficients of least squares, and the sum of squares (k,) of what they leave."""
+    """Return the coefficients of least squares, and the residual sum of squares (k,)."""
     projection = Projection(time, period, harmonics)
     size = signal.shape[1]
     first = projection.coefficients(lambda rows: signal[rows], size)
@@ -160,7 +164,7 @@ def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[
     def rest(rows: slice) -> Array:
         return np.asarray(signal[rows] - projection.basis(rows) @ first)
 
-    # A second step takes out what rounding put in.
+    # A step of iterative refinement removes the rounding of the first solution.
     found = first + projection.coefficients(rest, size)
     squares = np.zeros(size)
     for rows in row_blocks(len(time)):

@@ -1,4 +1,4 @@
-"""How long steps may be: the linear machine's modes, and the step that all its rates bear."""
+"""The longest stable step of the simulation, from the modes of the machine linear about rest."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ _SHORTEST = 1e-8
 
 
 def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = None) -> float:
-    """Return the longest stable step, s: infinite for a machine whose drives have no such rates.
+    """Return the longest stable step of the simulation, s; infinite where nothing limits it.
 
-    Viscous friction makes rates decay, as a winding's supply does at its limit, transmissions that
-    bend make motors and joints vibrate, and currents lag behind: steps must follow the fastest of
-    these. Dry friction asks for no short steps. The poses, (..., m), are those where the machine
-    may be. Of several machines it is the step that all bear, at the pose where joints are lightest.
+    The fastest of these limits it: the decay of rates by viscous friction or by a winding at its
+    supply's limit, the vibration of motors and joints on transmissions that bend, and the lag of
+    currents. Dry friction needs no short steps. The poses, (..., m), are those where the machine
+    may be. For several machines the step is stable for all of them, at the pose where the mass at
+    the joints is least.
     """
     return _fastest(as_manipulator(robot), poses, machines)[0]
 
@@ -41,7 +42,7 @@ def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = 
 def _fastest(
     robot: Manipulator, poses: PoseLike, machines: Machines | None = None
 ) -> tuple[float, str]:
-    """Return the longest stable step, and what asks for it, as the beginning of a sentence."""
+    """Return the longest stable step, s, and its cause as the beginning of a sentence."""
     kind, own = DriveKind.of(robot), drives_of(robot)
     if machines is not None:
         parts = machines.drives.reshape(len(machines), len(own), -1)
@@ -68,7 +69,7 @@ def _fastest(
 
 
 def _braking(robot: Manipulator) -> Array:
-    """Return by how much the windings' force falls with the rate at their supply's limit, (n,)."""
+    """Return the fall (n,) of drive forces per joint rate where the supply is at its limit."""
     found = np.zeros(robot.joint_count)
     for i, leg in enumerate(robot.legs):
         if leg.drive and leg.drive.winding:
@@ -78,13 +79,13 @@ def _braking(robot: Manipulator) -> Array:
 
 
 def _longest(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple[float, str]:
-    """Return the longest step and why, of J, M and drives at some poses or of some machines."""
+    """Return the longest step and its cause, from J, M and drives of poses or of machines."""
     kind, found = DriveKind.of(robot), (float("inf"), "")
     if own.viscous.any() or kind.bends:
         system, bent = _linear(robot, rows, mass, own)
         if kind.bends:
             rates, vectors = np.linalg.eig(system)
-        else:  # nothing pulls a machine back to where it was: friction's part has all rates
+        else:  # without springs the eigenvalues are those of the friction's part alone, and zeros
             rates = np.linalg.eigvals(system[..., robot.freedom :, robot.freedom :])
         fastest = int(np.abs(rates).argmax())
         rate = float(np.abs(rates.flat[fastest]))
@@ -112,8 +113,9 @@ def _longest(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple
 def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
     """Return the eigenvalues of a machine with its drives, linear about rest at poses.
 
-    The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d what each
-    transmission is bent; play, dry friction and gravity's change with the pose are left out.
+    The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d the
+    deflection of each transmission; play, dry friction and the change of gravity forces with the
+    pose are left out.
 
     Parameters
     ----------
@@ -127,7 +129,7 @@ def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
     eigenvalues : array of complex, shape (..., K)
         1/s, K twice the number of coordinates and of motors that move by themselves.
     bent : array of complex, shape (..., n, K)
-        What each transmission is bent in each mode.
+        The deflection of each transmission in each mode; 0 where it is rigid.
 
     Raises
     ------
@@ -154,7 +156,10 @@ def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
 
 
 def _linear(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple[Array, Array]:
-    """Return the linear machine's matrix (..., 2 K, 2 K), and what bends of its K coordinates."""
+    """Return the linear machine's matrix (..., 2 K, 2 K) and the deflections (..., n, K).
+
+    The K coordinates are those of the pose, then the motors behind transmissions that bend.
+    """
     bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
     stiffness, damping = (
         np.array([getattr(one, name) if one else 0.0 for one in bends])
@@ -198,9 +203,13 @@ def allowed_step(
     usual: bool = True,
     machines: Machines | None = None,
 ) -> float:
-    """Return the given step, or the longest that is stable for a machine or many, or refuse it.
+    """Return a stable step, s: the given one, or the longest stable one where that is shorter.
 
-    The `usual` step, and any that only viscous friction forbids, is made shorter.
+    Raises
+    ------
+    DataError
+        If a step that is not the `usual` one is too long for a transmission, bristles or a current,
+        or no sensible step is stable. One that is too long for viscous friction alone is shortened.
     """
     try:
         longest, why = _fastest(robot, poses, machines)
@@ -213,7 +222,7 @@ def allowed_step(
         )
     if step > longest and why.startswith("leg") and not usual:
         digit = 10.0 ** (math.floor(math.log10(longest)) - 1)
-        longest = digit * math.floor(longest / digit)  # what is told is not refused
+        longest = digit * math.floor(longest / digit)  # so that the printed step is accepted
         raise DataError(
             f"step: {step:g} s given, but {why} asks for {longest:.2g} s at most; give a shorter "
             "one, or none"

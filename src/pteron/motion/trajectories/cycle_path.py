@@ -10,10 +10,10 @@ from pteron.motion.trajectories.path import path_weights
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 
 _EDGE = 1e-3
-"""Share of a cycle's move, at each end, that counts as a straight line."""
+"""Share of a cycle's travel, at each end, that is taken as a straight line."""
 
 _NODES = 2001
-"""Nodes between which the arc length is interpolated."""
+"""Number of nodes between which the arc length is interpolated."""
 
 
 class CyclePath:
@@ -31,7 +31,7 @@ class CyclePath:
         span = tau[1] - tau[0]
         speeds = self._speed((tau[:-1, None] + 0.5 * span * (nodes + 1.0)).ravel())
         pieces = 0.5 * span * (speeds.reshape(-1, 5) @ shares)
-        # Before and after it goes straight, and starts from rest: its speed grows as tau^2.
+        # Before and after them the path is straight and starts from rest: speed grows as tau^2.
         edges = self._weighted(np.array([0.0, self._ends[0], self._ends[1], 0.5]))
         first, last = (float(np.linalg.norm(edges[k + 1] - edges[k])) for k in (0, 2))
         self._tau, self._s = tau, first + np.concatenate([[0.0], np.cumsum(pieces)])
@@ -76,5 +76,5 @@ class CyclePath:
         return tau
 
     def place(self, s: float) -> str:
-        """Return in words where on the path s is."""
+        """Return the place of s on the path in words."""
         return f"{s:.4g} m along its path of {self.length:.4g} m"

@@ -1,4 +1,4 @@
-"""Limits of a motion along a path s as rows for TOPP-RA: linear in s'', s'^2 but for friction."""
+"""Limits of a motion along a path s as rows for TOPP-RA: linear in s'' and s'^2, with friction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ _SIDES = 16
 
 
 class LimitRows(NamedTuple):
-    """Limits as a u + b x + c + v sqrt(x) <= 1, (K, R) each, and x <= `most`; u = s'', x = s'^2."""
+    """R limits at K points: a u + b x + c + v sqrt(x) <= 1, (K, R) each, and x <= `most` (K,).
+
+    u is s'' and x is s'^2; v is the part of viscous friction.
+    """
 
     a: Array
     b: Array
@@ -25,13 +28,16 @@ class LimitRows(NamedTuple):
     most: Array
 
     def used(self, u: Array, x: Array) -> Array:
-        """Return the share of each limit that s'' and s'^2, (K,) each, use, (K, R)."""
+        """Return the share (K, R) of each limit that is used at s'' and s'^2, (K,) each."""
         u, x = u[:, None], x[:, None]
         return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
 
 
 def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
-    """Return the rows of a demand at K points of a path, with times in `unit`, s."""
+    """Return the limits as rows for the demand at K points of a path.
+
+    Times are in units of `unit`, s.
+    """
     count = len(asked.first)
     none = np.zeros((count, 0))
     a, b, c, v = [none], [none], [none], [none]
@@ -57,7 +63,7 @@ def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
         add(linear, square, still[:, joints], root, force)
     speed, bend = asked.tool
     if math.isfinite(limits.tool_acceleration):
-        # Both lie in a plane: speed along its x, and what is left of the bend along its y.
+        # Speed and bend span a plane: x along the speed, y along the rest of the bend.
         size = np.linalg.norm(speed, axis=-1)
         direction = np.divide(
             speed, size[:, None], out=np.zeros_like(speed), where=size[:, None] > 0.0

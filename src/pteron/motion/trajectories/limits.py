@@ -23,7 +23,7 @@ PerJointLimit = float | Sequence[float] | Array | None
 @checked_arguments
 @dataclass(frozen=True, eq=False)
 class MotionLimits:
-    """Largest speeds, accelerations and forces, infinite without a limit. Made by `limits_of`.
+    """Largest speeds, accelerations and forces, infinite without a limit; from `limits_of`.
 
     A drive whose force is limited by its speed has lines |f + back q'| <= force - fall |q'| beside.
 
@@ -32,7 +32,7 @@ class MotionLimits:
     speed, acceleration : array, shape (n,)
         Limits of the joints, m/s and m/s^2 or rad/s and rad/s^2.
     force : array, shape (n,)
-        Limits of the drives, N or N m: their friction and their motors' inertia take a part of it.
+        Limits of the drives, N or N m, friction and motors' inertia included.
     tool_speed, tool_acceleration : float
         Limits of the tool's centre point, m/s and m/s^2.
     lines : tuple of tuple of SpeedLine
@@ -76,15 +76,15 @@ def limits_of(
     tool_speed: float | None = None,
     tool_acceleration: float | None = None,
 ) -> MotionLimits:
-    """Return the limits given and, of speed and force, else those of the machine's drives.
+    """Return given limits of a motion; those of speed and force are by default the drives' own.
 
     Parameters
     ----------
     robot : Manipulator, name or path
-        The machine; its drives' `max_speed` and `max_force` count where nothing else is given, and
-        what their `curve` and `winding` leave at speed in any case.
+        The machine, whose drives' `max_speed` and `max_force` are the defaults; what their `curve`
+        and `winding` leave at speed counts in any case.
     speed, acceleration, force : float or sequence of n floats, optional
-        Of each joint: m/s, m/s^2 and N, or rad/s, rad/s^2 and N m.
+        Limits of each joint: m/s, m/s^2 and N, or rad/s, rad/s^2 and N m.
     tool_speed, tool_acceleration : float, optional
         Limits of the tool's centre point, m/s and m/s^2.
 
@@ -95,7 +95,7 @@ def limits_of(
     Raises
     ------
     DataError
-        If a number is not above 0, or there are neither one nor n of them.
+        If a number is not above 0, or the numbers are neither one nor n.
 
     Examples
     --------

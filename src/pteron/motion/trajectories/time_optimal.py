@@ -4,11 +4,11 @@ Along a path x(s) speeds are linear in s', and accelerations and the drives' for
 a u + b x + c <= 1 with u = s'' and x = s'^2, for each limit at each s. TOPP-RA (Pham and Pham,
 2018, IEEE Transactions on Robotics 34(3)) finds the largest x everywhere by small linear programs.
 
-Viscous friction goes with s', which is the root of x: where it is against the drive a tangent of
-the root bounds it from above, where it helps to brake a chord from rest to a largest speed bounds
-it from below. Both are close at the speeds that they are taken for: those of the pass before.
-Dry friction has the sign of the joint's motion: where it is against the drive it counts in full,
-where it helps without Stribeck's part, which a joint in motion loses.
+Viscous friction is proportional to s' = sqrt(x), which is not linear in x. Where it opposes the
+drive, a tangent of the root bounds it from above; where it helps to brake, a chord from rest to a
+largest speed bounds it from below. Both are close near the speeds of the pass before, for which
+they are made. Dry friction has the sign of the joint's motion: where it opposes the drive it counts
+in full, where it helps without Stribeck's part, which a joint in motion does not have.
 """
 
 from __future__ import annotations
@@ -43,23 +43,24 @@ _EVEN = 0.3
 """Share of the grid that is spaced evenly."""
 
 _PASSES = 4
-"""Passes over a stretch, each with tighter limits where the pass before exceeds one."""
+"""Passes over a stretch, each with tighter limits where the pass before exceeded one."""
 
 _AHEAD = (math.inf, 4.0, 2.0, 1.4, 1.2, 1.1, 1.05)
-"""With viscous friction passes come before, each bounded by so many times the s'^2 of the
-pass before: the chord is then the closer."""
+"""Bounds of s'^2 in first passes, which viscous friction needs, over that of the pass before: the
+smaller the bound, the closer the chord."""
 
 _SLOWER = (1.0, 0.5, 0.25, 0.1)
-"""Speeds over the quintic's from which on it is: one so slow that less friction helps to brake."""
+"""Starting speeds of these passes, over the quintic's, tried in turn: a slower start needs less
+friction to brake."""
 
 _FASTEST = 1e6
-"""The greatest s'^2, over its mean in the quintic's time."""
+"""Greatest s'^2, in units of stretch and of its time by the quintic."""
 
 _SPREAD = 4.0
 """Samples over which, before and after, a jump of the acceleration is spread."""
 
 _SHARE = 0.02
-"""The same, as the share of a stretch's time that it is at most."""
+"""Greatest value of that time, as a share of a stretch's time."""
 
 _SPARE = 1e-3
 """Share of a limit that is kept as a margin between samples."""
@@ -82,10 +83,10 @@ class TimeOptimal(Motion):
     Attributes
     ----------
     bound : float
-        What TOPP-RA finds where the acceleration may jump, s. The motion takes longer by what its
-        jumps are spread over, and by what keeps the limits between samples.
+        Duration by TOPP-RA with jumps of the acceleration, s. The motion takes longer, as jumps are
+        spread over time and limits are kept between samples too.
     polynomial : float
-        What the quintic along the same path takes, within the same limits, s.
+        Duration of the quintic along the same path within the same limits, s.
     """
 
     bound: float
@@ -103,11 +104,11 @@ def time_optimal(
     Parameters
     ----------
     robot : Manipulator, name or path
-        The machine; what its drives need for themselves counts as their force.
+        The machine; the forces that its drives need for themselves count.
     path : Path
-        Such as `line_path` makes.
+        The path, such as `line_path` returns.
     limits : MotionLimits, optional
-        Of joints, drives and tool; by default those of the machine's drives.
+        Limits of joints, drives and tool; by default those of the machine's drives.
     step : float
         Time between samples, s.
 
@@ -118,7 +119,7 @@ def time_optimal(
     Raises
     ------
     UnreachablePose, SingularPose
-        If the machine cannot go the path; see `check_path`.
+        If a pose of the path is out of reach or singular; see `check_path`.
     DataError
         If nothing limits the acceleration.
     ModelError
@@ -152,7 +153,7 @@ def time_optimal(
 
 
 class _Stretch(NamedTuple):
-    """The time law of a stretch between two rests, its duration, and TOPP-RA's, s."""
+    """The time law of a stretch between two rests, with its duration and TOPP-RA's `bound`, s."""
 
     progress: Callable[[Array], tuple[Array, Array, Array]]
     duration: float
@@ -172,7 +173,7 @@ def _fastest(
 ) -> _Stretch:
     """Return the fastest time law of a stretch; times are in `unit`, s in its length."""
     begin, end = path.rests[j : j + 2]
-    # Denser towards the rests, where the motion stays long; much denser, and TOPP-RA loses digits.
+    # Denser towards the rests, where the motion is slow; TOPP-RA loses digits on a denser grid.
     even = np.linspace(0.0, 1.0, _GRID + 1)
     grid = _EVEN * even + (1.0 - _EVEN) * (0.5 - 0.5 * np.cos(np.pi * even))
 
@@ -191,7 +192,7 @@ def _fastest(
         profile = Profile.of(grid, squares)
         spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
         progress = profile.spread(spread)
-        # What the spreading exceeds is taken from the limits there.
+        # Limits are tightened by what the spread motion exceeds them.
 
         def at_times(tau: Array, progress: Progress = progress) -> Curve:
             return states(progress(tau)[0])
@@ -214,7 +215,7 @@ def _fastest(
 
 
 def _first(toppra: Any, rows: LimitRows, grid: Array) -> Array:
-    """Return x = s'^2 on the grid that viscous friction allows, from that of the quintic on."""
+    """Return x = s'^2 on the grid by first passes that start from the quintic's speeds."""
     share, rate, _ = polynomial("quintic")(np.linspace(0.0, 1.0, _LOOK))
     quintic = np.interp(grid, share, rate) ** 2
     if not rows.v.any():
@@ -233,7 +234,7 @@ def _first(toppra: Any, rows: LimitRows, grid: Array) -> Array:
 
 
 def _near(times: Array, nodes: Array, span: float) -> Array:
-    """Return the first and the last, exclusive, of the times (T,) near each node, (2, K)."""
+    """Return the range of the times (T,) near each node: first and last + 1, (2, K)."""
     first = np.searchsorted(times, nodes - span)
     last = np.searchsorted(times, nodes + span)
     # Between distant nodes all times count.
@@ -243,14 +244,14 @@ def _near(times: Array, nodes: Array, span: float) -> Array:
 
 
 def _most_of(near: Array, values: Array) -> Array:
-    """Return the largest values (T, R) near each node, (K, R)."""
+    """Return the largest of the values (T, R) near each node, (K, R)."""
     return np.array([values[a:b].max(axis=0) for a, b in near.T])
 
 
 def _solved(toppra: Any, rows: LimitRows, grid: Array, before: Array, ahead: float) -> Array:
-    """Return x = s'^2 on the grid, by TOPP-RA, given that of the pass before.
+    """Return x = s'^2 on the grid, by TOPP-RA, from that of the pass before.
 
-    With viscous friction it is no more than `ahead` times as large, where the chord ends.
+    With viscous friction it is at most `ahead` times as large: there the chord ends.
     """
     most = np.minimum(rows.most, _FASTEST)
     a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()

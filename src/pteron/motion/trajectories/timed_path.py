@@ -22,14 +22,14 @@ class Timed:
     curve : callable
         From tau (T,) in [0, 1] to poses (T, m) and two derivatives by tau.
     duration : float
-        s.
+        The duration, s.
     """
 
     curve: Callable[[Array], Curve]
     duration: float
 
     def slowed(self, factor: float) -> Timed:
-        """Return the same with all its times longer by a factor."""
+        """Return the same curve with its duration multiplied by a factor."""
         return Timed(self.curve, factor * self.duration)
 
     def at(self, time: Array) -> Curve:

@@ -14,9 +14,9 @@ Curve = tuple[Array, Array, Array]
 def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
     """Return poses with their lengths moved from P to the tool, and two derivatives.
 
-    Of a platform that turns about its axis alone, the part from P to the tool along that axis,
-    which is constant, is left out. A platform whose lengths cannot carry the tool anywhere, such as
-    a tripod, keeps its pose.
+    Where the platform turns about its axis alone, the constant part from P to the tool along that
+    axis is left out. A platform whose lengths cannot move the tool to any place, such as a
+    tripod's, keeps its pose.
     """
     return _moved(platform, (pose, first, second), 1.0)
 
@@ -27,9 +27,9 @@ def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -
 
 
 def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
-    """Return the tool's place (..., k), and two derivatives: k = 3 where the platform tilts.
+    """Return the tool's position (..., k) and two derivatives; k = 3 where the platform tilts.
 
-    Else they are those of `tool_motion` along the pose's lengths.
+    Else k is the number of the pose's lengths, and they are those of `tool_motion`.
     """
     if platform.tilts:
         return platform.tool_motion(pose, first, second)
@@ -50,14 +50,15 @@ def _moved(platform: Platform, curve: Curve, side: float) -> Curve:
 
 
 def carries(platform: Platform) -> bool:
-    """Say whether the pose's lengths make up for what its angles do to the tool's place."""
+    """Say whether the pose's lengths can hold the tool in place while its angles change."""
     return bool(platform.angles) and (not platform.tilts or len(platform.lengths) == 3)
 
 
 def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) -> Curve:
-    """Return the arm from P to the tool, as far as it turns, and two derivatives (..., k).
+    """Return the part of the arm from P to the tool that turns, and two derivatives, (..., k).
 
-    They are along the pose's lengths, of a platform that `carries` its tool; angles (..., j).
+    The k components are along the pose's lengths; angles, rates and growths, their second
+    derivatives, are (..., j). The platform is one that `carries` its tool.
     """
     if platform.tilts:
         state = (_without_lengths(platform, part) for part in (angles, rates, growths))

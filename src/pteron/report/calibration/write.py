@@ -1,4 +1,4 @@
-"""`write_calibration`: writes the report's page, `calibration.json` and the machine as found."""
+"""`write_calibration`: the report's page, `calibration.json` and the machine's file, written."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from pteron.report.written import Written as Written, write_found
 def write_calibration(
     result: Calibration, folder: str | Path, *, sources: Iterable[str | Path] = ()
 ) -> Written:
-    """Write a calibration: a page, `calibration.json`, and the machine as found, `robot.toml`.
+    """Write a calibration: a page, `calibration.json`, and the calibrated machine, `robot.toml`.
 
     The page, `calibration.html`, needs no other file or network. All files are written, or none.
 
     Parameters
     ----------
     result : Calibration
-        What was found.
+        The calibration.
     folder : str or path
         Where to write; made if it is missing.
     sources : iterable of str or path
-        Files that were read, which none of these must replace.
+        Files that were read, which the machine's file must not replace.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def write_calibration(
     OutputError
         If the folder cannot be written, or a file that was read would be replaced.
     """
-    # Matplotlib and Jinja are behind it.
+    # This import loads Matplotlib and Jinja, which are slow.
     from pteron.report.calibration.page import page
 
     target = checked_folder(folder)

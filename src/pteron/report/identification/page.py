@@ -27,7 +27,7 @@ from pteron.report.typeset import measured, template
 
 
 def page(result: Identification, model_file: str | None = None) -> str:
-    """Return the page as HTML without reference to another file but the machine's, beside it."""
+    """Return the page as HTML, with a link to the machine's file beside it and to no other."""
     made = template(
         "identification/page.html.j2",
         measured=lambda row: measured(row.value, row.half),
@@ -52,7 +52,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
 
 
 def figures(found: Contents) -> dict[str, Any]:
-    """Return the pictures; those of residuals are None where an estimator keeps none."""
+    """Return the pictures by name; those of residuals are None if the estimator keeps none."""
     rows = found.parameters
     joints = [leg.joint for leg in found.result.robot.legs]
     names = [row.name for row in rows]
@@ -77,7 +77,7 @@ def figures(found: Contents) -> dict[str, Any]:
 def _panels(
     shown: PageRecording, name: str, joints: Sequence[ActuatedJoint], *, speed: bool
 ) -> dict[str, Any]:
-    """Return the pictures of one recording; those over speed only where they are asked for."""
+    """Return the pictures of one recording, with those over joint speed if `speed` is set."""
     p, part = shown.prediction, shown.stretch
     rest = p.measured - p.predicted
     series = p.measured[part], p.predicted[part], p.without_friction[part]

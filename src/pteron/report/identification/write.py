@@ -15,7 +15,7 @@ from pteron.report.write import checked_apart, checked_folder, commented
 from pteron.report.written import Written as Written, write_found
 
 _SAFE = re.compile(r"[^\w.-]+")
-"""Characters that names of files do without."""
+"""Characters that are left out of names of files."""
 
 
 def write_identification(
@@ -43,7 +43,7 @@ def write_identification(
     OutputError
         If the folder cannot be written, or a file that was read would be replaced.
     """
-    # Matplotlib and Jinja are behind it.
+    # This import loads Matplotlib and Jinja, which are slow.
     from pteron.report.identification.page import page
 
     path = model_path(folder, result.robot.name, sources)
@@ -56,7 +56,7 @@ def write_identification(
 
 
 def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
-    """Return the path of the model file: no file that is read, and no description of a log."""
+    """Return a path for the model file that is no file that was read and no log's description."""
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
     return checked_apart(path, sources)

@@ -30,7 +30,7 @@ from pteron.kernels import Array
 from pteron.verdict import Verdict
 
 _LEAST_ROWS = 9
-"""Least number of samples, from which the noise of forces can be found without a model."""
+"""Least number of samples: from so many the noise of forces is estimated without a model."""
 
 _ESTIMATORS = (*ESTIMATORS, "instrumental")
 """Estimators by name."""
@@ -45,13 +45,13 @@ class Fit:
     estimate : Estimate
         The values.
     essential : Essential
-        Those that the data can show, and the fit of these alone.
+        The values that the data determine, and the fit of these alone.
     held_out : Prediction
-        Their prediction of the forces that were held out.
+        The prediction of the held-out forces.
     verdict : Verdict
-        Whether they can be trusted, from these forces alone.
+        Whether the values can be trusted, by the held-out forces alone.
     reduced : Reduced or None
-        The independent columns, where that was asked for.
+        The independent columns, if `reduce` was given.
     """
 
     estimate: Estimate
@@ -81,7 +81,7 @@ def estimate(
     ----------
     regressor : array, shape (R, n, p) or (R n, p)
         W at R samples of n actuators, in the order of time; stacked sample by sample if it has two
-        axes. Filter it and the forces alike before.
+        axes. If it is filtered, the forces must be filtered alike.
     forces : array, shape (R, n), or (R,) of a single actuator
         F, N or N m.
     names : sequence of str, optional
@@ -94,7 +94,8 @@ def estimate(
     time : array, shape (R,), optional
         s; one second a sample by default.
     used : array of bool, shape (R, n), optional
-        Equations that count; leave out those that the model is not meant for, as of joints at rest.
+        Equations that count; leave out those that the model does not hold for, such as those of
+        joints at rest.
     estimator : str or callable
         ordinary, weighted, huber, total, instrumental; or a function from observations to an
         estimate.
@@ -102,8 +103,8 @@ def estimate(
         Regressor and forces of another motion, and which equations count there; by default the last
         30 % of the samples.
     instruments : array or callable, optional
-        For "instrumental": the regressor at states whose noise has nothing to do with that of the
-        ones given, such as a simulation's; or what returns it for values (of the columns kept).
+        For "instrumental": the regressor at states whose noise is independent of that of the given
+        ones, such as a simulation's; or a function that returns it for values of the kept columns.
     reduce : bool
         Whether columns that depend on others are left out and named, numerically: see `reduced`.
 
@@ -160,7 +161,7 @@ def estimate(
         fit, check = fit.columns(found.kept), check.columns(found.kept)
 
     def alike(numbers: ArrayLike) -> Observations:
-        """Return instruments as observations of the samples that are fitted."""
+        """Return instruments as observations of the fitted samples."""
         given = finite(numbers, "instruments")
         wanted = f"that of the regressor, {whole.matrix.shape},"
         fits = given.size == whole.matrix.size
@@ -192,7 +193,7 @@ def estimate(
 
 
 def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
-    """Return how well the values predict forces that were not fitted."""
+    """Return the prediction of held-out forces by the estimated values, with its errors."""
     predicted = check.matrix @ estimate.values
     without = np.full(predicted.shape, np.nan)
     if check.kinds:
@@ -206,7 +207,7 @@ def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Pr
     size = np.sqrt((used * (check.forces - mean) ** 2).sum(axis=0) / counts)
     noise = estimate.noise
     if len(check.forces) >= _LEAST_ROWS and used.all():
-        # Either is too large: where samples are few, or where the model misses something.
+        # Each of both is too large in one case: few samples, or a model that misses something.
         noise = np.minimum(noise, white_noise(check.forces))
     return Prediction(
         source="the last samples" if repeats else "the samples held out",
@@ -216,7 +217,7 @@ def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Pr
         error=error,
         error_without_friction=bare,
         error_of_all=error,
-        # Which of filtered samples stand out nobody knows.
+        # Filters spread outliers: which samples they come from is not known.
         robust_error=error,
         outliers=np.zeros_like(error),
         noise=noise,
