@@ -200,7 +200,7 @@ TILTING = ("6-UPS", "6-RSS", "3-RRS, symmetric", "3-PRS", "wrist")
 FEW = ("tripteron-oblique", "delta", "a slider and two cranks", "delta-4", "five-bar", "3-prr")
 
 
-EVERY = in_turn([*MACHINES, *FAMILY], share=3)
+EVERY = in_turn([*MACHINES, *FAMILY], share=4)
 
 
 @cache

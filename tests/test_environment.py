@@ -25,7 +25,9 @@ MACHINES = {
     "planar": random_machine(0, "CLP"),
     **{name: TILTED[name] for name in ("wrist", "ball-table", "stewart")},
 }
-EVERY = in_turn(MACHINES, [name for name in MACHINES if name not in ("ball-table", "stewart")])
+EVERY = in_turn(
+    MACHINES, [name for name in MACHINES if name not in ("ball-table", "stewart")], share=3
+)
 
 
 @lru_cache

@@ -94,7 +94,7 @@ MACHINES = {
     "par4": (limited("par4", **CONES), crank_cones),
     "delta-4": (limited("delta-4", travel=(0.1, 3.0)), shafts),
 }
-EVERY = in_turn(MACHINES, tuple(MACHINES))
+EVERY = in_turn(MACHINES, tuple(MACHINES), share=3)
 
 
 def passive(robot, pose):

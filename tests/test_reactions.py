@@ -39,7 +39,7 @@ def test_the_published_router():
 
 RANDOM = ("PRSU", "SSSSI", "CCC")
 SOME = ("3-rpr", "delta", "delta-4", "tripteron-oblique", "CCC", "SSSSI")
-EVERY = in_turn([*CATALOG, *RANDOM], SOME)
+EVERY = in_turn([*CATALOG, *RANDOM], SOME, share=3)
 
 
 @EVERY

@@ -58,7 +58,7 @@ def driven(robot, **more):
 
 
 MACHINES = {name: driven(robot) for name, robot in BARE.items()}
-EVERY = in_turn(MACHINES, tuple(MACHINES))
+EVERY = in_turn(MACHINES, tuple(MACHINES), share=3)
 
 
 @lru_cache
