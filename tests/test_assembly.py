@@ -322,7 +322,7 @@ SIDES = {
 }
 
 
-@pytest.mark.parametrize("share", [0.1, 1.0])
+@pytest.mark.parametrize("share", gated([0.1, 1.0], [1.0]))
 @pytest.mark.parametrize("name", SIDES)
 def test_a_step_stays_on_its_side_of_all_singularities(name, share):
     """From anywhere in reach, a tenth of the way to another pose, and all of it."""

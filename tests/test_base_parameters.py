@@ -345,8 +345,8 @@ SHARED = ("quadrupteron, shared", "tripteron-oblique, shared", "delta, shared", 
     gated(
         [*PLAIN, *FAMILY, *SHARED, "3-RRS, symmetric", "ankle"],
         (
-            *("tripteron-oblique", "delta", "five-bar", "h4, its nacelle sliding"),
-            *("the same with a shaft", *SHARED[:2], "ankle"),
+            *("tripteron-oblique", "delta", "h4, its nacelle sliding"),
+            *("the same with a shaft", SHARED[0], "ankle"),
         ),
     ),
 )

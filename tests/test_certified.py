@@ -292,6 +292,7 @@ def test_a_region_that_touches_the_boundary_is_not_decided():
     assert "the region may touch that edge" in str(found)
 
 
+@CLIENTS
 def test_cylinders_are_proved_too():
     found = largest_cylinder("tripteron-router", np.full(3, 0.1))
     assert found.proof.holds

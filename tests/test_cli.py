@@ -673,12 +673,14 @@ def test_forces_of_drives_and_what_they_exceed():
     assert done("forces tripteron --pose 0,0,0 --drives") == done("forces tripteron --pose 0,0,0")
 
 
+@CLIENTS
 def test_colours_that_are_asked_for_bring_no_moving_pictures_into_a_pipe():
     plain, coloured = run("check quadrupteron"), run("check quadrupteron", FORCE_COLOR="1")
     assert "\x1b[" in coloured.stdout
     assert plain.stderr == coloured.stderr == ""
 
 
+@CLIENTS
 def test_a_name_is_no_markup():
     name = "[/red] [bold]odd[2J"
     Path("odd.toml").write_text(broken('name = "tripteron"', f'name = "{name}"'))
@@ -1118,6 +1120,7 @@ def test_a_pipeline_of_programs():
     assert {row["row"] for row in rows} == {1, 2}
 
 
+@CLIENTS
 @pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
 def test_a_wait_for_standard_input_can_be_interrupted():
     script = (

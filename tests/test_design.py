@@ -237,6 +237,7 @@ def test_no_design_of_the_front_betters_another(found):
         assert not ((costs <= one).all(axis=1) & (costs < one).any(axis=1)).any()
 
 
+@CLIENTS
 def test_a_search_that_was_ended_goes_on_to_the_same_front(found, tmp_path):
     front, folder = found
     again = tmp_path / "generations"

@@ -248,6 +248,7 @@ def with_outliers(seed, share=0.05):
     return equations.with_forces(equations.forces + hit * rng.normal(20.0, 20.0, hit.shape))
 
 
+@CLIENTS
 def test_huber_forgives_outliers():
     errors = standard_errors(huber, with_outliers)
     # One-sided outliers pull at the offset, and at nothing else.

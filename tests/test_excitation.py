@@ -553,6 +553,7 @@ def test_an_interrupt_during_the_program_ends_it_at_once():
     assert time.monotonic() - interrupted[0] < 8.0
 
 
+@CLIENTS
 def test_time_cuts_the_search_and_a_result_is_there_all_the_same():
     found = optimal_excitation(CATALOG["quadrupteron"], seconds=0.5, draws=50, workers=1)
     assert found.seconds < 10.0

@@ -290,6 +290,7 @@ def test_the_log_of_what_was_written_gives_the_parameters_back(name: str, tmp_pa
     assert result.fitted[0].source == str(log)
 
 
+@CLIENTS
 def test_a_log_that_never_repeats_is_taken_as_it_is(tmp_path: Path):
     found = excited("delta")
     log = written_log(tmp_path, found.with_leads(2), Layout(separator=";"), "log")

@@ -450,7 +450,12 @@ def test_direct_kinematics_has_a_row_for_each_assembly_mode(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "real"), [("quadrupteron", "double"), ("quadrupteron", "float"), ("mixed", "double")]
+    ("name", "real"),
+    [
+        pytest.param("quadrupteron", "double", marks=NIGHTLY),
+        ("quadrupteron", "float"),
+        ("mixed", "double"),
+    ],
 )
 def test_out_of_reach_there_is_a_status_and_nan_is_all_there_is(name, real):
     robot, call = ROBOTS[name], library(name, real)

@@ -322,6 +322,7 @@ def test_forces_held_from_sample_to_sample_are_no_fault_and_spoil_no_value(name)
     assert off.max() < 0.02 * spoiled.max()
 
 
+@CLIENTS
 def test_half_a_sample_that_noise_shows_as_a_little_more_is_taken_out_all_the_same():
     """0.6 of a sample, two tenths uncertain, was called a delay, and lowered the grade."""
     robot, log, _ = held("delta")

@@ -140,6 +140,7 @@ def test_another_geometry_is_named():
     assert first.fault == "geometry"
 
 
+@CLIENTS
 def test_friction_that_falls_with_speed_is_named_and_then_identified():
     robot, log, friction = clean("linear-delta", dry=0.2)
     rates = np.gradient(log.joints, log.time, axis=0)
@@ -218,9 +219,7 @@ def test_small_motion_is_not_accused_of_flipped_signs(seed):
         found(robot, log)
 
 
-@pytest.mark.parametrize(
-    "name", gated(["quadrupteron", "delta", "par4", "mixed"], ["par4", "mixed"])
-)
+@pytest.mark.parametrize("name", gated(["quadrupteron", "delta", "par4", "mixed"], ["mixed"]))
 def test_columns_are_what_a_fault_does_to_the_forces(name):
     """Other joints and lengths, against the machine built anew."""
     robot, log, _ = clean(name)

@@ -630,6 +630,7 @@ def test_an_interrupt_in_casadi_gets_through_once_its_call_is_over():
 # Files ---------------------------------------------------------------------------------------
 
 
+@CLIENTS
 def test_a_file_in_pieces_gives_what_the_log_in_memory_gives(tmp_path):
     log = noisy(QUADRUPTERON)
     path = write_log(log, tmp_path / "log.parquet")

@@ -106,7 +106,7 @@ PUBLIC = {
 }
 
 
-@pytest.mark.parametrize("what", FUNCTIONS)
+@pytest.mark.parametrize("what", gated(FUNCTIONS, [*FUNCTIONS][::2]))
 @pytest.mark.parametrize("name", gated(["quadrupteron", "random PRR 0", "five-bar"], ["five-bar"]))
 def test_every_function_compiles_and_gives_what_the_public_one_gives(name, what):
     robot = MACHINES[name]
@@ -313,7 +313,7 @@ def on_tape(expression):
 
 
 @pytest.mark.parametrize("name", EXPRESSIONS)
-@settings(deadline=None, derandomize=True, max_examples=25)
+@settings(deadline=None, derandomize=True, max_examples=15)
 @given(fractions, fractions, fractions)
 def test_fields_agree_with_floats(name, first, second, tangent):
     assume(first != 0 and second != 0)

@@ -204,6 +204,7 @@ def test_threads_and_chunks_change_no_bit(delta):
     assert np.array_equal(found.values["condition"], values, equal_nan=True)
 
 
+@CLIENTS
 def test_jax_agrees_to_rounding():
     """In two chunks, of which the second is filled up."""
     pytest.importorskip("jax")
@@ -241,6 +242,7 @@ def test_tables_carry_units_and_zarr_stores_axes(whole, tmp_path):
     assert group["margin"].attrs["units"] == group["x"].attrs["units"] == "m"
 
 
+@CLIENTS
 def test_xarray_opens_a_store(whole, tmp_path):
     path = save_map(whole, tmp_path / "map.zarr")
     with xarray.open_zarr(path, consolidated=False) as found:

@@ -255,6 +255,7 @@ def test_an_fmu_ends_where_a_leg_does_not_reach(name, kind):
         assert abs(result[f"reach_reserve{leg}"][-1]) < 1e-6
 
 
+@CLIENTS
 @pytest.mark.parametrize(
     ("values", "words"),
     [
@@ -327,6 +328,7 @@ def test_an_fmu_goes_back_to_a_kept_state_and_to_its_start():
     unit.freeInstance()
 
 
+@CLIENTS
 def test_an_fmu_has_its_sources_and_is_refused_clearly(tmp_path, monkeypatch):
     with zipfile.ZipFile(fmu_of("delta")) as archive:
         names = set(archive.namelist())

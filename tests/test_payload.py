@@ -252,6 +252,7 @@ def test_values_of_no_real_body_are_told():
     assert "is what was called with payload the one without it?" in found.summary()
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", ["quadrupteron"])
 def test_a_payload_that_was_not_there_is_not_felt(name):
     nothing = pteron.bodies.PlanarInertia(1e-9, (0.0, 0.0), 1e-12)
@@ -262,6 +263,7 @@ def test_a_payload_that_was_not_there_is_not_felt(name):
     assert identify_payload(machine(name), make_log(name, noise=NOISE), base=base_of(name)).felt
 
 
+@CLIENTS
 def test_terms_may_be_left_out():
     found = identify_payload(
         machine("tripteron"),

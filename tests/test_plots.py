@@ -584,6 +584,7 @@ def lone(text):
     return len(text.get_fontfamily()) == 1
 
 
+@CLIENTS
 @pytest.mark.parametrize("width", gated([None, "column"], ["column"]))
 def test_letters_that_no_font_has_are_told_once(tmp_path, width):
     letters = "".join(map(chr, range(0xF0000, 0xF0020)))  # for private use, and used by nobody

@@ -177,7 +177,7 @@ def test_constraints_of_revolute_joints_are_the_layouts():
 
 @pytest.mark.parametrize(
     "name",
-    gated(["five-bar", "3-rrr", "delta", "tripteron-oblique"], ["five-bar", "tripteron-oblique"]),
+    gated(["five-bar", "3-rrr", "delta", "tripteron-oblique"], ["five-bar"]),
 )
 def test_no_sampled_singular_pose_is_nearer_than_the_nearest(name):
     robot = CATALOG[name]
@@ -323,6 +323,7 @@ def test_no_singular_pose_is_nearer_than_proved(name):
             assert (values[0, reached] * values[1, reached] > 0.0).all()
 
 
+@CLIENTS
 def test_a_search_that_is_given_up_tells_its_bound():
     robot, pose = CATALOG["five-bar"], AWAY["five-bar"]
     whole = {(one.kind, one.leg): one for one in found_of("five-bar")}

@@ -63,6 +63,7 @@ def test_exported_c_in_the_loop_is_the_loops_own_controller_to_the_bit(name, law
         np.testing.assert_array_equal(getattr(linked, part), getattr(own, part))
 
 
+@mechanisms.CLIENTS
 @pytest.mark.parametrize(
     "name", mechanisms.gated(["quadrupteron", "five-bar", "stewart"], ["five-bar"])
 )
@@ -82,6 +83,7 @@ def test_drives_that_count_otherwise_run_the_machine_alike(name, tmp_path):
         assert off <= 1e-7 * np.abs(expected).max()  # encoders' steps leave rounding as it is
 
 
+@mechanisms.CLIENTS
 def test_exported_c_in_the_loop_is_what_it_is_by_itself(tmp_path):
     """Compiled alone, with other options, and called back at each sample."""
     robot, controller = driven("quadrupteron"), ComputedTorque()
