@@ -148,6 +148,7 @@ def test_quantities_are_those_of_the_public_functions(task):
     assert design.quantity("moving_mass") == pytest.approx(total)
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", ["five-bar"])
 def test_the_cube_is_that_of_the_proved_search(name):
     """Another search, by linear programs over another lattice, finds none that is larger."""

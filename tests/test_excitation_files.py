@@ -303,6 +303,7 @@ def test_a_log_that_never_repeats_is_taken_as_it_is(tmp_path: Path):
     assert result.base_values == pytest.approx(result.model.base.values(driven("delta")), rel=1e-2)
 
 
+@CLIENTS
 def test_a_payload_is_found_from_logs_that_lead_in_and_out():
     found = excited("delta")
     led = found.with_leads(2)

@@ -84,6 +84,7 @@ def test_noise_free_logs_give_back_the_machine(name):
     )
 
 
+@CLIENTS
 def test_a_noisy_log_is_judged_by_another_motion():
     built = as_built(QUADRUPTERON)
     fast = [noisy(built, seed, period=2.0, size=0.06, turn=0.5) for seed in (1, 2)]
@@ -553,6 +554,7 @@ def test_wrong_geometry_is_not_trusted():
     assert found.verdict.grade != "trustworthy"
 
 
+@CLIENTS
 def test_negative_inertia_is_seen_on_every_machine():
     for robot in (CATALOG[name] for name in NEAREST):
         model = identification_model(robot)

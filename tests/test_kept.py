@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from mechanisms import NIGHTLY
 
 import pteron
 from pteron.cli.kept_machines import kept_machine
@@ -70,7 +71,9 @@ def key_of(package, **options):
     ("start", "packages"),
     [
         (PACKAGE / "kernels" / "programs.py", EQUATIONS),
-        (Path(home.__file__), (*EQUATIONS, "kinematics", "workspace")),
+        pytest.param(
+            *(Path(home.__file__), (*EQUATIONS, "kinematics", "workspace")), marks=NIGHTLY
+        ),
     ],
     ids=["programs", "home poses"],
 )

@@ -249,6 +249,7 @@ def test_loads_change_on_the_way():
     assert np.abs(held.pose - home).max() < 1e-12
 
 
+@mechanisms.CLIENTS
 def test_a_simulation_says_why_it_ends():
     robot = pteron.load("quadrupteron")
     home, rest = home_pose(robot), np.zeros(4)

@@ -232,6 +232,7 @@ def test_where_the_forces_are_not_determined_the_page_says_why():
     assert '<span class="close">very near</span>' in page
 
 
+@CLIENTS
 @pytest.mark.parametrize("name", gated(MECHANISMS, ["delta", "tripteron-oblique"]))
 def test_every_machine_is_pushed_by_a_spring_and_stays_where_it_may_be(name):
     robot = MECHANISMS[name]

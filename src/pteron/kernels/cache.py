@@ -27,6 +27,7 @@ import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,9 @@ TEXTS = "texts"
 
 MOST = 3000
 """Texts that are kept, of some 10 kB each."""
+
+_WRITTEN = count()
+"""Number of texts that this process has written."""
 
 MOST_BYTES = 1 << 29
 """Size of all entries together, above which those that were used least lately are removed."""
@@ -154,6 +158,10 @@ def keep_text(name: str, text: str, most: int = MOST) -> None:
                 work.replace(folder / name)
             finally:
                 work.unlink(missing_ok=True)
+        # To list the folder takes as long as to write: a process does so for its first text and for
+        # every fiftieth part of `most`.
+        if next(_WRITTEN) % max(most // 50, 1):
+            return
         kept = list(os.scandir(folder))
         if len(kept) > most:
             for old in sorted(kept, key=_age)[: len(kept) - 3 * most // 4]:
