@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
-from mechanisms import CLIENTS, NIGHTLY, TILTED
+from mechanisms import CLIENTS, TILTED
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from test_cli import run
@@ -136,7 +136,7 @@ def test_rams_far_longer_than_the_platform_is_wide_are_not_singular():
     assert not pteron.kinematics.architecture(replace(robot, legs=far)).singular
 
 
-@NIGHTLY
+@CLIENTS
 def test_points_in_line_are_the_reason():
     robot = tilting.machine("3R", ("UPS",), 4)[0]
     legs = [

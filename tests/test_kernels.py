@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
-from mechanisms import CATALOG, MACHINES, MECHANISMS, NEAREST, NIGHTLY, gated, states
+from mechanisms import CATALOG, CLIENTS, MACHINES, MECHANISMS, NEAREST, gated, states
 
 import pteron
 from pteron import atomic
@@ -280,7 +280,7 @@ def test_the_inverse_dynamics_are_cheap(name):
         assert cost(base=base, grade="parametric") <= cheapest
 
 
-@NIGHTLY
+@CLIENTS
 def test_every_working_mode_is_cheap():
     for mode in pteron.working_modes(ROBOT):
         assert pteron.compile(mode, "inverse_dynamics").operations <= 385

@@ -244,7 +244,7 @@ def test_singular_poses_at_the_edge_of_the_reach_are_found(pose, known, most):
         np.testing.assert_allclose(*sizes, rtol=2e-3)
 
 
-@NIGHTLY
+@CLIENTS
 def test_a_sheet_that_is_in_reach_in_a_corner_only_is_found():
     """Leg 4 folds within the reach of legs 1 and 2 only where both of them fold too."""
     robot = CATALOG["h4"]
@@ -257,7 +257,7 @@ def test_a_sheet_that_is_in_reach_in_a_corner_only_is_found():
     assert squares[2] > 0.01
 
 
-@NIGHTLY
+@CLIENTS
 def test_singular_poses_of_a_pose_beyond_its_joints_limits_are_found():
     """Limits do not count: where the sliders are below theirs the towers' corners are as near."""
     robot = CATALOG["linear-delta"]

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import tilting
-from mechanisms import CLIENTS, NIGHTLY, TILTED, gated
+from mechanisms import CLIENTS, TILTED, gated
 from test_cli import run
 
 import pteron
@@ -73,7 +73,7 @@ def test_the_cycle_of_a_tripod_on_a_wall_goes_along_its_axis():
     np.testing.assert_allclose(np.ptp(cycle.pose[:, 0]), 0.0125, rtol=1e-2)
 
 
-@NIGHTLY
+@CLIENTS
 def test_a_cube_is_found_where_it_is_far_smaller_than_the_machine():
     found = largest_cube("rubin-m2-hexapod", np.zeros(6))
     assert found.edge > 0.02

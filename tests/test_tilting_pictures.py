@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from mechanisms import CLIENTS, NIGHTLY
+from mechanisms import CLIENTS
 from PIL import Image
 from scipy.spatial import ConvexHull
 from test_viewer import opened, slide, wait_for
@@ -146,7 +146,7 @@ def test_the_viewer_moves_a_platform_by_its_angles():
         session.type_pose("1 2 3")
 
 
-@NIGHTLY
+@CLIENTS
 def test_a_tripods_page_has_its_angles(browser):
     with view(pteron.load("ball-table"), port=0) as viewer:
         with opened(browser, viewer.url) as page:
@@ -159,7 +159,7 @@ def test_a_tripods_page_has_its_angles(browser):
         assert viewer.faults == ()
 
 
-@NIGHTLY
+@CLIENTS
 @pytest.mark.parametrize("name", ["ball-table", "stewart"])
 def test_a_report_has_slices_of_angles_and_the_tilt(name, tmp_path):
     robot = pteron.load(name)

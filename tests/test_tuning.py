@@ -185,7 +185,7 @@ def test_each_rate_lags_as_its_own_encoder_has_it(encoder: str, sensors: Sensors
         assert sign * grows(robot, tuned.controller, home, duration, **given) > 0.0
 
 
-@NIGHTLY
+@CLIENTS
 def test_a_margin_is_that_of_the_mode_that_grows_first() -> None:
     """An error that is alike along all axes of an Orthoglide excites one mode, of another margin.
 
@@ -259,7 +259,7 @@ def test_the_closed_loops_poles_are_those_of_the_simulations_own_steps() -> None
     assert np.sort(np.abs(own))[: -2 * m].max() < 1e-6
 
 
-@NIGHTLY
+@CLIENTS
 @pytest.mark.parametrize("controller", [PDGravity(), ComputedTorque(), Adaptive()])
 def test_other_laws_are_stable_just_within_their_margins(controller: Controller) -> None:
     robot, delay = driven("five-bar"), 2e-4
