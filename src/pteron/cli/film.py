@@ -31,7 +31,7 @@ def film(
 
     The view is the same from the first frame to the last, or goes round the machine with --turns;
     the film says its speed in a corner. Ctrl-C leaves no file. An MP4 is H.264 as browsers and
-    slides play it, and needs FFmpeg, which the extra film brings.
+    slides play it, and needs FFmpeg, which comes with Pteron's extra named film.
 
     Options
     -------
@@ -41,7 +41,7 @@ def film(
     --fps: Frames a second.
     --size WIDTHxHEIGHT: Width and height, pixels, both even.
     --turns: Turns of the view round the machine over the film; not for planar machines.
-    --forces: Draw the drives' forces below.
+    --forces: Draw the drives' forces below the machine.
 
     Examples
     --------

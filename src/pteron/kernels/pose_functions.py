@@ -1,4 +1,7 @@
-"""Functions of poses and of their rates that can be compiled, with the conditions they need."""
+"""The table of functions of poses and rates that can be compiled.
+
+Each has its inputs, its equations, and the conditions on the pose under which its result counts.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,7 @@ from pteron.kernels.entries import (
 
 
 def _inverse_kinematics(m: Machine, pose: Expression) -> Expression:
-    # A slider's coordinate exists out of reach too; a machine that cannot be there has none.
+    # A slider's equation has a value out of reach too; `beyond_reach` makes it NaN there.
     return kinematics.inverse_position(m, pose) + kinematics.beyond_reach(m, pose)
 
 

@@ -29,7 +29,7 @@ from pteron.legs.reading import Reading
 from pteron.legs.rods import rod_body, universal_joints
 
 _FAST = 10.0
-"""Ratio beyond which a gear is likelier to be the motor's."""
+"""Ratio of a shaft's gear from which it is probably that of the motor's gear instead."""
 
 
 def _check_ratio(ratio: float) -> None:

@@ -38,7 +38,9 @@ class PlaneAxes(MachineAxes):
         *,
         small: bool = False,
     ) -> None:
-        """Make the axes for x and y along the rows (2, 3) of `plane`, with squares of a side, m.
+        """Make the axes for x and y along the two rows of `plane`, shape (2, 3).
+
+        The grid's squares have sides of `step`, m.
 
         They take a box of the figure (left, bottom, width, height, shares of it), or all of it;
         `small` ones have no scales.

@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 ROUNDING = 1e-13
-"""Largest singular value, relative to the greatest, that is taken for rounding, which is 1e-16 to
-1e-14: a rank that drops a larger one is told as unclear."""
+"""Largest singular value, relative to the greatest, that counts as rounding, which is 1e-16 to
+1e-14. A rank that drops a larger one is called unclear."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Doubts about a motion whose forces are not those that the machine needs for it."""
+"""Warnings of a report where the forces in a motion's file are not those that the machine needs."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pteron.manipulator import Manipulator
 from pteron.playback import Playback
 
 _CLEAR = 0.1
-"""RMS of a difference, as a share of the largest force's, above which it is told: no friction of a
-good drive and no smoothing of a log is as large, while a payload is."""
+"""RMS of a difference, as a share of the largest force's, above which it is a warning: no friction
+of a good drive and no smoothing of a log is as large, while a payload is."""
 
 
 def force_doubts(robot: Manipulator, given: Playback) -> tuple[str, ...]:
-    """Return a doubt where the forces that came with a motion are clearly those of another load.
+    """Return a warning where the forces in a motion's file are clearly those of another load.
 
-    A report shows what the machine needs, and not what the file has: a file that was made with a
-    payload would else seem to be shown with it.
+    A report shows the forces that the machine needs. The reader of a file that was made with a
+    payload would otherwise take them for the file's.
     """
     motion, loaded = given.motion, ""
     if given.payload:

@@ -17,11 +17,11 @@ _MOST = 120
 """Most harmonics of a series where no highest frequency is given."""
 
 _SIGNIFICANT = 5.0
-"""Size of a harmonic, in standard deviations of noise, above which it belongs to the motion: by
-chance, one in a million does."""
+"""Size of a harmonic, in standard deviations of noise, above which it counts as motion. Of
+harmonics that are noise alone one in a million is as large."""
 
 _SHARE = 0.4
-"""Harmonics that a fit can tell from noise, for each sample in a period."""
+"""Most harmonics of a fit, as a share of the samples in a period."""
 
 _ROUNDING = 1e-15
 """Rounding of a signal, relative to its size: noise is taken to be at least this."""
@@ -29,7 +29,9 @@ _ROUNDING = 1e-15
 
 @dataclass(frozen=True)
 class Projection:
-    """Least squares of samples at times (T,), s, onto the lowest harmonics of a period (s).
+    """The least-squares fit of a period's lowest harmonics to samples at given times.
+
+    `time`, shape (T,), and `period` are in s.
 
     The basis is nearly orthogonal over a whole period or more, so that the normal equations are
     well conditioned.

@@ -30,13 +30,13 @@ class Sensors:
     noise : float or array, shape (n,)
         Standard deviation of the coordinates' noise before they are rounded, m or rad.
     seed : int
-        Of the noise.
+        Seed of the noise.
     motor_encoder : float or array, shape (n,), optional
         Step of encoders at the motors, counted at the joints; by default that of `encoder`.
     delay : float
         How old a reading is when the controller gets it, s.
     samples : int
-        The same in whole samples, in addition.
+        A further delay, in whole samples.
     """
 
     encoder: float | tuple[float, ...] = 0.0

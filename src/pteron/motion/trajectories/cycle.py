@@ -1,4 +1,4 @@
-"""The pick-and-place cycle in time: the tool goes up, across, down, and back, in one unit of time.
+"""The pick-and-place cycle in time: the tool goes up, across, down, and back, in time from 0 to 1.
 
 A planar machine stays in its plane: up is then against the part of gravity in the plane or, where
 there is none, at a right angle to across.
@@ -27,7 +27,8 @@ _LIFT_ENDS = 0.4
 """Share of the path out in which the platform rises, and again in which it sinks."""
 
 _ACROSS_BEGINS = 0.15
-"""Share of the path out after which it sets off across: that rounds the corners and saves time."""
+"""Share of the way out after which the platform sets off across: to start before it is up rounds
+the corners and saves time."""
 
 _NONE = 1e-9
 """Share of a vector below which a component counts as zero."""
