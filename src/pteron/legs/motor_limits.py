@@ -1,4 +1,4 @@
-"""What a motor's curve and winding leave of a drive's force at a speed, at the joint."""
+"""The greatest force of a drive at a speed: the limits of its motor's curve and winding."""
 
 from __future__ import annotations
 

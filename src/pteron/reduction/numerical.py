@@ -35,7 +35,7 @@ class _Scaled(NamedTuple):
 
     matrix: Array
     lengths: Array
-    """Of the columns as they were; infinite for one that does nothing."""
+    """Lengths of the columns before scaling; infinite where a column is rounding alone."""
     states: int
 
 
