@@ -28,6 +28,7 @@ _SCRIPTS = {
     "Commands that one waits for": "waiting.py",
     "Memory traffic": "memory_traffic.py",
     "The paper's 41 %": "paper_claim.py",
+    "The paper's inverse position": "inverse_position.py",
     "Reachy Mini's own kinematics": "reachy_mini.py",
     "Excitation": "excitation.py",
     "The same free motion in MuJoCo": "mujoco_convergence.py",

@@ -31,13 +31,15 @@ def main() -> None:
         print(f"\n{name:<58}{f'{complete} parameters':>15}{f'{reduced} base':>12}")
         row("Eq. (15) as written, J^-T [...] P", *pair(forms, "regressor"))
         row("Eq. (15), J^-T last", *pair(forms, "regressor, J^-T last"))
-        standard, factored = pair(forms, "factored")
+        standard, factored = forms["factored", "complete"], forms["factored", "cheapest"]
         row("factored, parameters as inputs", standard, factored)
         folded = pteron.compile(robot, "inverse_dynamics").operations
         folded_base = pteron.compile(robot, "inverse_dynamics", base=cheapest).operations
         row("factored, the machine's numbers folded in (specialised)", folded, folded_base)
         general = pteron.compile(robot, "inverse_dynamics", grade="general").operations
         row("factored, geometry as an input too (general)", general, None)
+        row("factored, the base parameters of `base_parameters`", *pair(forms, "factored"))
+        row("Eq. (13), body by body", *pair(forms, "virtual work"))
 
         written = forms["regressor", "complete"]
         print(f"reduced against Eq. (15) as written: {fewer(factored, written)}")

@@ -20,7 +20,7 @@ from pteron.legs.cones import Cone
 from pteron.reduction import FORMS
 from pteron.report import write_report
 from pteron.report.contents import contents
-from pteron.report.costs import dense_operations
+from pteron.report.costs import PAPER_CLAIM, dense_operations
 from pteron.report.page import bodies, geometry, in_symbols, lettered, page
 from pteron.report.typeset import fixed, significant, triple
 from pteron.report.write import checked_folder, numbers
@@ -326,8 +326,11 @@ def test_the_page_shows_the_numbers(name):
 
 def test_costs_come_in_pairs_with_percentages_of_the_counts():
     found = report("quadrupteron")
-    assert len(found.costs) == 2 * (1 + len(FORMS))
-    for complete, reduced in zip(found.costs[::2], found.costs[1::2], strict=True):
+    assert PAPER_CLAIM in html("quadrupteron")
+    *pairs, cheapest = found.costs
+    assert len(pairs) == 2 * (1 + len(FORMS))
+    assert cheapest.operations < pairs[-1].operations < pairs[-2].operations
+    for complete, reduced in zip(pairs[::2], pairs[1::2], strict=True):
         share = 100.0 * (1.0 - reduced.operations / complete.operations)
         assert reduced.note == f"{share:.0f} % fewer operations"
         assert complete.note == ""

@@ -1,25 +1,44 @@
-"""The place in the code of each numbered equation of the theory; a test checks both ends."""
+"""The place in the code of each numbered equation of the theory; a test checks both ends.
+
+The paper's are found by their labels in the source (`paper_labels`); ours are listed here.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from paper_labels import labels
 
 _E, _L, _R = "pteron.equations", "pteron.legs", "pteron.reduction"
 
+
+def _documented(file: str, name: str) -> str | None:
+    """Return the dotted name of the nearest public function or class around a label, if any."""
+    module = "pteron." + file.removesuffix(".py").replace("/", ".")
+    parts = name.split(".")
+    while parts:
+        thing: Any = importlib.import_module(module)
+        for part in parts:
+            thing = getattr(thing, part, None)
+        if callable(thing) and not any(part.startswith("_") for part in parts):
+            return ".".join((module, *parts))
+        parts.pop()
+    return None
+
+
+def _of_the_paper() -> dict[str, tuple[str, ...]]:
+    """Return the places of equations 1 to 16."""
+    places: dict[str, dict[str, None]] = {str(number): {} for number in range(1, 17)}
+    for label in labels():
+        place = _documented(label.file, label.name)
+        if label.number.startswith("Eq. ") and place:
+            places[label.number[5:-1]][place] = None
+    return {number: tuple(found) for number, found in places.items()}
+
+
 CODE: dict[str, tuple[str, ...]] = {
-    # The paper's.
-    "1": (f"{_L}.circles.links_from_triangle",),
-    "2": (f"{_L}.circles.links_from_triangle",),
-    "3": (f"{_L}.prrr.PRRREquations",),
-    "4": (f"{_L}.prrr.PRRREquations.motion", f"{_E}.kinematics.inverse_position"),
-    "5": (f"{_L}.prrr.PRRREquations",),
-    "6": (f"{_E}.kinematics.link_vectors", f"{_L}.circles.links_from_triangle"),
-    "7": (f"{_E}.kinematics.link_vectors", f"{_L}.circles.links_from_triangle"),
-    "8": (f"{_E}.kinematics.joint_screws",),
-    "9": (f"{_E}.kinematics.joint_screws", f"{_E}.kinematics.passive_motion"),
-    "10": (f"{_E}.kinematics.jacobian",),
-    "11": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),
-    "12": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),
-    "13": (f"{_E}.virtual_work.inverse_dynamics", f"{_L}.leg.LegEquations.needs_of_bodies"),
-    "14": (f"{_E}.virtual_work.needed_forces", "pteron.bodies.motion.needed_wrench"),
-    "15": (f"{_E}.regressor.paper_regressor", f"{_E}.virtual_work.inverse_dynamics"),
-    "16": ("pteron.bodies.parameters.parameter_list", "pteron.bodies.inertia.PlanarInertia"),
+    **_of_the_paper(),
     # Ours: kinematics.
     "K1": (f"{_L}.circles.squared_reach",),
     "K2": (f"{_L}.prrr.PRRREquations",),

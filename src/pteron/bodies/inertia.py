@@ -112,8 +112,8 @@ class _TurningInertia:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """m, m gamma_x, ... and I, in the order of its kinds and of the paper's Eq. (16)."""
-        return (self.mass, *self.first_moment, self.inertia)
+        """m, m gamma_x, ... and I, in the order of its kinds."""
+        return (self.mass, *self.first_moment, self.inertia)  # Eq. (16), p_u, p_l or p_e
 
 
 @dataclass(frozen=True)

@@ -134,7 +134,7 @@ def needed_wrench(
     """Return the force and the moment, each (3, K), that a body needs at its reference point.
 
     With h = hx x + hy y: force m (a - g) + h'' and moment h x (a - g) + I x x x''. For a body in a
-    plane the last is I theta'' z. The paper's F is what acts on the body, minus this: Eq. (14).
+    plane the last is I theta'' z. The paper's F is what acts on the body, minus this.
     """
     a_g = body.acceleration - gravity
     force = ca.mtimes(a_g, inertia.m)
@@ -153,7 +153,7 @@ def wrench_matrix(body: BodyMotion, gravity: Expression) -> Expression:
     """Return Om (6, k) of Eq. (15): what acts on a body, per unit of each of its k parameters."""
     unit = ca.SX.eye(len(body.kinds))
     inertia = moments_of(body.kinds, ca.vertsplit(unit))
-    return -ca.vertcat(*needed_wrench(body, inertia, gravity))
+    return -ca.vertcat(*needed_wrench(body, inertia, gravity))  # Eq. (15), Omega of one body
 
 
 def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:

@@ -130,4 +130,4 @@ def parameter_list(
         for kind in legs[group[0] - 1].get(body, ())
     ]
     carried = [Parameter(kind, PLATFORM, (), unit_of(kind)) for kind in platform]
-    return (*found, *carried)
+    return (*found, *carried)  # Eq. (16)

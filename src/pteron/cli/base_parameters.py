@@ -141,7 +141,12 @@ def table1() -> Result:
         (r.parameter, plain(r.printed), plain(r.computed), verdicts[r.agrees] + " *" * r.restored)
         for r in found
     )
-    note = "* damaged in the scan of the paper; restored from its legible rows"
+    restored = [r.parameter for r in found if r.restored]
     agree = f"{len(found) - wrong} of {len(found)} rows agree."
-    told = [table("", "printed", "computed", "agrees", rows=rows), agree, note]
+    if restored:
+        agree += (
+            f" Cells of {', '.join(restored)} (*) are damaged in our text of the paper and "
+            "restored from its other rows."
+        )
+    told = [table("", "printed", "computed", "agrees", rows=rows), agree]
     return Result(data, told, code=1 if wrong else 0)

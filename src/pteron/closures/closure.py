@@ -2,7 +2,7 @@
 
 The platform's matrices d(c, omega)/dx take the pose's rates x' to (c', omega), the velocity of a
 leg's platform point and the platform's angular velocity; a leg's row takes these to its joint rate.
-Together they make up the Jacobian J, Eq. (10): q' = J x'. A closure applies J^-T to wrenches and
+Together they make up the Jacobian J: q' = J x'. A closure applies J^-T to wrenches and
 J^-1 to rates, finds poses from joint coordinates, and measures how far J is from singular.
 A kind of closure is a subclass in this folder, entered in `closures.KINDS`.
 """

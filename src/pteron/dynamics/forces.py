@@ -16,7 +16,7 @@ def inverse_dynamics(
     *,
     on_failure: OnFailure = "raise",
 ) -> PerJoint:
-    """Return the actuator forces of a motion, by virtual work, Eqs. (13) and (14).
+    """Return the actuator forces of a motion, by virtual work, Eq. (13).
 
     F_a = - F_p - J^-T (sum J_u^T F_u + sum J_l^T F_l + F_e), without friction.
 

@@ -1,4 +1,4 @@
-"""Kinematics, inverse and direct: positions, reach, margins, Jacobians, rates; Eqs. (4) to (12)."""
+"""Kinematics, inverse and direct: positions, reach, margins, Jacobians, rates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FAR = 1e3
 
 
 def inverse_position(machine: Machine, pose: Expression) -> Expression:
-    """Return the joint coordinates (n, 1), Eq. (4)."""
+    """Return the joint coordinates (n, 1)."""
     return ca.vertcat(*(leg.coordinate for leg in machine.state(pose).legs))
 
 
@@ -32,7 +32,7 @@ def reach(machine: Machine, pose: Expression) -> list[Reach]:
 def beyond_reach(machine: Machine, pose: Expression) -> Expression:
     """Return, for every leg (n, 1), NaN where it does not reach the pose, 0 where it does."""
     found = reach(machine, pose)
-    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))
+    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))  # Remark 2
 
 
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
@@ -111,7 +111,7 @@ def jacobian(state: State) -> Expression:
     """Return J (n, m), Eq. (10): the legs' rows times their points' matrices."""
     pairs = zip(state.legs, state.platform.matrices, strict=True)
     rows = ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, matrix) for leg, matrix in pairs))
-    return state.platform.pose_rows(rows)
+    return state.platform.pose_rows(rows)  # Eq. (10)
 
 
 def twist_jacobian(state: State) -> Expression:
@@ -129,7 +129,7 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
     if body is None:
         return None
     rows = ca.vertcat(body.velocity_row, body.turning_row)
-    return state.platform.pose_rows(ca.mtimes(rows, state.platform.matrices[i]))
+    return state.platform.pose_rows(ca.mtimes(rows, state.platform.matrices[i]))  # Eqs. (11), (12)
 
 
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
@@ -144,7 +144,7 @@ def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
 
 
 def link_vectors(state: State) -> tuple[Expression, Expression]:
-    """Return l_u and l_l of every leg, each (n, 3): Eqs. (6) and (7); NaN where it has none."""
+    """Return l_u and l_l of every leg, each (n, 3); NaN where it has none."""
 
     def rows(k: int) -> Expression:
         links = (leg.links[k] for leg in state.legs)
@@ -204,7 +204,7 @@ def platform_rates(
 
 
 def joint_screws(state: State) -> list[Expression]:
-    """Return the unit screws of every leg's joints about P, from the base to the platform, Eq. (8).
+    """Return the unit screws of every leg's joints about P, from the base to the platform.
 
     Each is (6, j), rows omega, then v; NaN for a joint that a leg has not. Where d is parallel to
     k, R4 of a P-R-R-R leg coincides with R3.
@@ -213,7 +213,7 @@ def joint_screws(state: State) -> list[Expression]:
 
     def screw(joint: Joint) -> Expression:
         if joint.kind == "P":
-            return ca.vertcat(ca.SX(3, 1), joint.axis)
-        return ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis))
+            return ca.vertcat(ca.SX(3, 1), joint.axis)  # Eq. (8), of P
+        return ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis))  # Eq. (8), of R
 
     return _chains(state, screw)

@@ -1,12 +1,14 @@
 """The regressor as the paper's Eq. (15) writes it: J^-T [ J^T Om_p  J_u^T Om_u  J_l^T Om_l  Om_e ].
 
 Om are the wrenches on sliders, links and platform per unit of their parameters. `virtual_work`
-gives the same regressor at less cost; this form checks it. `Terms` keeps the factors apart.
+gives the same regressor at less cost; this form checks it. `Terms` keeps the factors apart, for
+benchmarks of how they are multiplied.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import casadi as ca
 
@@ -24,6 +26,8 @@ class Terms:
     """J (n, m)."""
     sliders: Expression
     """Om_p (n, n): for each slider the force on it, per unit of its mass; zero without one."""
+    with_slider: tuple[int, ...]
+    """The legs, from 0, that have a slider: the columns of Om_p that have a parameter."""
     link_jacobians: tuple[Expression, ...]
     """J_u1..J_un, J_l1..J_ln, each (6, m)."""
     links: tuple[Expression, ...]
@@ -31,39 +35,44 @@ class Terms:
     platform: Expression
     """Om_e (m, k), a column for each of the platform's k parameters."""
 
+    @property
+    def columns(self) -> list[slice]:
+        """Places of the parameters in P: of the sliders, of each link, of the platform."""
+        sizes = [len(self.with_slider), *(om.shape[1] for om in (*self.links, self.platform))]
+        return [slice(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
+
+    @property
+    def bracket(self) -> Expression:
+        """The bracket of Eq. (15), (m, N)."""
+        links = (
+            ca.mtimes(jac.T, matrix)
+            for jac, matrix in zip(self.link_jacobians, self.links, strict=True)
+        )
+        sliders = ca.mtimes(self.jacobian.T, self.sliders[:, self.with_slider])
+        return ca.horzcat(sliders, *links, self.platform)  # Eq. (15)
+
 
 def terms(machine: Machine, state: State) -> Terms:
     """Return the factors of Eq. (15)."""
     slider, *links = LEG_BODIES
     n = len(machine.legs)
-    diagonal = []
-    for leg in state.legs:
-        body = leg.bodies.get(slider)
-        force = ca.SX(1, 1)
-        if body is not None:
-            force = ca.dot(leg.driven.axis, machine.gravity - body.acceleration)
-        diagonal.append(force)
+    with_slider = tuple(i for i in range(n) if slider in state.legs[i].bodies)
+    forces = [ca.SX(1, 1)] * n
+    for i in with_slider:
+        leg = state.legs[i]
+        acceleration = leg.bodies[slider].acceleration
+        forces[i] = ca.dot(leg.driven.axis, machine.gravity - acceleration)  # Eq. (14), m_p = 1
     places = [(i, link) for link in links for i in range(n) if link in state.legs[i].bodies]
     jacobians = [body_jacobian(state, i, link) for i, link in places]
     matrices = [wrench_matrix(state.legs[i].bodies[link], machine.gravity) for i, link in places]
     return Terms(
         jacobian(state),
-        ca.diag(ca.vertcat(*diagonal)),
+        ca.diag(ca.vertcat(*forces)),
+        with_slider,
         tuple(jacobians),
         tuple(matrices),
         state.platform.pose_forces(machine.platform.wrench_matrix(state.platform, machine.gravity)),
     )
-
-
-def generalized_regressor(machine: Machine, state: State) -> Expression:
-    """Return the bracket of Eq. (15), (m, N)."""
-    parts = terms(machine, state)
-    with_slider = [i for i, leg in enumerate(state.legs) if LEG_BODIES[0] in leg.bodies]
-    links = (
-        ca.mtimes(jac.T, body) for jac, body in zip(parts.link_jacobians, parts.links, strict=True)
-    )
-    sliders = ca.mtimes(parts.jacobian.T, parts.sliders[:, with_slider])
-    return ca.horzcat(sliders, *links, parts.platform)
 
 
 def paper_regressor(machine: Machine, state: State) -> Expression:
@@ -71,5 +80,5 @@ def paper_regressor(machine: Machine, state: State) -> Expression:
 
     Omega holds what acts on the bodies, so that the forces which balance it carry a minus sign.
     """
-    bracket = state.platform.quasi_forces(generalized_regressor(machine, state))
-    return -machine.closure.forces(bracket, state.platform, state.legs)
+    bracket = state.platform.quasi_forces(terms(machine, state).bracket)
+    return -machine.closure.forces(bracket, state.platform, state.legs)  # J^-T of Eq. (15)

@@ -1,10 +1,10 @@
-"""Inverse dynamics by virtual work, Eqs. (13) and (14), in factored form.
+"""Inverse dynamics by virtual work, Eq. (13), in factored form.
 
 The wrenches that a leg's bodies need become a force at its joint and a load at its platform point,
 by rows against (c', omega), the velocity of that point and the platform's angular velocity; J_u and
-J_l of Eq. (13) are never multiplied out. The paper's F_b of Eq. (14) acts on a body; forces here
-are those that bodies need, -F_b. One column of parameters gives the inverse dynamics, the identity
-matrix the regressor of Eq. (15).
+J_l of Eq. (13) are never multiplied out. The paper's F_b acts on a body; forces here are those
+that bodies need, -F_b. One column of parameters gives the inverse dynamics, the identity
+matrix the regressor.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ def inverse_dynamics(
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
         load = load - machine.platform.applied(state.platform, wrench)
-    return joints + machine.closure.forces(load, state.platform, state.legs)
+    forces = machine.closure.forces(load, state.platform, state.legs)
+    return joints + forces  # Eq. (13), Contribution 2, Section 4
 
 
 def generalized_forces(machine: Machine, state: State, parameters: Expression) -> Expression:

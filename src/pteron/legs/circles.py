@@ -1,4 +1,4 @@
-"""Two links that close a triangle: the intersection of two circles, the paper's Lemma 1.
+"""Two links that close a triangle: the intersection of two circles.
 
 Vectors of the links' plane are two-vectors (2, 1); `plane_of` gives its axes. The random vectors
 are rational: exact reduction closes legs with them.
@@ -23,7 +23,7 @@ _ROUNDING = 1e-15
 
 def edges_of_reach(lu: Expression, ll: Expression, n2: Expression) -> tuple[Expression, Expression]:
     """Return (lu + ll)^2 - n2 and n2 - (lu - ll)^2, negative beyond reach; n2 is u . u."""
-    longest, shortest = lu + ll, lu - ll
+    longest, shortest = lu + ll, lu - ll  # Remark 1: radii, not diameters
     return longest * longest - n2, n2 - shortest * shortest
 
 
@@ -41,16 +41,16 @@ def quarter_turn(v: Expression) -> Expression:
 def links_from_triangle(
     lu: Expression, ll: Expression, sigma: Expression, u: Expression
 ) -> tuple[Expression, Expression, Expression]:
-    """Return links l_u + l_l = u (Eqs. 1 and 2, or 6 and 7) and 1/D with D = (l_u x l_l) . d.
+    """Return links l_u + l_l = u (Eqs. 1 and 2) and 1/D with D = (l_u x l_l) . d.
 
     D = -sigma sqrt(Delta) / 2: twice the area of the links' triangle.
     """
     n2 = ca.dot(u, u)
     root = ca.sqrt(squared_reach(lu, ll, n2))
-    share = 0.5 + (0.5 * (lu * lu - ll * ll)) / n2
+    share = 0.5 + (0.5 * (lu * lu - ll * ll)) / n2  # Lemma 1, Contribution 1
     offset = (0.5 * sigma) * (root / n2)
-    l_u = share * u + offset * quarter_turn(u)
-    return l_u, u - l_u, (-2 * sigma) / root
+    l_u = share * u + offset * quarter_turn(u)  # Eq. (1)
+    return l_u, u - l_u, (-2 * sigma) / root  # Eq. (2)
 
 
 def first_moment(

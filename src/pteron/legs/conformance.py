@@ -156,7 +156,7 @@ def _forces(at: _Moved) -> Iterator[str]:
     power = ca.dot(plain.point, at.twist)
     yield from differing(
         {
-            "needs: not what its bodies need, Eqs. (13) and (14)": (
+            "needs: not what its bodies need, body by body": (
                 whole + ca.mtimes(row.T, joint),
                 plain.point,
             ),

@@ -187,7 +187,7 @@ class CrankEquations(LegEquations):
         """Return the last link in motion, the joints after the crank, and how the link turns."""
 
     def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return u, h and lu^2 u.u - h^2, a quarter of the Delta of Lemma 1, for w = c - r.
+        """Return u, h and lu^2 u.u - h^2, a quarter of the Delta of two circles, for w = c - r.
 
         The length of the last link is |w - l_u| = ll, so that u . l_u = h, u being in the plane.
         """

@@ -85,7 +85,7 @@ class LegMotion(NamedTuple):
     reference point is the platform point, and its x points there from the joint."""
     chain: tuple[Joint, ...]
     """The joints from the base to the platform, all of them: their screws times their rates are the
-    platform's twist, Eq. (9). Their points, in this order, are what is drawn."""
+    platform's twist. Their points, in this order, are what is drawn."""
     links: tuple[Expression | None, Expression | None] = (None, None)
     """l_u and l_l, where the leg has them."""
     turning: tuple[tuple[Expression, Expression] | None, ...] = (None, None)
@@ -282,15 +282,15 @@ class LegEquations(ABC):
     ) -> Needs:
         """Return what the leg's bodies need, body by body, as the paper writes it.
 
-        Eq. (14) is the wrench F_b that acts on a body by its weight and inertia; what the body
-        needs is -F_b. Eq. (13) sums J_b^T of it, J_b being the body's rows against (c', omega).
+        F_b is the wrench that acts on a body by its weight and inertia; what the body needs is
+        -F_b. Eq. (13) sums J_b^T F_b, J_b being the body's rows against (c', omega).
         """
         motion = self.motion(point, rotation)
         columns = next(iter(inertia.values())).m.shape[1]
         total = ca.SX(6, columns)
         for letter, body in motion.bodies.items():
-            force, moment = needed_wrench(body, inertia[letter], gravity)  # -F_b, Eq. (14)
-            total = total + ca.mtimes(body.velocity_row.T, force)  # J_b^T, Eq. (13)
+            force, moment = needed_wrench(body, inertia[letter], gravity)  # -F_b
+            total = total + ca.mtimes(body.velocity_row.T, force)  # Eq. (13), J_b^T F_b of one body
             if body.axes is not None:
                 total = total + ca.mtimes(body.turning_row.T, moment)
         return Needs(ca.SX(1, columns), total, ca.SX(1, columns))

@@ -41,7 +41,7 @@ def link_body(
     turning: Turning,
 ) -> BodyMotion:
     """Return a link in motion: its reference point's place, row (3, 6) and acceleration; its x."""
-    y = quarter_turn(x)
+    y = quarter_turn(x)  # Fig. 3
     along, square = turning.acceleration, turning.rate * turning.rate
     vectors = (x, y, along * y - square * x, -along * x - square * y)
     placed = (ca.mtimes(plane, vector) for vector in vectors)
@@ -52,7 +52,7 @@ def lower_link_body(
     point: PointMotion, d: Expression, plane: Expression, x: Expression, turning: Turning
 ) -> BodyMotion:
     """Return the link that ends at the platform point, its reference point."""
-    rides = point.position, point_rows(ca.SX.eye(3)), point.acceleration
+    rides = point.position, point_rows(ca.SX.eye(3)), point.acceleration  # Fig. 3, origin on R3
     return link_body(rides, d, plane, x, turning)
 
 
@@ -72,7 +72,7 @@ def last_joints(
     for turn in rotation.turns:
         along, apart = ca.dot(d, turn.axis), ca.cross(d, point.position - at)
         one = ca.logic_and(ca.fabs(along) > _PARALLEL, ca.dot(apart, apart) < _COINCIDENT**2)
-        sense = ca.if_else(one, along, 0)
+        sense = ca.if_else(one, along, 0)  # Section 2: where d is along k, U is R
         motion = turn.row, turn.rate, turn.acceleration
         ankle = Turning(*(a + sense * b for a, b in zip(ankle, motion, strict=True)))
         rest = 1 - sense * sense

@@ -214,9 +214,8 @@ class PRRREquations(LegEquations):
             self.d_bar = direction / ca.dot(direction, slider_direction)
             self.e_plane = ca.mtimes(self.plane.T, slider_direction)
         self.constant_row = self.d_bar
-        # r + rho e + u = c, Eq. (3): u = across (c - r) is the part of c - r - rho e in the plane,
-        # Eq. (5).
-        self.across = self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)
+        # u = across (c - r) is the part of c - r - rho e in the plane: r + rho e + u = c.
+        self.across = self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)  # Eq. (3)
 
     def _state(self, point: PointMotion) -> _InPlane:
         """Return the links and their motion, in the leg's plane.
@@ -225,9 +224,9 @@ class PRRREquations(LegEquations):
         ll^2, theta_u'' = l_l . v / D and theta_l'' = -l_u . v / D, v = u'' + theta_u'^2 l_u +
         theta_l'^2 l_l.
         """
-        u = ca.mtimes(self.across, point.position - self.r)
+        u = ca.mtimes(self.across, point.position - self.r)  # Eq. (5)
         du, ddu = (ca.mtimes(self.across, v) for v in (point.velocity, point.acceleration))
-        l_u, l_l, inverse_d = links_from_triangle(self.lu, self.ll, self.sigma, u)
+        l_u, l_l, inverse_d = links_from_triangle(self.lu, self.ll, self.sigma, u)  # Eqs. (6), (7)
         upper_row, lower_row = l_l * inverse_d, -(l_u * inverse_d)
         upper_rate, lower_rate = ca.dot(upper_row, du), ca.dot(lower_row, du)
         v = ddu + (upper_rate * upper_rate) * l_u + (lower_rate * lower_rate) * l_l
@@ -242,20 +241,20 @@ class PRRREquations(LegEquations):
         at = self._state(point)
         rho = ca.dot(self.d_bar, point.position - self.r)  # Eq. (4)
         rate, sliding = (ca.dot(self.d_bar, v) for v in (point.velocity, point.acceleration))
-        row = point_rows(self.d_bar.T)
-        r1 = self.r + rho * self.e
+        row = point_rows(self.d_bar.T)  # Eq. (10), the row of one leg
+        r1 = self.r + rho * self.e  # Fig. 1(b)
         slides = r1, ca.mtimes(self.e, row), sliding * self.e
         bodies = {
             "p": BodyMotion(*slides),
-            "u": link_body(slides, self.d, self.plane, at.l_u / self.lu, at.upper),
-            "l": lower_link_body(point, self.d, self.plane, at.l_l / self.ll, at.lower),
+            "u": link_body(slides, self.d, self.plane, at.l_u / self.lu, at.upper),  # Eq. (11)
+            "l": lower_link_body(point, self.d, self.plane, at.l_l / self.ll, at.lower),  # Eq. (12)
         }
         links = ca.mtimes(self.plane, at.l_u), ca.mtimes(self.plane, at.l_l)
-        chain = (
+        chain = (  # Eq. (9): the joints' screws times these rates
             Joint("P", self.e, self.r, row, rate, sliding, "p", driven=True),
             Joint("R", self.d, r1, *at.upper, "u"),
             Joint("R", self.d, r1 + links[0], *at.lower.less(at.upper), "l"),
-            *last_joints(self.d, point, at.lower, rotation),
+            *last_joints(self.d, point, at.lower, rotation),  # Fig. 2, its R3 and R4
         )
         angles = tuple((link.rate, link.acceleration) for link in (at.upper, at.lower))
         return LegMotion(rho, rate, sliding, row, ca.SX(1), bodies, chain, links, angles)
@@ -309,7 +308,7 @@ class PRRREquations(LegEquations):
         slider, upper, lower = (inertia[letter] for letter in self.kinds)
         sliding = ca.dot(self.d_bar, point.acceleration)
         weight = ca.mtimes(self.plane.T, gravity)
-        masses = (slider.m + upper.m) * (sliding - ca.dot(self.e, gravity))
+        masses = (slider.m + upper.m) * (sliding - ca.dot(self.e, gravity))  # Eq. (14), negated
         if lower.hx.is_zero():
             u = [ca.mtimes(self.across, v) for v in (point.position - self.r, *point[1:])]
             along, across = two_bar_needs(self, u, sliding, weight, (upper, lower))

@@ -83,7 +83,7 @@ class RRREquations(CrankEquations):
     def last_link(
         self, point: PointMotion, rotation: RotationMotion, at: CrankState, crank: Joint
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
-        """Return the lower link: theta_l' = -l_u . u' / D and theta_l'' = -l_u . v / D, as Eq. (7).
+        """Return the lower link: theta_l' = -l_u . u' / D and theta_l'' = -l_u . v / D.
 
         With v = u'' + theta_u'^2 l_u + theta_l'^2 b; D = b . g.
         """

@@ -203,7 +203,7 @@ class PlatformEquations(ABC):
         return needed_wrench(motion.body, inertia, gravity)
 
     def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
-        """Return Om_e (m, k) of Eq. (15): the wrench on it per unit of each of its k parameters."""
+        """Return Om_e (m, k): the wrench on it per unit of each of its k parameters."""
         return -self.needs(motion, gravity, self.moments(ca.vertsplit(ca.SX.eye(len(self.kinds)))))
 
     @abstractmethod

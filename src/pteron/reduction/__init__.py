@@ -15,7 +15,11 @@ if TYPE_CHECKING:
         base_parameters as base_parameters,
         base_regressor as base_regressor,
     )
-    from pteron.reduction.forms import FORMS as FORMS, model_forms as model_forms
+    from pteron.reduction.forms import (
+        FORMS as FORMS,
+        GRAPHS as GRAPHS,
+        model_forms as model_forms,
+    )
     from pteron.reduction.result import BaseParameters as BaseParameters
 
 _publish(__name__, checked=True)

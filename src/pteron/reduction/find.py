@@ -140,7 +140,7 @@ def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int
             f"keep: {given!r} is no list of parameter names; they are {', '.join(names)}"
         )
     first = [names.index(name) for name in dict.fromkeys(keep)]
-    return first + [column for column in default if column not in first]
+    return first + [column for column in default if column not in first]  # Section 5 (b)
 
 
 def base_regressor(
@@ -195,4 +195,4 @@ def base_regressor(
         raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
     motion = pose, velocity, acceleration
     matrices: Regressors = evaluated(robot, "base_regressor", on_failure, *motion, base=base)
-    return matrices
+    return matrices  # Section 5 (c), Contribution 3

@@ -46,7 +46,7 @@ def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed:
     least preferred first, as long as the null vectors' entries at them stay independent.
     """
     scaled = _scaled_regressor(robot, sharing, seed)
-    _, values, vectors = np.linalg.svd(scaled.matrix, full_matrices=True)
+    _, values, vectors = np.linalg.svd(scaled.matrix, full_matrices=True)  # Section 5 (a)
     values = np.pad(values, (0, scaled.matrix.shape[1] - len(values)))
     rank = int((values > _TOLERANCE * values[0]).sum())
     null = vectors[rank:].T

@@ -32,6 +32,7 @@ from pteron.plots.machine_figures import gravity_of
 from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
+from pteron.report.costs import PAPER_CLAIM
 from pteron.report.drive_figures import force_speed, power
 from pteron.report.motion_frames import few
 from pteron.report.moving_picture import stage
@@ -69,6 +70,7 @@ def page(report: Report) -> str:
             force_title=f"{'Drive' if report.driven else 'Actuator'} {force(joints).name}",
         ),
         report=report,
+        paper_claim=PAPER_CLAIM,
         cycle=report.cycle,
         standard=standard,
         way=way,

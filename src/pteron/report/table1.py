@@ -39,8 +39,9 @@ PRINTED = (
 """The 26 rows as the paper prints them, in this project's names."""
 
 RESTORED = frozenset({15, 21, 24})
-"""Rows that the scan of the paper damages (15 has m gamma_x of the platform twice, 21 lacks terms,
-24 an axis): they stand here as the other rows and the symmetry of the machine determine them."""
+"""Rows with cells that our text of the paper damages (15 has m gamma_x of the platform twice, 21
+lacks two terms, 24 an axis): they stand here as the other rows and the machine's symmetry determine
+them. docs/theory/corrections.md has each cell."""
 
 _TERM = re.compile(r"([+-]?)\s*([\d.]+)?\s*([A-Za-z]\w*)")
 """Pattern of a term of a printed row: sign, coefficient, name."""
@@ -64,7 +65,7 @@ class Row:
 
 def rows() -> tuple[Row, ...]:
     """Return the rows of Table 1, computed for the catalog's Quadrupteron."""
-    base = base_parameters(load("quadrupteron"))
+    base = base_parameters(load("quadrupteron"))  # Table 1
     columns = base.names, PRINTED, base.expressions(), base.expressions(digits=12)
     return tuple(
         Row(f"P_b{i}", name, printed, shown, agree(printed, exact), i in RESTORED)
