@@ -15,12 +15,14 @@ from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 
+import casadi as ca
 import numpy as np
 import pytest
 from mechanisms import inertia, relative_error, unit
 
 import pteron
 from pteron.kernels import count_operations
+from pteron.legs.circles import edges_of_reach, links_from_triangle, perpendicular_to
 from pteron.reduction import model_forms
 from pteron.report.costs import PAPER_CLAIM, dense_operations
 
@@ -212,15 +214,23 @@ def test_lemma_1_gives_two_links_of_their_lengths_that_close_and_stay_in_the_pla
             np.testing.assert_allclose(sizes, [lu, ll], atol=1e-14)
             np.testing.assert_allclose([l_u @ d, l_l @ d], 0.0, atol=1e-15)
             assert np.sign(np.cross(u, l_u) @ d) == sign
+            # The library's, in the plane's axes.
+            a = np.array(perpendicular_to(leg.direction))
+            plane = np.array([a, np.cross(d, a)])
+            flat = links_from_triangle(lu, ll, sign, ca.DM(plane @ u))[:2]
+            found = [plane.T @ vector.full().ravel() for vector in flat]
+            np.testing.assert_allclose(found, [l_u, l_l], atol=2e-15)
 
 
 def test_with_diameters_in_place_of_radii_the_circles_meet_elsewhere():
     """Remark 1 says diameters; the links' lengths are radii."""
-    d, u = np.array([0.0, 0.0, 1.0]), np.array([0.3, 0.0, 0.0])
-    l_u, _ = lemma(d, u, 0.2, 0.25, 1)
-    np.testing.assert_allclose(np.linalg.norm([l_u, u - l_u], axis=1), [0.2, 0.25])
-    halves, _ = lemma(d, 0.5 * u, 0.1, 0.125, 1)
-    assert not np.isclose(np.linalg.norm(halves), 0.2)
+    lu, ll = 0.2, 0.25
+    stretched, folded = edges_of_reach(lu, ll, (lu + ll) ** 2)
+    assert stretched == 0.0
+    assert folded > 0.0
+    assert edges_of_reach(lu, ll, (lu - ll) ** 2)[1] == 0.0
+    # Circles of these diameters would not meet at a distance of 0.3 m.
+    assert min(edges_of_reach(lu, ll, 0.3**2)) > 0.0 > min(edges_of_reach(0.5 * lu, 0.5 * ll, 0.09))
 
 
 @EVERY
