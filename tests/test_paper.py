@@ -399,8 +399,9 @@ def test_forces_of_the_sliders(seed):
 
 @EVERY
 def test_the_dynamic_matrix(seed):
-    """Eq. (15): column k of D is Eq. (13) with 1 for parameter k and 0 for all others."""
+    """Eq. (15): the library's regressor, and the form that it keeps as printed."""
     robot = quadrupteron(seed)
+    as_printed = pteron.compile(robot, "paper_regressor")
     for state, at in at_states(seed):
         blocks = omegas(robot, at, *state[1:])
         bracket = np.column_stack(
@@ -412,8 +413,8 @@ def test_the_dynamic_matrix(seed):
             ]
         )
         D = -np.linalg.solve(at.J.T, bracket)
-        found = pteron.regressor(robot, *state)
-        np.testing.assert_allclose(found, D, rtol=0, atol=1e-11 * np.abs(D).max())
+        for found in (pteron.regressor(robot, *state), as_printed(*state)):
+            np.testing.assert_allclose(found, D, rtol=0, atol=1e-11 * np.abs(D).max())
 
 
 def omegas(robot, at, dx, ddx):

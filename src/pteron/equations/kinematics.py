@@ -32,7 +32,7 @@ def reach(machine: Machine, pose: Expression) -> list[Reach]:
 def beyond_reach(machine: Machine, pose: Expression) -> Expression:
     """Return, for every leg (n, 1), NaN where it does not reach the pose, 0 where it does."""
     found = reach(machine, pose)
-    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))  # Remark 2
+    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))
 
 
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
@@ -90,7 +90,7 @@ def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression
             room = ca.fmin(room, ca.if_else(own < 0, own, FAR) if leg.follows_angle else own)
     status, nearest = ca.if_else(room < 0, -1, 0), ca.fmin(least, room)
     for at in found:
-        status = ca.if_else(at.discriminant < 0, worst, status)
+        status = ca.if_else(at.discriminant < 0, worst, status)  # Remark 2
         nearest = ca.if_else(at.discriminant < 0, least, nearest)
     return status, nearest
 
