@@ -90,7 +90,7 @@ def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression
             room = ca.fmin(room, ca.if_else(own < 0, own, FAR) if leg.follows_angle else own)
     status, nearest = ca.if_else(room < 0, -1, 0), ca.fmin(least, room)
     for at in found:
-        status = ca.if_else(at.discriminant < 0, worst, status)  # Remark 2
+        status = ca.if_else(at.discriminant < 0, worst, status)
         nearest = ca.if_else(at.discriminant < 0, least, nearest)
     return status, nearest
 

@@ -352,7 +352,7 @@ def _statuses(
         for leg, at in zip(machine.legs, found, strict=True):
             if "reach" in entry.needs or not leg.row_is_constant:
                 least = -_TINY if entry.needs == ("reach",) else TYPE_I**2 * at.scale
-                status = ca.if_else(least < at.discriminant, status, 0)
+                status = ca.if_else(least < at.discriminant, status, 0)  # Remark 2
     if "angles" in entry.needs:
         rest = ca.SX.zeros(machine.freedom)
         measure = machine.platform.motion(symbols["pose"], rest, rest).angle_measure
