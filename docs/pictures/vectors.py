@@ -62,7 +62,7 @@ def triangle() -> Sheet:
     sheet.arrow(r1, c, "$u$", GIVEN, (0.0, -0.8), 0.7)
     sheet.name(r1 + 0.5 * l_u, r"$l_u$", UPPER, (-0.9, 0.5))
     sheet.name(0.5 * (r2 + c), r"$l_l$", LOWER, (0.8, 0.6))
-    sheet.name(0.5 * (foot + r2), "0.24", INK, (-1.0, -1.0))
+    sheet.name(0.5 * (foot + r2), "0.24", INK, (1.05, -0.9))
     sheet.name(0.5 * (r1 + foot), "0.18", INK, (0.0, -0.8))
     sheet.name(r1, "R1", INK, (-0.9, -0.9))
     sheet.name(c, "R3", INK, (0.9, -0.9))
