@@ -114,3 +114,62 @@ def test_the_measure_of_a_mixed_machine_is_that_of_forces_in_space(kinds):
     expected = np.abs(np.linalg.det(rows)) / sizes.prod(axis=-1) / most
     found = np.abs(numeric(robot, "type_ii")(poses)[0])
     np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+_CORNERS = ((0.0, 0.0, 0.0), (1.6, 0.0, 0.0), (0.4, 1.2, 0.0))
+_PLATE = ((0.0, 0.0, 0.0), (0.8, 0.3, 0.0), (0.0, 0.7, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("shares", "singular"),
+    [
+        ((0.5, 0.5, 0.5, 0.5, 0.5, 0.5), True),
+        ((0.2, 0.5, 0.6, 0.5, 0.5, 8.0 / 11.0), True),  # ratios 1/4, 1, 3/2 and 1, 1, 8/3
+        ((0.2, 0.5, 0.6, 0.5, 0.5, 0.5), False),
+        ((0.3, 0.4, 0.6, 0.7, 0.2, 0.45), False),
+    ],
+)
+def test_corners_on_the_others_sides_are_singular_where_six_ratios_multiply_to_one(
+    shares, singular
+):
+    """Griffis and Duffy's layout: the condition of docs/theory/singularities.md."""
+    t, u = np.split(np.array(shares), 2)
+    hexapod = pteron.load("stewart")
+    corners, plate = np.array(_CORNERS), np.array(_PLATE)
+    sides = (
+        (1.0 - v)[:, None] * np.roll(triangle, -1, axis=0)
+        + v[:, None] * np.roll(triangle, -2, axis=0)
+        for v, triangle in ((u, corners), (t, plate))
+    )
+    on_base, on_plate = sides
+    ends = zip(
+        hexapod.legs,
+        np.vstack([corners, on_base]),
+        np.vstack([on_plate, plate]),
+        strict=True,
+    )
+    legs = tuple(
+        replace(leg, guide_point=tuple(a), platform_point=tuple(b), limits=(0.01, 50.0))
+        for leg, a, b in ends
+    )
+    found = pteron.kinematics.architecture(replace(hexapod, legs=legs))
+    assert found.singular == singular
+    ratios = np.prod(np.array(shares) / (1.0 - np.array(shares)))
+    assert np.isclose(ratios, 1.0) == singular
+
+
+def test_the_type_ii_bound_is_not_reached_by_table_1s_platform_points():
+    """27/32 of it is the most: forces across the arms that rise and fall by 30 degrees in turn."""
+    robot, rng = CATALOG["quadrupteron"], np.random.default_rng(5)
+    flat, up = np.sqrt(0.75), 0.5
+    best = np.array([(flat, 0, up), (0, -flat, -up), (flat, 0, -up), (0, -flat, up)])
+
+    def measure(directions):
+        units = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        legs = zip(robot.legs, units, strict=True)
+        turned = replace(robot, legs=tuple(replace(leg, direction=tuple(d)) for leg, d in legs))
+        return abs(float(numeric(turned, "type_ii")(np.zeros(4))[0]))
+
+    assert measure(best) == pytest.approx(27.0 / 32.0, abs=1e-12)
+    assert measure(best + 0.05 * rng.normal(size=(4, 3))) < 27.0 / 32.0
+    assert measure(rng.normal(size=(4, 3))) < 27.0 / 32.0

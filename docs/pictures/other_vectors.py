@@ -126,11 +126,11 @@ def segments() -> Sheet:
     sheet.line([q, q + v], LOWER, 5.0, alpha=0.35)
     sheet.arrow(p, p + u, "$u$", UPPER, (0.4, -0.9), 0.75)
     sheet.arrow(q, q + v, "$v$", LOWER, (0.2, 0.9), 0.8)
-    sheet.arrow(q, p, "$w$", GIVEN, (0.2, 0.8), 0.5)
+    sheet.arrow(q, p, "$w$", GIVEN, (-0.2, -0.8), 0.4)
     near = p + 0.375 * u, q + 0.5 * v
     sheet.line(near, INK, 1.2)
     sheet.name(0.5 * (near[0] + near[1]), "0.1", INK, (1.0, 0.0))
-    for point, name, way in ((p, "$p$", (-0.8, -0.6)), (q, "$q$", (-0.8, -0.4))):
+    for point, name, way in ((p, "$p$", (-0.2, -1.0)), (q, "$q$", (-0.8, -0.4))):
         sheet.mark(point, INK)
         sheet.name(point, name, INK, way)
     for point, name, way in (

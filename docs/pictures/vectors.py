@@ -7,6 +7,7 @@ where they fit it; only the names are put by hand.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from matplotlib.patches import Circle
 import pteron
 from pteron.bodies import PlanarInertia, RodInertia
 from pteron.kernels import Array
-from pteron.legs import PRRR, RSS
+from pteron.legs import PRRR, RSS, Drive, Stribeck
 
 SCHOOL = Path(__file__).parents[1] / "theory" / "school.toml"
 
@@ -61,12 +62,12 @@ def triangle() -> Sheet:
     sheet.arrow(r1, c, "$u$", GIVEN, (0.0, -0.8), 0.7)
     sheet.name(r1 + 0.5 * l_u, r"$l_u$", UPPER, (-0.9, 0.5))
     sheet.name(0.5 * (r2 + c), r"$l_l$", LOWER, (0.8, 0.6))
-    sheet.name(0.5 * (foot + r2), "0.24", INK, (1.2, -0.5))
+    sheet.name(0.5 * (foot + r2), "0.24", INK, (1.05, -0.9))
     sheet.name(0.5 * (r1 + foot), "0.18", INK, (0.0, -0.8))
     sheet.name(r1, "R1", INK, (-0.9, -0.9))
     sheet.name(c, "R3", INK, (0.9, -0.9))
     sheet.name(r2, r"R2, $\sigma = +1$", INK, (-1.4, 1.3))
-    sheet.name(other, r"$\sigma = -1$", MUTED, (0.3, -1.2))
+    sheet.name(other, r"$\sigma = -1$", MUTED, (2.0, -0.3))
     return sheet
 
 
@@ -115,7 +116,7 @@ def platform() -> Sheet:
     sheet.line(corners, PLATE, 1.2)
     sheet.line([p, p + 0.24 * np.array([1.0, 0.0, 0.0])], MUTED, 1.0, **_THIN)
     sheet.arc(p, 0.12 * np.array([1.0, 0.0, 0.0]), 0.12 * x, r"$\varphi$", (0.8, 0.2))
-    sheet.arrow(p, p + s, "$s$", PLATE, (-0.3, 0.8), 0.6)
+    sheet.arrow(p, p + s, "$s$", PLATE, (-0.4, 0.7), 0.25)
     sheet.arrow(p, p + moved, r"$\dot p$", INK, (0.4, -0.8), 0.8)
     c = p + s
     sheet.arrow(c, c + moved, r"$\dot p$", INK, (0.2, -0.8), 0.7)
@@ -136,8 +137,12 @@ def rates() -> Sheet:
     spin = np.array([1.0, 0.0, 0.0])
     elbow = float(found.upper_links[0]) * np.cross(spin, l_u)
     _links(sheet, r1, r2, c)
-    sheet.arrow(c, c + 0.2 * up, r"$\dot u$", GIVEN, (0.8, 0.2), 0.8, linewidth=2.0)
-    sheet.arrow(r2, r2 + 0.2 * elbow, r"$\dot\theta_u\,d\times l_u$", UPPER, (-2.4, 0.2), 0.7)
+    first, second = 0.3 * elbow, 0.3 * float(found.lower_links[0]) * np.cross(spin, c - r2)
+    assert np.allclose(first + second, 0.3 * up)
+    sheet.arrow(c, c + 0.3 * up, r"$\dot u$", GIVEN, (-0.8, 0.0), 0.7, linewidth=2.0)
+    sheet.arrow(c, c + second, r"$\dot\theta_l\,d\times l_l$", LOWER, (2.5, -0.2), 0.6)
+    sheet.arrow(c + second, c + 0.3 * up, r"$\dot\theta_u\,d\times l_u$", UPPER, (2.2, 0.8), 0.4)
+    sheet.arrow(r2, r2 + first, r"$\dot\theta_u\,d\times l_u$", UPPER, (-2.6, 0.2), 0.7)
     sheet.arc(r1, np.array([0.0, 0.12, 0.0]), 0.4 * l_u, r"$\dot\theta_u$", (1.1, 0.2))
     back = r2 - c
     flat = -0.15 * np.array([0.0, 1.0, 0.0])
@@ -155,25 +160,26 @@ def rates() -> Sheet:
 
 def body() -> Sheet:
     """Draw one body: its reference point, its centre of mass, and what acts on it."""
-    sheet = Sheet(-90.0, 90.0, (4.4, 3.0))
+    sheet = Sheet(-90.0, 90.0, (5.0, 3.0))
     o, along = np.array([0.05, 0.03, 0.0]), np.array([np.cos(0.5), np.sin(0.5), 0.0])
     across = np.array([-along[1], along[0], 0.0])
     g = 0.17 * along + 0.02 * across
-    shape = [(-0.03, 0), (0, 0.04), (0.2, 0.06), (0.3, 0.01), (0.2, -0.03), (0, -0.035)]
+    shape = [(-0.03, 0), (0, 0.04), (0.2, 0.06), (0.33, 0.04), (0.35, -0.05), (0.3, -0.11)]
+    shape += [(0.18, -0.05), (0, -0.035)]
     sheet.line([o + a * along + b * across for a, b in [*shape, shape[0]]], MUTED, 1.4)
-    sheet.arrow(o, o + g, r"$\gamma = h/m$", GIVEN, (-0.6, 1.0), 0.5)
+    sheet.arrow(o, o + g, r"$\gamma = h/m$", GIVEN, (-0.9, 0.9), 0.4)
     sheet.arrow(o, o + np.array([-0.1, 0.06, 0.0]), "$a$", INK, (0.0, 0.8), 0.9)
     center, down = o + g, np.array([0.0, -1.0, 0.0])
     sheet.arrow(center, center + 0.11 * down, "$m g$", LOWER, (1.0, 0.0), 0.8)
     inward = -0.09 * g / np.linalg.norm(g)
-    sheet.arrow(center, center + inward, r"$-\omega^2\gamma$", UPPER, (-0.4, -1.0), 0.9)
+    sheet.arrow(center, center + inward, r"$-\omega^2\gamma$", UPPER, (1.3, -0.7), 0.8)
     turned = 0.09 * np.cross([0.0, 0.0, 1.0], g / np.linalg.norm(g))
     sheet.arrow(center, center + turned, r"$\alpha\,z\times\gamma$", UPPER, (1.8, 0.2), 0.9)
-    sheet.arc(o, 0.06 * np.array([1.0, 0.0, 0.0]), 0.06 * along, r"$\omega,\alpha$", (1.3, 0.0))
+    sheet.arc(o, 0.05 * np.array([1.0, 0.0, 0.0]), 0.05 * along, r"$\omega,\alpha$", (1.3, 0.0))
     sheet.mark(o, INK)
-    sheet.name(o, "reference point", INK, (-1.6, -1.2))
+    sheet.name(o, "reference point", INK, (-4.4, -1.1))
     sheet.mark(center, INK, 4.0)
-    sheet.name(center, "centre of mass", INK, (2.6, -0.9))
+    sheet.name(center, "centre of mass", INK, (4.0, -0.1))
     return sheet
 
 
@@ -211,10 +217,11 @@ def transfer() -> Sheet:
 
 
 def rod() -> Sheet:
-    """Draw an R-S-S leg: crank, rod, and the motion of the tip."""
+    """Draw an R-S-S leg at a positive q: crank, rod, and the motion of the tip."""
     made = RSS((0.0, 0, 0.0), (0, 1, 0), (1, 0, 0), (-0.08, 0, 0), 0.17, 0.32, _BODY, _ROD, -1)
-    c = np.array([0.19, 0.05, -0.26])
+    c = np.array([0.12, 0.05, -0.41])
     posed = Posed(made, c)
+    assert posed.coordinate > 0.5
     sheet = Sheet(-62.0, 18.0, (4.2, 3.6))
     r, d, tip = np.zeros(3), np.array([0.0, 1.0, 0.0]), posed.points[1]
     crank = posed.links[0]
@@ -222,13 +229,13 @@ def rod() -> Sheet:
     sheet.arrow(r, r + 0.09 * d, "$d$", GIVEN, (0.3, 0.8), 1.0)
     sheet.arrow(r, r + np.array([0.13, 0, 0]), "$a$", GIVEN, (0.8, 0.0), 1.0)
     sheet.arc(r, np.array([0.09, 0, 0]), 0.09 * crank / 0.17, "$q$", (0.9, 0.2))
-    sheet.arrow(r, tip, "$l_u$", UPPER, (-0.6, 0.7), linewidth=2.8)
+    sheet.arrow(r, tip, "$l_u$", UPPER, (-0.5, -0.9), linewidth=2.8)
     sheet.arrow(tip, c, "$b$", LOWER, (1.0, 0.3), linewidth=2.4)
     sheet.arrow(r, c, "$w$", GIVEN, (-0.9, -0.2), **_THIN)
-    sheet.arrow(tip, tip + 0.55 * np.cross(d, crank), "$t' = d\\times l_u$", INK, (2.2, 0.3), 0.9)
+    sheet.arrow(tip, tip + 0.55 * np.cross(d, crank), "$t'$", INK, (-0.7, 0.5), 0.8)
     for point, name, way in (
         (r, "$r$", (-0.9, 0.7)),
-        (tip, "tip $t$", (0.2, 1.2)),
+        (tip, "tip $t$", (1.6, 0.4)),
         (c, "$c$", (0.9, -0.8)),
     ):
         sheet.mark(point, INK)
@@ -274,9 +281,146 @@ def singular() -> Sheet:
     return sheet
 
 
+def school() -> Sheet:
+    """Draw the school machine: three legs at right angles that hold P itself."""
+    robot, sheet = pteron.load(SCHOOL), Sheet(32.0, 24.0, (5.4, 4.4))
+    uppers, lowers = pteron.kinematics.link_vectors(robot, np.zeros(3))
+    names = (
+        ((-2.5, 0.6), (-1.0, 0.4), (1.2, 0.6), (-0.3, -1.0)),
+        ((-1.4, -1.0), (1.0, 0.9), (1.2, -0.2), (0.5, 0.8)),
+        ((-2.4, 0.6), (1.1, 0.4), (-0.6, 1.0), (0.5, 0.8)),
+    )
+    for i, (leg, upper, lower) in enumerate(zip(robot.legs, uppers, lowers, strict=True), 1):
+        assert isinstance(leg, PRRR)
+        r1, d = np.array(leg.guide_point), np.array(leg.direction)
+        sheet.line([r1 - 0.22 * d, r1 + 0.22 * d], MUTED, 2.6)
+        sheet.arrow(r1 + 0.1 * d, r1 + 0.24 * d, f"$d_{i}$", GIVEN, names[i - 1][3], 1.0)
+        sheet.line([r1, r1 + upper], UPPER, 4.0)
+        sheet.line([r1 + upper, r1 + upper + lower], LOWER, 4.0)
+        for point in (r1, r1 + upper, r1 + upper + lower):
+            sheet.axle(point, d, 0.05)
+            sheet.mark(point, INK, 5.0)
+        sheet.name(r1, f"slider {i}", INK, names[i - 1][0])
+        sheet.name(r1 + 0.5 * upper, "0.3", UPPER, names[i - 1][1])
+        sheet.name(r1 + upper + 0.5 * lower, "0.4", LOWER, names[i - 1][2])
+    sheet.frame(np.zeros(3), np.eye(3), "x y z", INK, 0.16)
+    sheet.mark(np.zeros(3), PLATE, 9.0)
+    sheet.name(np.zeros(3), "P", PLATE, (0.9, -0.9))
+    return sheet
+
+
+def delta() -> Sheet:
+    """Draw the Delta of the first result, with the vectors of its first leg."""
+    robot, sheet, pose = pteron.load("delta"), Sheet(-70.0, 18.0, (5.4, 4.6)), DELTA_POSE
+    ends = [np.array(leg.guide_point) for leg in robot.legs]
+    points = [pose + np.array(leg.platform_point) for leg in robot.legs]
+    sheet.line([*ends, ends[0]], MUTED, 1.4)
+    sheet.axes.fill(*(sheet.view @ np.array(points).T), color=PLATE, alpha=0.22, linewidth=0)
+    sheet.line([*points, points[0]], PLATE, 1.4)
+    for leg, q, c in zip(robot.legs, pteron.inverse_kinematics(robot, pose), points, strict=True):
+        assert isinstance(leg, RSS)
+        d, a, r = (np.array(v) for v in (leg.direction, leg.zero_direction, leg.guide_point))
+        crank = leg.upper_length * (np.cos(q) * a + np.sin(q) * np.cross(d, a))
+        first = leg is robot.legs[0]
+        look: dict[str, Any] = {} if first else {"alpha": 0.35}
+        sheet.line([r, r + crank], UPPER, 4.0, **look)
+        for side in (-0.05, 0.05):
+            sheet.line([r + crank + side * d, c + side * d], LOWER, 1.8, **look)
+        for point in (r + crank, c):
+            sheet.line([point - 0.05 * d, point + 0.05 * d], LOWER, 1.2, **look)
+        sheet.axle(r, d, 0.12)
+        if first:
+            tip = r + crank
+            sheet.arrow(r, tip, "$l_u$", UPPER, (0.0, 0.8), linewidth=2.4)
+            sheet.arrow(tip, c, "$b$", LOWER, (1.0, 0.0), linewidth=1.6)
+            sheet.arrow(r, c, "$w$", GIVEN, (-0.8, 0.0), 0.55, **_THIN)
+            sheet.arrow(r, r + 0.2 * d, "$d$", GIVEN, (-0.9, -0.2), 1.0)
+            sheet.arrow(pose, c, "$s$", PLATE, (0.0, -0.8), 0.5)
+            names = ((r, "$r$", (-0.2, 1.0)), (tip, "tip", (1.4, 0.4)), (c, "$c$", (1.0, -0.5)))
+            for point, name, way in names:
+                sheet.mark(point, INK)
+                sheet.name(point, name, INK, way)
+    sheet.frame(np.zeros(3), np.eye(3), "x y z", INK, 0.2)
+    sheet.mark(pose, PLATE, 4.0)
+    sheet.name(pose, "P", PLATE, (-0.6, -0.9))
+    return sheet
+
+
+def friction() -> Sheet:
+    """Draw a drive's friction over the joint's rate."""
+    coulomb, more, rate, viscous = 3.0, 2.0, 0.05, 12.0
+    drive = Drive(coulomb=coulomb, stribeck=Stribeck(more, rate), viscous=viscous)
+    robot = pteron.load(SCHOOL)
+    robot = replace(robot, legs=(replace(robot.legs[0], drive=drive), *robot.legs[1:]))
+    rates = np.concatenate([np.linspace(1e-6, 0.1, 81), np.linspace(0.1, 0.3, 21)])
+    rest = np.zeros(3)
+
+    def force(rate: float) -> float:
+        state = rest, rate * np.array([1.0, 0.0, 0.0]), rest
+        return float(
+            (pteron.drive_forces(robot, *state) - pteron.inverse_dynamics(robot, *state))[0]
+        )
+
+    sheet = Sheet(-90.0, 90.0, (5.4, 3.4))
+
+    def at(rate: float, force: float) -> Array:
+        return np.array([10.0 * rate, 0.3 * force, 0.0])
+
+    sheet.arrow(at(-0.32, 0), at(0.36, 0), r"$\dot q$", INK, (0.2, -0.9), 1.0, linewidth=1.0)
+    sheet.arrow(at(0, -8.0), at(0, 8.4), "force", INK, (1.5, 0.0), 1.0, linewidth=1.0)
+    for sign in (1.0, -1.0):
+        sheet.line([at(v, force(v)) for v in sign * rates], UPPER, 2.4)
+    sheet.line([at(0, coulomb), at(0.3, coulomb + 0.3 * viscous)], MUTED, 1.4, **_THIN)
+    sheet.line([at(rate, 0), at(rate, force(rate))], MUTED, 1.0, **_THIN)
+    sheet.name(at(rate, 0), "$v_s$", INK, (0.0, -0.9))
+    sheet.arrow(at(-0.02, 0), at(-0.02, coulomb), "$F_c$", GIVEN, (-0.9, 0.0), 0.5)
+    sheet.arrow(at(-0.02, coulomb), at(-0.02, coulomb + more), "$F_s$", LOWER, (-0.9, 0.0), 0.5)
+    for level in (coulomb, coulomb + more):
+        sheet.line([at(-0.03, level), at(0.0, level)], MUTED, 0.8)
+    left = coulomb + rate * viscous
+    sheet.line([at(rate, left), at(rate, force(rate))], LOWER, 2.4)
+    sheet.name(at(rate, force(rate)), "$0.37\\,F_s$", LOWER, (2.3, 1.0))
+    sheet.name(at(0.24, coulomb + 0.24 * viscous), r"$F_c + F_v\,\dot q$", MUTED, (1.4, -1.3))
+    return sheet
+
+
+def fit() -> Sheet:
+    """Draw the four samples of the worked regression, and the two lines that fit them."""
+    sheet = Sheet(-90.0, 90.0, (5.0, 3.4))
+
+    def at(acceleration: float, force: float) -> Array:
+        return np.array([acceleration, 0.25 * force, 0.0])
+
+    sheet.arrow(at(-3, 0), at(3.2, 0), r"$\ddot\rho$", INK, (0.2, -0.9), 1.0, linewidth=1.0)
+    sheet.arrow(at(0, -8.4), at(0, 8.8), "$F$", INK, (0.8, 0.0), 1.0, linewidth=1.0)
+    for sign, color, name in ((1.0, UPPER, r"$\dot\rho > 0$"), (-1.0, LOWER, r"$\dot\rho < 0$")):
+        ends = [at(a, 2.0 * a + 3.1 * sign) for a in (-2.6, 2.6)]
+        sheet.line(ends, color, 1.6)
+        sheet.name(ends[int(sign > 0)], name, color, (-1.6 * sign, 0.4 * sign))
+        for a, force in SAMPLES[sign]:
+            sheet.mark(at(a, force), color)
+    both: dict[str, Any] = {"arrowstyle": "<|-|>", "linewidth": 1.0}
+    sheet.arrow(at(0, -3.1), at(0, 3.1), r"$2\,\hat F_c$", GIVEN, (1.4, -0.6), 0.75, **both)
+    corner = at(1.6, 2.0 * 0.6 - 3.1)
+    sheet.line([at(0.6, 2.0 * 0.6 - 3.1), corner, at(1.6, 0.1)], MUTED, 1.0)
+    sheet.name(at(1.1, -1.9), "1", MUTED, (0.0, -0.6))
+    sheet.name(at(1.6, -0.9), r"$\hat m$", MUTED, (0.8, 0.0))
+    return sheet
+
+
+DELTA_POSE = np.array([0.1, 0.05, -0.95])
+"""The pose of the first result."""
+
+SAMPLES = {1.0: ((2.0, 7.1), (-2.0, -0.9)), -1.0: ((2.0, 0.9), (-2.0, -7.1))}
+"""Accelerations and forces of docs/theory/identification.md, by the sign of the rate."""
+
+
 DRAWINGS: dict[str, Callable[[], Sheet]] = {
     one.__name__: one
-    for one in (triangle, leg, platform, rates, body, work, transfer, rod, singular)
+    for one in (
+        *(school, triangle, leg, platform, rates, body, work, transfer, rod, delta, singular),
+        *(friction, fit),
+    )
 }
 
 

@@ -68,13 +68,14 @@ class Closure(ABC):
     """Whether `poses` is one; if not, `kinematics.assembly` finds the poses."""
 
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-        """Return the type-II measure: 1 in size at best, 0 where J is singular, without unit.
+        """Return the type-II measure: 1 in size at most, 0 where J is singular, without unit.
 
         It is det A, J = B^-1 A, with each leg's force on its platform point, or moment on the
-        platform, made one of unit size in space, over the most that so many forces on these points
-        may have: 1 where the forces are isotropic and their moments balanced. So it is the same in
-        any units and frame, for every kind of leg; a force across a planar machine counts as the
-        little that it does in the plane.
+        platform, made one of unit size in space, over Hadamard's bound of the determinant of so
+        many unit forces on these points. The size is 1 only where the forces are isotropic and
+        their moments balanced, which the points need not allow: a Quadrupteron with the platform
+        points of Table 1 reaches 27/32. So it is the same in any units and frame, for every kind
+        of leg; a force across a planar machine counts as the little that it does in the plane.
         """
         if any(leg.row.is_zero() for leg in legs):
             return ca.SX(0)  # a leg that moves nothing
@@ -98,12 +99,12 @@ class Closure(ABC):
         if sizes is None:
             sizes = [ca.norm_2(x.normal) if isinstance(x, Plane) else ca.SX(1) for x in loci]
         forces = sum(not isinstance(locus, Turned) for locus in loci)
-        greatest = (forces / lengths) ** (lengths / 2)
+        bound = (forces / lengths) ** (lengths / 2)
         if forces == len(self.legs) and self.platform.angles():
             if self._in_line:  # no force has a moment
                 return ca.SX(0)
-            greatest = greatest * self._lever
-        return determinant(against(platform, rows)) / (greatest * reduce(mul, sizes))
+            bound = bound * self._lever
+        return determinant(against(platform, rows)) / (bound * reduce(mul, sizes))
 
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -119,7 +120,8 @@ class Closure(ABC):
     def _lever(self) -> Expression:
         """Return the root of the sum of squares of the platform points' distances from their mean.
 
-        About an axis along k through it; it is the greatest moment that unit forces may have.
+        About an axis along k through it. The moments of unit forces on these points, as one vector
+        with an entry for each force, are this long at most.
         """
         # From the first point, so that points that coincide do so to the last bit.
         first = self.platform.offsets[0].a

@@ -126,8 +126,9 @@ class ConstantRows(Closure):
         """Solve the closures, which are linear in (p, cos phi, sin phi).
 
         For 3T they give one pose. For 3T1R their left null vector leaves A' cos(phi) + B' sin(phi)
-        = C, with two angles: the first column has N . j > 0, the second N . j < 0, so that each
-        column is one assembly mode throughout. NaN where it is not real, C^2 > A'^2 + B'^2.
+        = C, with two angles, in which a platform point counts as it is at phi = 0, in base axes.
+        The first column has N . j > 0, the second N . j < 0, so that each column is one assembly
+        mode throughout. NaN where it is not real, C^2 > A'^2 + B'^2.
         """
         known, sizes = [], []
         for leg, offset, q in zip(

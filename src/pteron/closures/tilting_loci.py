@@ -51,16 +51,16 @@ class TiltingLoci(Closure):
         """Return the type-II measure, of the forces that legs and the platform's planes exert.
 
         It is the determinant of their rows against (v, omega) of P, or omega where P stays, each a
-        unit force, over the most that so many forces on these points may have: with moments counted
-        by the root of a third of the sum of squares of the points' distances from their mean, or
-        from P.
+        unit force, over an upper bound of the determinant of so many unit forces on these points:
+        with moments counted by the root of a third of the sum of squares of the points' distances
+        from their mean, or from P. The bound need not be reached: `stewart` reaches 0.84 of it.
         """
         held, size = self.platform.held_rows(platform), reduce(mul, sizes or [ca.SX(1)])
         if held is None:
-            return determinant(against(platform, rows)) / (self._greatest(1) * size)
+            return determinant(against(platform, rows)) / (self._bound(1) * size)
         pairs = zip(rows, platform.point_twists, strict=True)
         whole = ca.vertcat(*(ca.mtimes(row, twist) for row, twist in pairs), held)
-        return determinant(whole) / (self._greatest(2) * size)
+        return determinant(whole) / (self._bound(2) * size)
 
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -68,14 +68,14 @@ class TiltingLoci(Closure):
         """Return it by the determinant, or by the rows that `forces` makes orthogonal."""
         found = super().measure_squares(platform, legs)
         if len(legs) == 6:
-            most = reduce(mul, (leg.wrench_size for leg in legs), self._greatest(1))
+            most = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))
             found.append(determinant_square(plain_rows(platform, legs)) / (most * most))
         return found
 
-    def _greatest(self, forces: int) -> Expression:
-        """Return the greatest determinant of so many unit forces at each point.
+    def _bound(self, forces: int) -> Expression:
+        """Return an upper bound of the determinant of so many unit forces at each point.
 
-        By Fischer's inequality and that of the means.
+        By Fischer's inequality and that of the arithmetic and geometric means.
         """
         points, centred = self.platform.points, "z" not in self.platform.coordinates
         center = ca.SX(3, 1) if centred else sum(points) / len(points)

@@ -10,7 +10,7 @@ from pteron.legs.kind import LegKind
 _QUANTITIES = (
     ("dry friction", "coulomb", "{force}"),
     ("more of it at rest", "stribeck.force", "{force}"),
-    ("which is gone by", "stribeck.speed", "{rate}"),
+    ("37 % of it left at", "stribeck.speed", "{rate}"),
     ("viscous friction", "viscous", "{damping}"),
     ("offset", "offset", "{force}"),
     ("smooth below", "rest_speed", "{rate}"),

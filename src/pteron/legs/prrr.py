@@ -70,7 +70,8 @@ class PRRR(LegKind):
     """A P-R-R-R leg that carries one point of the platform.
 
     The slider moves along `slider_direction` through `guide_point`; the revolute axes R1, R2 and R3
-    all have `direction`. Vectors are in the base frame, except `platform_point`.
+    all have `direction`. Vectors are in the base frame, except `platform_point`, which is in the
+    platform's frame.
     """
 
     guide_point: Vector

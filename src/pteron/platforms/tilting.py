@@ -69,6 +69,9 @@ def rotation(
 class Tilting(PlatformEquations):
     """c = p + R s0: a leg's point from P's place, any rotation and its platform point.
 
+    R is the product of the angles' turns, about the axes that the platform's frame has at angles
+    zero, times that frame.
+
     The legs' rows and forces stand against quasi-velocities: the twist (v, omega) of a 3T3R
     platform, omega of a 3R platform. They have none of the angles' singularities at +-90 degrees.
     """

@@ -19,7 +19,11 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
 class Turning(PlatformEquations):
-    """c = p + R(phi) s0: a leg's point from P's place, a turn about k and its platform point."""
+    """c = p + R(phi) s0 + t0: P's place, a turn about k and a leg's platform point.
+
+    R(phi) = Rot(k, phi) R0 takes vectors of the platform's frame to the base frame; R0 is that
+    frame at phi = 0, whose columns are `frame`.
+    """
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z", "phi")
 
