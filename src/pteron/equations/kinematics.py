@@ -32,7 +32,7 @@ def reach(machine: Machine, pose: Expression) -> list[Reach]:
 def beyond_reach(machine: Machine, pose: Expression) -> Expression:
     """Return, for every leg (n, 1), NaN where it does not reach the pose, 0 where it does."""
     found = reach(machine, pose)
-    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))
+    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))  # Remark 2
 
 
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
