@@ -20,12 +20,13 @@ from typer.testing import CliRunner
 import pteron
 from pteron.cli.main import app
 from pteron.equations.drives import drive_numbers
-from pteron.errors import DataError, ModelError, OutputError
+from pteron.errors import DataError, ModelError, OutputError, UnlikelyValue
 from pteron.export import FUNCTIONS
 from pteron.identification import Terms, identify
 from pteron.identification.signals import States
 from pteron.kernels.vm import VirtualMachine
 from pteron.kinematics import assembly_modes
+from pteron.manipulator.machine_record import machine_record
 from pteron.motion import with_payload
 from pteron.report.identification import numbers
 
@@ -408,6 +409,23 @@ def test_an_identified_machine_goes_to_the_controller_as_it_was_printed(tmp_path
     for k in np.flatnonzero(np.abs(rates).min(axis=-1) > 0.02):
         _, found = call("feed_forward_base", *(part[k] for part in state), sizes=(3,))
         np.testing.assert_allclose(found, fitted[k], rtol=0, atol=1e-11 * np.abs(fitted).max())
+
+
+def test_identified_values_go_to_the_calibrated_machine_with_a_warning(tmp_path):
+    """Not to one whose dimensions differ by more than calibration explains."""
+    base = pteron.base_parameters(DELTA)
+    path = identification_file(tmp_path / "i.json", base, base.values(), [(0.0, 0.0, 0.0)] * 3)
+    data = json.loads(path.read_text())
+    path.write_text(json.dumps(data | {"machine": machine_record(DELTA)}))
+
+    def with_rods(factor):
+        legs = [replace(leg, lower_length=factor * leg.lower_length) for leg in DELTA.legs]
+        return replace(DELTA, legs=tuple(legs))
+
+    with pytest.warns(UnlikelyValue, match=r"legs\[1\]\.lower_length .* 0\.10% off"):
+        pteron.export_c(with_rods(1.001), "inverse_dynamics_base", tmp_path / "c", base=path)
+    with pytest.raises(DataError, match=r"legs\[1\]\.lower_length .* off\), at most 1%"):
+        pteron.export_c(with_rods(1.05), "inverse_dynamics_base", tmp_path / "d", base=path)
 
 
 def test_a_file_that_is_no_identification_of_the_machine_is_refused(tmp_path):

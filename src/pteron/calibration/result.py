@@ -18,6 +18,7 @@ from pteron.calibration.residuals import MachineSlopes
 from pteron.json_values import picked
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
+from pteron.manipulator.machine_record import machine_record
 from pteron.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -189,6 +190,7 @@ class Calibration:
         outliers = [self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)]
         return {
             "name": self.drawn.name,
+            "machine": machine_record(self.drawn),
             "values": values,
             **picked(self.fit.guess, "zeros scales"),
             "noise": self.noise,

@@ -15,6 +15,7 @@ from pteron.controllers.feed_forward_pd import FeedForwardPD
 from pteron.controllers.pd_gravity import PDGravity
 from pteron.errors import DataError, shown
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator.machine_record import expect_machine, machine_record
 from pteron.toml import read_toml
 
 _KINDS: dict[str, type[Controller]] = {
@@ -25,8 +26,11 @@ _KINDS: dict[str, type[Controller]] = {
 }
 """Names of the controllers in files, as on the command line."""
 
-_ABOUT = ("controller", "robot", "joints", "margins")
+_ABOUT = ("controller", "robot", "joints", "margins", "machine")
 """Keys that are no numbers of the controller."""
+
+_IDENTITY = ("name", "layout", "topology", "geometry")
+"""Keys of the table `machine` but the dimensions."""
 
 
 def gains_text(
@@ -53,6 +57,11 @@ def gains_text(
     if margins:
         lines += ["", "[margins]  # the least anywhere: factor, rad, s and the disk margin"]
         lines += [f"{name} = {tomlkit.item(value).as_string()}" for name, value in margins.items()]
+    record = machine_record(robot)
+    lines += ["", "[machine]  # compared with the machine that the gains are given to"]
+    lines += [f"{name} = {tomlkit.item(record[name]).as_string()}" for name in _IDENTITY]
+    lines += ["", "[machine.dimensions]"]
+    lines += [f'"{name}" = {values}' for name, values in record["dimensions"].items()]
     return "\n".join(lines) + "\n"
 
 
@@ -88,7 +97,8 @@ def read_gains(robot: RobotLike, path: str | Path) -> Controller:
     Raises
     ------
     DataError
-        If the file is not there, has other keys or numbers, or is for a machine of other joints.
+        If the file is not there, has other keys or numbers, or is for another machine: of other
+        joints, of another topology, or with a dimension that differs by more than 1 %.
     """
     robot = as_manipulator(robot)
     found = read_toml(path, DataError, "there is no such file; pteron tune writes one")
@@ -104,6 +114,7 @@ def read_gains(robot: RobotLike, path: str | Path) -> Controller:
             f"{path}: its joints are {shown(joints)}, of {robot.name} they are "
             f"{' '.join(robot.joint_names)}; tune this machine"
         )
+    expect_machine(found.get("machine"), robot, path)
     numbers = {key: value for key, value in found.items() if key not in _ABOUT}
     allowed = _numbers(kind)
     unknown = [key for key in numbers if key not in allowed]

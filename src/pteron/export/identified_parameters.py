@@ -28,6 +28,7 @@ from pteron.kernels import (
 )
 from pteron.legs import Drive, LegKind, Stribeck
 from pteron.manipulator import Manipulator
+from pteron.manipulator.machine_record import expect_machine
 from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
 
 _NAME = "base_parameters"
@@ -81,6 +82,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
             f"{path}: not an identification.json of this version of pteron identify "
             f"({type(error).__name__}: {error}); run it again"
         ) from None
+    expect_machine(data.get("machine"), robot, path)
     if passive := [n for n, kind in zip(all_names, kinds, strict=False) if kind == "passive"]:
         raise DataError(
             f"{path}: {', '.join(passive)}: friction of passive joints, which exported code has no "
@@ -88,7 +90,9 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         )
     try:
         base = base_parameters(robot, shared=groups or False)
-        same = list(base.names) == names and list(base.expressions(digits=12)) == expressions
+        # A record has been compared: dimensions may differ a little, as a calibrated machine's do.
+        alike = "machine" in data or list(base.expressions(digits=12)) == expressions
+        same = list(base.names) == names and alike
     except ModelError:
         same = False
     if not same or len(drives) != robot.joint_count or values.shape != (base.rank,):

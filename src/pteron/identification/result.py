@@ -21,6 +21,7 @@ from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
+from pteron.manipulator.machine_record import machine_record
 from pteron.renamed import former_attribute
 from pteron.verdict import Verdict
 
@@ -178,6 +179,7 @@ class Identification:
         }
         return {
             "robot": self.robot.name,
+            "machine": machine_record(self.robot),
             **picked(self, "verdict"),
             **picked(self.model, "expressions kinds left_out"),
             "base_parameters": {

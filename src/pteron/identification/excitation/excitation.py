@@ -23,6 +23,7 @@ from pteron.identification.excitation.search_program import Criterion
 from pteron.identification.logs import Description, write_description
 from pteron.json_values import picked
 from pteron.kinematics import assembly_mode
+from pteron.manipulator.machine_record import machine_record
 from pteron.tables import write_table
 
 _SLOWER = 5.0
@@ -211,6 +212,7 @@ class Excitation:
         motion = self.motion
         return {
             "robot": motion.robot.name,
+            "machine": machine_record(motion.robot),
             **picked(self, "criterion seed seconds interrupted conditioning random draws gain"),
             **picked(self, "limits"),
             **picked(self.margins, "margins=each"),
