@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import lru_cache
 from operator import itemgetter
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
+from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.legs.leg import Passive
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
@@ -55,21 +57,43 @@ def drawn_poses(
     limits: bool = True,
 ) -> Array:
     """Return poses (count, m) in reach, as `random_poses` does, also if all are singular."""
-    low, high = _widest_box(robot)
     wanted = _Wanted(type_i, type_ii, limits)
+    sample = _search(robot, count, rng, wanted)
+    if len(sample.poses) < count:
+        raise _too_few(robot, count, sample, wanted)
+    return sample.poses[:count]
+
+
+def sampled_poses(
+    robot: Manipulator,
+    count: int,
+    rng: np.random.Generator,
+    type_i: float = 0.0,
+    *,
+    limits: bool = True,
+) -> Array:
+    """Return poses (count, m) in reach like `drawn_poses`, or as many (k, m) as are found."""
+    return _search(robot, count, rng, _Wanted(type_i, 0.0, limits)).poses[:count]
+
+
+def _search(robot: Manipulator, count: int, rng: np.random.Generator, wanted: _Wanted) -> _Sample:
+    """Return a sample of at least `count` usable poses, or of as many as are found."""
+    low, high = _widest_box(robot)
     coarse = _led(robot, low, high, rng, wanted)
     free, share = np.ones(robot.freedom, dtype=bool), 0.05
     if len(coarse) < _SCOUTS:
-        coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, wanted)
-        if len(coarse) >= count:
-            return coarse[:count]
+        scouts = min(count, _SCOUTS)
+        sample = _drawn(robot, low, high, scouts, rng, wanted)
+        coarse = sample.poses
+        if len(coarse) >= count or len(coarse) < scouts:
+            return sample
         free, share = ~robot.platform.angular, 0.25
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
     least, most = coarse.min(axis=0), coarse.max(axis=0)
     margin = share * (most - least)
     low = np.where(free, np.maximum(least - margin, low), low)
     high = np.where(free, np.minimum(most + margin, high), high)
-    return _drawn(robot, low, high, count, rng, wanted)[:count]
+    return _drawn(robot, low, high, count, rng, wanted)
 
 
 class _Wanted(NamedTuple):
@@ -81,12 +105,23 @@ class _Wanted(NamedTuple):
     limits: bool
     """Whether limits are kept: those of passive joints, and of actuated ones where it tilts."""
 
-    def reached(self, robot: Manipulator, poses: Array) -> Array:
-        """Return those of the poses that are in reach and away from singularities."""
+    def reached(self, robot: Manipulator, poses: Array, sample: _Sample | None = None) -> Array:
+        """Return those of the poses that are in reach and away from singularities.
+
+        A sample is told how many are in reach, and the greatest measures.
+        """
         _, measures, _, _ = numeric(robot, "reach")(poses)
-        poses = poses[(measures >= self.type_i).all(axis=-1)]
+        within, bent = (measures >= 0.0).all(axis=-1), (measures >= self.type_i).all(axis=-1)
+        poses = poses[bent]
+        if sample is not None:
+            sample.reached += int(within.sum())
+            least = measures[within].min(axis=-1).max(initial=0.0)
+            sample.type_i = max(sample.type_i, float(least))
         if self.type_ii > 0.0 and len(poses):
-            poses = poses[type_ii_sizes(robot, poses) >= self.type_ii]
+            sizes = type_ii_sizes(robot, poses)
+            poses = poses[sizes >= self.type_ii]
+            if sample is not None:
+                sample.type_ii = max(sample.type_ii, float(sizes.max()))
         return poses
 
     def kept(self, robot: Manipulator, poses: Array) -> Array:
@@ -98,6 +133,26 @@ class _Wanted(NamedTuple):
             joints = numeric(robot, "joint_coordinates")(poses)[0]
             poses = poses[((low <= joints) & (joints <= high)).all(axis=-1)]
         return poses
+
+
+@dataclass
+class _Sample:
+    """Usable poses drawn from a box, and what the others lacked."""
+
+    poses: Array
+    """(k, m)."""
+    tried: int = 0
+    """Poses drawn."""
+    reached: int = 0
+    """Those in reach of all legs."""
+    apart: int = 0
+    """Those of them with the measures that are wanted."""
+    type_i: float = 0.0
+    """Greatest type-I measure, the least of all legs, of the poses in reach."""
+    type_ii: float = 0.0
+    """Greatest type-II measure of those with the type-I measure, where one is wanted."""
+    seen: Array = field(default_factory=lambda: np.empty((0, 0)))
+    """Some poses with the measures."""
 
 
 def _widest_box(robot: Manipulator) -> tuple[Array, Array]:
@@ -146,35 +201,67 @@ def _drawn(
     count: int,
     rng: np.random.Generator,
     wanted: _Wanted,
-) -> Array:
-    """Return at least `count` usable poses drawn from a box."""
-    found: list[Array] = []
-    total = reached = 0
-    seen = np.empty((0, robot.freedom))
-    attempts = _ATTEMPTS + count // 16
+) -> _Sample:
+    """Return at least `count` usable poses drawn from a box, or as many as are found."""
+    usable = [np.empty((0, robot.freedom))]
+    sample = _Sample(usable[0], seen=usable[0])
+    total, attempts = 0, _ATTEMPTS + count // 16
     for k in range(1, attempts + 1):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
-        poses = wanted.reached(robot, 0.5 * (low + high) + 0.5 * (high - low) * poses)
-        reached += len(poses)
-        seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses])
-        found.append(wanted.kept(robot, poses))
-        total += len(found[-1])
-        if total >= count:
-            return np.concatenate(found)
+        poses = 0.5 * (low + high) + 0.5 * (high - low) * poses
+        poses = wanted.reached(robot, poses, sample)
+        sample.tried += _BATCH
+        sample.apart += len(poses)
+        if len(sample.seen) < _SEEN:
+            sample.seen = np.concatenate([sample.seen, poses])
+        usable.append(wanted.kept(robot, poses))
+        total += len(usable[-1])
         # A quarter of the attempts tells, where many poses are wanted, that they will not be found.
-        if k == attempts // 4 and count >= _MANY and total < count / 16:
+        few = k == attempts // 4 and count >= _MANY and total < count / 16
+        if total >= count or few:
             break
-    if reached >= count:
-        raise ModelError(
-            f"only {total} of {reached} random poses in reach of all legs keep the limits of "
+    sample.poses = np.concatenate(usable)
+    return sample
+
+
+def _too_few(robot: Manipulator, count: int, sample: _Sample, wanted: _Wanted) -> ModelError:
+    """Return the error for a sample with too few usable poses: it names what they lack."""
+    total = len(sample.poses)
+    if sample.apart >= count:
+        text = (
+            f"only {total} of {sample.apart} random poses in reach of all legs keep the limits of "
             f"{'joints' if robot.platform.tilts else 'passive joints'}: "
-            f"{_seldom_kept(robot, seen)}; widen these limits",
-            subject=robot.name,
+            f"{_seldom_kept(robot, sample.seen)}; widen these limits"
         )
-    raise ModelError(
-        f"only {total} of {k * _BATCH} random poses are in reach of all legs and away from "
-        "singularities; bring the guide points nearer or lengthen the links",
-        subject=robot.name,
+    elif not sample.reached:
+        text = (
+            f"only 0 of {sample.tried} random poses are in reach of all legs; bring the guide "
+            "points nearer or lengthen the links"
+        )
+    elif sample.reached < count:
+        text = (
+            f"only {sample.reached} of {sample.tried} random poses are in reach of all legs, and "
+            f"{count} are wanted; ask for fewer"
+        )
+    else:
+        text = _below_floors(robot, sample, wanted)
+    return ModelError(text, subject=robot.name)
+
+
+def _below_floors(robot: Manipulator, sample: _Sample, wanted: _Wanted) -> str:
+    """Return the words for poses in reach of which too few have the measures that are wanted."""
+    head = f"only {sample.apart} of {sample.reached} random poses in reach of all legs have "
+    if sample.type_i < wanted.type_i or wanted.type_ii <= 0.0:
+        return (
+            f"{head}type-I measures of at least {wanted.type_i:g}; the greatest that was met, "
+            f"the least of all legs, is {sample.type_i:.3g}: ask for less (type_i)"
+        )
+    keys = alternatives(jacobian_keys(robot))
+    also = f"type-I measures of at least {wanted.type_i:g} and " if wanted.type_i > 0.0 else ""
+    return (
+        f"{head}{also}a type-II measure of at least {wanted.type_ii:g}; the greatest that was met "
+        f"is {sample.type_ii:.3g}: ask for less (type_ii), or change what the Jacobian depends on, "
+        f"the legs' {keys}"
     )
 
 
