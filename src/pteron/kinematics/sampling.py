@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
@@ -33,6 +34,24 @@ _SCOUTS = 100
 
 _LEADING = 20
 """Steps of Newton's method that lead a pose to joint coordinates."""
+
+_RARE = 1e-3
+"""Share of poses in reach of all legs below which a random walk looks for them."""
+
+_ROUNDS = 100
+"""Batches of the walk at most: steps shorten to 0.7^100 of the box where nothing is met."""
+
+_SPREAD = 20
+"""Batches by which it spreads once it is in reach, before poses are taken."""
+
+_LONGEST = 0.3
+"""Longest step of the walk, as a share of the box: a longer one draws from the box again."""
+
+_PARENTS = 200
+"""Poses from which the next batch of the walk sets out, where few are in reach."""
+
+_INSIDE = 0.05, 0.3
+"""Share of a batch in reach below which the walk's steps shorten, and above which they lengthen."""
 
 _TILT = 0.5
 """Greatest size of the angles drawn, rad, of a tilting platform whose file does not limit them."""
@@ -78,22 +97,36 @@ def sampled_poses(
 
 def _search(robot: Manipulator, count: int, rng: np.random.Generator, wanted: _Wanted) -> _Sample:
     """Return a sample of at least `count` usable poses, or of as many as are found."""
-    low, high = _widest_box(robot)
-    coarse = _led(robot, low, high, rng, wanted)
-    free, share = np.ones(robot.freedom, dtype=bool), 0.05
-    if len(coarse) < _SCOUTS:
-        scouts = min(count, _SCOUTS)
-        sample = _drawn(robot, low, high, scouts, rng, wanted)
-        coarse = sample.poses
-        if len(coarse) >= count or len(coarse) < scouts:
-            return sample
-        free, share = ~robot.platform.angular, 0.25
+    widest = _widest_box(robot)
+    every = np.ones(robot.freedom, dtype=bool)
+    led = _led(robot, *widest, rng, wanted)
+    if len(led) >= _SCOUTS:
+        return _drawn(robot, *_box_about(led, 0.05, every, widest), count, rng, wanted)
+    scouts = min(count, _SCOUTS)
+    sample = _drawn(robot, *widest, scouts, rng, wanted)
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
-    least, most = coarse.min(axis=0), coarse.max(axis=0)
+    if scouts <= len(sample.poses) < count:
+        box = _box_about(sample.poses, 0.25, ~robot.platform.angular, widest)
+        return _drawn(robot, *box, count, rng, wanted)
+    if len(sample.poses) >= count or sample.reached > _RARE * sample.tried:
+        return sample
+    walked = _walked(robot, *widest, max(count, _SCOUTS), rng, wanted)
+    if len(walked) < max(count, _SCOUTS):
+        return sample
+    near = _drawn(robot, *_box_about(walked, 0.25, every, widest), count, rng, wanted)
+    if len(near.poses) < count:
+        near.poses = rng.permutation(walked)
+    return near
+
+
+def _box_about(
+    poses: Array, share: float, free: NDArray[np.bool_], widest: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Return the ends of the bounding box of poses, widened by a share, in the free coordinates."""
+    least, most = poses.min(axis=0), poses.max(axis=0)
     margin = share * (most - least)
-    low = np.where(free, np.maximum(least - margin, low), low)
-    high = np.where(free, np.minimum(most + margin, high), high)
-    return _drawn(robot, low, high, count, rng, wanted)
+    low = np.where(free, np.maximum(least - margin, widest[0]), widest[0])
+    return low, np.where(free, np.minimum(most + margin, widest[1]), widest[1])
 
 
 class _Wanted(NamedTuple):
@@ -222,6 +255,51 @@ def _drawn(
             break
     sample.poses = np.concatenate(usable)
     return sample
+
+
+def _walked(
+    robot: Manipulator,
+    low: Array,
+    high: Array,
+    count: int,
+    rng: np.random.Generator,
+    wanted: _Wanted,
+) -> Array:
+    """Return at least `count` usable poses (k, m) that a random walk finds, or as many as it does.
+
+    It serves where poses in reach are so rare that drawing meets next to none: links of very
+    unequal length have a reach as thin as a shell. The poses that miss the legs' reach by least
+    lead to it; from poses in reach it spreads, in steps of which some, not all, stay there.
+    """
+    poses = rng.uniform(low, high, (_BATCH, robot.freedom))
+    kin = poses[:0]
+    usable = [kin]
+    step, spread = 0.1, 0
+    for _ in range(_ROUNDS):
+        margins = _least_margins(robot, poses)
+        inside = margins > 0.0
+        share = inside.mean()
+        if share >= _INSIDE[0]:
+            spread += 1
+            kin = poses[inside]
+        else:
+            both = np.concatenate([kin, poses])
+            kin = both[np.argsort(-_least_margins(robot, both), kind="stable")[:_PARENTS]]
+        if spread > _SPREAD:
+            usable.append(wanted.kept(robot, wanted.reached(robot, poses)))
+            if sum(map(len, usable)) >= count:
+                break
+        step *= 1.5 if share > _INSIDE[1] else 1.0 if share >= _INSIDE[0] else 0.7
+        step = min(step, _LONGEST)
+        steps = step * (high - low) * rng.normal(size=(_BATCH, robot.freedom))
+        poses = np.clip(kin[rng.integers(len(kin), size=_BATCH)] + steps, low, high)
+    return np.concatenate(usable)
+
+
+def _least_margins(robot: Manipulator, poses: Array) -> Array:
+    """Return the least margin (K,) of all legs' reach, m; -infinity where it is none."""
+    margins = numeric(robot, "reach")(poses)[0].min(axis=-1)
+    return np.asarray(np.nan_to_num(margins, nan=-np.inf))
 
 
 def _too_few(robot: Manipulator, count: int, sample: _Sample, wanted: _Wanted) -> ModelError:
