@@ -28,6 +28,8 @@ def random_poses(
     Passive joints and the platform's angle keep their limits; the actuated joints need not. A
     platform that tilts is drawn within the limits of its angles, or where it has none with each of
     them within 0.5 rad of 0, and its actuated joints keep their limits too: poses that it takes.
+    Where fewer than one in a thousand of the poses drawn are in reach, a random walk finds where
+    they lie.
 
     Parameters
     ----------

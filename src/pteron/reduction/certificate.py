@@ -98,7 +98,7 @@ class NumericalCertificate(Certificate):
         """Return the certificate in a few sentences."""
         return (
             f"Numerical rank {self.rank} of {self.columns} columns ({self.method}, {self.states} "
-            f"random states, columns scaled). Smallest value kept {self.smallest_kept:.1e}, "
+            f"random states, rows and columns scaled). Smallest value kept {self.smallest_kept:.1e}, "
             f"largest dropped {self.largest_dropped:.1e}, relative to the largest: a gap of "
             f"{self.gap:.0e}. "
             f"Residual of the grouping {self.residual:.0e}. "

@@ -18,7 +18,7 @@ from pteron.reduction.certificate import NumericalCertificate, NumericalRank
 from pteron.reduction.grouping import Grouping, Shares
 
 _TOLERANCE = 1e-10
-"""Singular values up to this share of the largest count as zero, with columns scaled to unit
+"""Singular values up to this share of the largest count as zero, with rows and columns of unit
 length: rounding leaves 1e-14, what is identifiable at all 1e-6 and more. The certificate reports
 the gap."""
 
