@@ -100,8 +100,8 @@ class NumericalCertificate(Certificate):
         return (
             f"Numerical rank {self.rank} of {self.columns} columns ({self.method}, {self.states} "
             "random states, rows and columns scaled). Smallest value kept "
-            f"{self.smallest_kept:.1e}, largest dropped {self.largest_dropped:.1e}, relative to the largest: a gap of "
-            f"{self.gap:.0e}. "
+            f"{self.smallest_kept:.1e}, largest dropped {self.largest_dropped:.1e}, "
+            f"relative to the largest: a gap of {self.gap:.0e}. "
             f"Residual of the grouping {self.residual:.0e}. "
             + _UNCLEAR * (self.largest_dropped > ROUNDING)
             + "It confirms a rank, it proves none."
