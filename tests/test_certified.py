@@ -11,6 +11,7 @@ import codac_bounds
 import numpy as np
 import pytest
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, in_turn
+from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.errors import DataError, ModelError
@@ -232,6 +233,17 @@ def test_volumes_enclose_the_quadrature_and_closed_forms():
     cube = paving("tripteron-router", np.full(3, 0.1), tolerance=0.1)
     assert cube.inner_volume <= 0.008 <= cube.outer_volume
     assert largest_cube("tripteron-router", np.full(3, 0.1)).edge <= 0.2 <= cube_bound(cube)
+
+
+def test_a_turned_cube_may_exceed_the_bound_of_cubes_along_the_axes_by_root_three_at_most():
+    robot = CATALOG["tripteron-router"]
+    quarter = Rotation.from_euler("z", 45.0, degrees=True).as_matrix()
+    turned = pteron.turned(robot, quarter)
+    edge = largest_cube(robot, np.full(3, 0.1)).edge  # along the router's axes, turned with it
+    found = paving(turned, quarter @ np.full(3, 0.1), tolerance=0.05)
+    bound = cube_bound(found)
+    assert 0.2 / np.sqrt(2.0) < bound < 0.9 * edge
+    assert edge <= min(np.sqrt(3.0) * bound, np.cbrt(found.outer_volume))
 
 
 def test_a_reach_without_end_is_refused_and_nowhere_is_proved():

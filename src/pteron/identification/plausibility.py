@@ -258,7 +258,7 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
     # x''^T M x'' is positive for every real machine, whatever its CAD says.
     robot, rng = model.robot, np.random.default_rng(0)
     drawn = model.base.grouping @ parameters(robot)
-    pose = random_poses(robot, _PROBES, seed=rng, type_i=0.3, type_ii=0.1)
+    pose = random_poses(robot, _PROBES, seed=rng)
     rest = np.zeros_like(pose)
     still = base_regressor(robot, model.base, pose, rest, rest)
     jacobians = unchecked(robot, "jacobian", pose)

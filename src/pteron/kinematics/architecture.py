@@ -18,6 +18,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, NoSquareRoot, PrimeField, general_program, numeric
 from pteron.kernels.fields import Evaluation
+from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
@@ -314,7 +315,8 @@ def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> Sing
     """Return the error for a machine that is singular at every pose."""
     return SingularPose(
         f"singular at every pose (type II): {architecture(robot).reason}; with the actuators held "
-        "still the platform can move; change a leg's direction or platform point",
+        "still the platform can move; change what the Jacobian depends on, a leg's "
+        f"{alternatives(jacobian_keys(robot))}",
         kind="II",
         measure=0.0,
         index=index,

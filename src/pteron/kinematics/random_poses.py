@@ -7,6 +7,7 @@ import numpy as np
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError
 from pteron.kinematics.architecture import expect_regular
+from pteron.kinematics.measure_floors import usual_floors
 from pteron.kinematics.sampling import drawn_poses
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import Poses, Seed
@@ -17,8 +18,8 @@ def random_poses(
     count: int,
     *,
     seed: Seed | np.random.Generator = 0,
-    type_i: float = 0.1,
-    type_ii: float = 0.1,
+    type_i: float | None = None,
+    type_ii: float | None = None,
     limits: bool = True,
 ) -> Poses:
     """Return poses drawn at random from those in reach and away from singularities.
@@ -27,6 +28,8 @@ def random_poses(
     Passive joints and the platform's angle keep their limits; the actuated joints need not. A
     platform that tilts is drawn within the limits of its angles, or where it has none with each of
     them within 0.5 rad of 0, and its actuated joints keep their limits too: poses that it takes.
+    Where fewer than one in a thousand of the poses drawn are in reach, a random walk finds where
+    they lie.
 
     Parameters
     ----------
@@ -36,10 +39,13 @@ def random_poses(
         Number of poses.
     seed : int or numpy Generator
         Seed, or source, of the random numbers.
-    type_i : float
-        Least type-I measure of every leg: 0 where it is singular, 1 at best.
-    type_ii : float
-        Least type-II measure of the machine.
+    type_i : float, optional
+        Least type-I measure of every leg: 0 where it is singular, 1 at best. By default 0.1 where
+        at least a tenth of the poses in reach have as much; else their median, so that no machine
+        is refused for its proportions.
+    type_ii : float, optional
+        Least type-II measure of the machine; by default 0.1 or the median likewise, of the poses
+        with that type-I measure. A number that is given is kept as it is.
     limits : bool
         Whether limits are kept as said above, or none are.
 
@@ -53,9 +59,10 @@ def random_poses(
     DataError
         If the count is no whole number, or negative.
     ModelError
-        If the legs have next to no common reach.
+        If the legs have next to no common reach; or if too few poses have the measures given, with
+        the greatest that was met.
     SingularPose
-        If a type-II measure above 0 is asked of a machine that is singular at every pose.
+        If the machine is singular at every pose, unless `type_ii` is 0.
 
     Examples
     --------
@@ -67,7 +74,8 @@ def random_poses(
     if count < 0:
         raise DataError(f"count: {count} given, 0 or more expected")
     expect_to_fit("count", count, 4.0 * count * robot.freedom)
-    if type_ii > 0.0:
+    if type_ii is None or type_ii > 0.0:
         expect_regular(robot)
+    least = usual_floors(robot, type_i, type_ii, limits)
     rng = np.random.default_rng(seed)
-    return drawn_poses(robot, count, rng, type_i, type_ii, limits=limits)
+    return drawn_poses(robot, count, rng, *least, limits=limits)

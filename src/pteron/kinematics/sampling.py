@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import lru_cache
 from operator import itemgetter
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
+from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.legs.leg import Passive
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
@@ -31,6 +34,24 @@ _SCOUTS = 100
 
 _LEADING = 20
 """Steps of Newton's method that lead a pose to joint coordinates."""
+
+_RARE = 1e-3
+"""Share of poses in reach of all legs below which a random walk looks for them."""
+
+_ROUNDS = 100
+"""Batches of the walk at most: steps shorten to 0.7^100 of the box where nothing is met."""
+
+_SPREAD = 20
+"""Batches by which it spreads once it is in reach, before poses are taken."""
+
+_LONGEST = 0.3
+"""Longest step of the walk, as a share of the box: a longer one draws from the box again."""
+
+_PARENTS = 200
+"""Poses from which the next batch of the walk sets out, where few are in reach."""
+
+_INSIDE = 0.05, 0.3
+"""Share of a batch in reach below which the walk's steps shorten, and above which they lengthen."""
 
 _TILT = 0.5
 """Greatest size of the angles drawn, rad, of a tilting platform whose file does not limit them."""
@@ -55,21 +76,57 @@ def drawn_poses(
     limits: bool = True,
 ) -> Array:
     """Return poses (count, m) in reach, as `random_poses` does, also if all are singular."""
-    low, high = _widest_box(robot)
     wanted = _Wanted(type_i, type_ii, limits)
-    coarse = _led(robot, low, high, rng, wanted)
-    free, share = np.ones(robot.freedom, dtype=bool), 0.05
-    if len(coarse) < _SCOUTS:
-        coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, wanted)
-        if len(coarse) >= count:
-            return coarse[:count]
-        free, share = ~robot.platform.angular, 0.25
+    sample = _search(robot, count, rng, wanted)
+    if len(sample.poses) < count:
+        raise _too_few(robot, count, sample, wanted)
+    return sample.poses[:count]
+
+
+def sampled_poses(
+    robot: Manipulator,
+    count: int,
+    rng: np.random.Generator,
+    type_i: float = 0.0,
+    *,
+    limits: bool = True,
+) -> Array:
+    """Return poses (count, m) in reach like `drawn_poses`, or as many (k, m) as are found."""
+    return _search(robot, count, rng, _Wanted(type_i, 0.0, limits)).poses[:count]
+
+
+def _search(robot: Manipulator, count: int, rng: np.random.Generator, wanted: _Wanted) -> _Sample:
+    """Return a sample of at least `count` usable poses, or of as many as are found."""
+    widest = _widest_box(robot)
+    every = np.ones(robot.freedom, dtype=bool)
+    led = _led(robot, *widest, rng, wanted)
+    if len(led) >= _SCOUTS:
+        return _drawn(robot, *_box_about(led, 0.05, every, widest), count, rng, wanted)
+    scouts = min(count, _SCOUTS)
+    sample = _drawn(robot, *widest, scouts, rng, wanted)
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
-    least, most = coarse.min(axis=0), coarse.max(axis=0)
+    if scouts <= len(sample.poses) < count:
+        box = _box_about(sample.poses, 0.25, ~robot.platform.angular, widest)
+        return _drawn(robot, *box, count, rng, wanted)
+    if len(sample.poses) >= count or sample.reached > _RARE * sample.tried:
+        return sample
+    walked = _walked(robot, *widest, max(count, _SCOUTS), rng, wanted)
+    if len(walked) < max(count, _SCOUTS):
+        return sample
+    near = _drawn(robot, *_box_about(walked, 0.25, every, widest), count, rng, wanted)
+    if len(near.poses) < count:
+        near.poses = rng.permutation(walked)
+    return near
+
+
+def _box_about(
+    poses: Array, share: float, free: NDArray[np.bool_], widest: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Return the ends of the bounding box of poses, widened by a share, in the free coordinates."""
+    least, most = poses.min(axis=0), poses.max(axis=0)
     margin = share * (most - least)
-    low = np.where(free, np.maximum(least - margin, low), low)
-    high = np.where(free, np.minimum(most + margin, high), high)
-    return _drawn(robot, low, high, count, rng, wanted)[:count]
+    low = np.where(free, np.maximum(least - margin, widest[0]), widest[0])
+    return low, np.where(free, np.minimum(most + margin, widest[1]), widest[1])
 
 
 class _Wanted(NamedTuple):
@@ -81,12 +138,23 @@ class _Wanted(NamedTuple):
     limits: bool
     """Whether limits are kept: those of passive joints, and of actuated ones where it tilts."""
 
-    def reached(self, robot: Manipulator, poses: Array) -> Array:
-        """Return those of the poses that are in reach and away from singularities."""
+    def reached(self, robot: Manipulator, poses: Array, sample: _Sample | None = None) -> Array:
+        """Return those of the poses that are in reach and away from singularities.
+
+        A sample is told how many are in reach, and the greatest measures.
+        """
         _, measures, _, _ = numeric(robot, "reach")(poses)
-        poses = poses[(measures >= self.type_i).all(axis=-1)]
+        within, bent = (measures >= 0.0).all(axis=-1), (measures >= self.type_i).all(axis=-1)
+        poses = poses[bent]
+        if sample is not None:
+            sample.reached += int(within.sum())
+            least = measures[within].min(axis=-1).max(initial=0.0)
+            sample.type_i = max(sample.type_i, float(least))
         if self.type_ii > 0.0 and len(poses):
-            poses = poses[type_ii_sizes(robot, poses) >= self.type_ii]
+            sizes = type_ii_sizes(robot, poses)
+            poses = poses[sizes >= self.type_ii]
+            if sample is not None:
+                sample.type_ii = max(sample.type_ii, float(sizes.max()))
         return poses
 
     def kept(self, robot: Manipulator, poses: Array) -> Array:
@@ -98,6 +166,26 @@ class _Wanted(NamedTuple):
             joints = numeric(robot, "joint_coordinates")(poses)[0]
             poses = poses[((low <= joints) & (joints <= high)).all(axis=-1)]
         return poses
+
+
+@dataclass
+class _Sample:
+    """Usable poses drawn from a box, and what the others lacked."""
+
+    poses: Array
+    """(k, m)."""
+    tried: int = 0
+    """Poses drawn."""
+    reached: int = 0
+    """Those in reach of all legs."""
+    apart: int = 0
+    """Those of them with the measures that are wanted."""
+    type_i: float = 0.0
+    """Greatest type-I measure, the least of all legs, of the poses in reach."""
+    type_ii: float = 0.0
+    """Greatest type-II measure of those with the type-I measure, where one is wanted."""
+    seen: Array = field(default_factory=lambda: np.empty((0, 0)))
+    """Some poses with the measures."""
 
 
 def _widest_box(robot: Manipulator) -> tuple[Array, Array]:
@@ -146,35 +234,112 @@ def _drawn(
     count: int,
     rng: np.random.Generator,
     wanted: _Wanted,
-) -> Array:
-    """Return at least `count` usable poses drawn from a box."""
-    found: list[Array] = []
-    total = reached = 0
-    seen = np.empty((0, robot.freedom))
-    attempts = _ATTEMPTS + count // 16
+) -> _Sample:
+    """Return at least `count` usable poses drawn from a box, or as many as are found."""
+    usable = [np.empty((0, robot.freedom))]
+    sample = _Sample(usable[0], seen=usable[0])
+    total, attempts = 0, _ATTEMPTS + count // 16
     for k in range(1, attempts + 1):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
-        poses = wanted.reached(robot, 0.5 * (low + high) + 0.5 * (high - low) * poses)
-        reached += len(poses)
-        seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses])
-        found.append(wanted.kept(robot, poses))
-        total += len(found[-1])
-        if total >= count:
-            return np.concatenate(found)
+        poses = 0.5 * (low + high) + 0.5 * (high - low) * poses
+        poses = wanted.reached(robot, poses, sample)
+        sample.tried += _BATCH
+        sample.apart += len(poses)
+        if len(sample.seen) < _SEEN:
+            sample.seen = np.concatenate([sample.seen, poses])
+        usable.append(wanted.kept(robot, poses))
+        total += len(usable[-1])
         # A quarter of the attempts tells, where many poses are wanted, that they will not be found.
-        if k == attempts // 4 and count >= _MANY and total < count / 16:
+        few = k == attempts // 4 and count >= _MANY and total < count / 16
+        if total >= count or few:
             break
-    if reached >= count:
-        raise ModelError(
-            f"only {total} of {reached} random poses in reach of all legs keep the limits of "
+    sample.poses = np.concatenate(usable)
+    return sample
+
+
+def _walked(
+    robot: Manipulator,
+    low: Array,
+    high: Array,
+    count: int,
+    rng: np.random.Generator,
+    wanted: _Wanted,
+) -> Array:
+    """Return at least `count` usable poses (k, m) that a random walk finds, or as many as it does.
+
+    It serves where poses in reach are so rare that drawing meets next to none: links of very
+    unequal length have a reach as thin as a shell. The poses that miss the legs' reach by least
+    lead to it; from poses in reach it spreads, in steps of which some, not all, stay there.
+    """
+    poses = rng.uniform(low, high, (_BATCH, robot.freedom))
+    kin = poses[:0]
+    usable = [kin]
+    step, spread = 0.1, 0
+    for _ in range(_ROUNDS):
+        margins = _least_margins(robot, poses)
+        inside = margins > 0.0
+        share = inside.mean()
+        if share >= _INSIDE[0]:
+            spread += 1
+            kin = poses[inside]
+        else:
+            both = np.concatenate([kin, poses])
+            kin = both[np.argsort(-_least_margins(robot, both), kind="stable")[:_PARENTS]]
+        if spread > _SPREAD:
+            usable.append(wanted.kept(robot, wanted.reached(robot, poses)))
+            if sum(map(len, usable)) >= count:
+                break
+        step *= 1.5 if share > _INSIDE[1] else 1.0 if share >= _INSIDE[0] else 0.7
+        step = min(step, _LONGEST)
+        steps = step * (high - low) * rng.normal(size=(_BATCH, robot.freedom))
+        poses = np.clip(kin[rng.integers(len(kin), size=_BATCH)] + steps, low, high)
+    return np.concatenate(usable)
+
+
+def _least_margins(robot: Manipulator, poses: Array) -> Array:
+    """Return the least margin (K,) of all legs' reach, m; -infinity where it is none."""
+    margins = numeric(robot, "reach")(poses)[0].min(axis=-1)
+    return np.asarray(np.nan_to_num(margins, nan=-np.inf))
+
+
+def _too_few(robot: Manipulator, count: int, sample: _Sample, wanted: _Wanted) -> ModelError:
+    """Return the error for a sample with too few usable poses: it names what they lack."""
+    total = len(sample.poses)
+    if sample.apart >= count:
+        text = (
+            f"only {total} of {sample.apart} random poses in reach of all legs keep the limits of "
             f"{'joints' if robot.platform.tilts else 'passive joints'}: "
-            f"{_seldom_kept(robot, seen)}; widen these limits",
-            subject=robot.name,
+            f"{_seldom_kept(robot, sample.seen)}; widen these limits"
         )
-    raise ModelError(
-        f"only {total} of {k * _BATCH} random poses are in reach of all legs and away from "
-        "singularities; bring the guide points nearer or lengthen the links",
-        subject=robot.name,
+    elif not sample.reached:
+        text = (
+            f"only 0 of {sample.tried} random poses are in reach of all legs; bring the guide "
+            "points nearer or lengthen the links"
+        )
+    elif sample.reached < count:
+        text = (
+            f"only {sample.reached} of {sample.tried} random poses are in reach of all legs, and "
+            f"{count} are wanted; ask for fewer"
+        )
+    else:
+        text = _below_floors(robot, sample, wanted)
+    return ModelError(text, subject=robot.name)
+
+
+def _below_floors(robot: Manipulator, sample: _Sample, wanted: _Wanted) -> str:
+    """Return the words for poses in reach of which too few have the measures that are wanted."""
+    head = f"only {sample.apart} of {sample.reached} random poses in reach of all legs have "
+    if sample.type_i < wanted.type_i or wanted.type_ii <= 0.0:
+        return (
+            f"{head}type-I measures of at least {wanted.type_i:g}; the greatest that was met, "
+            f"the least of all legs, is {sample.type_i:.3g}: ask for less (type_i)"
+        )
+    keys = alternatives(jacobian_keys(robot))
+    also = f"type-I measures of at least {wanted.type_i:g} and " if wanted.type_i > 0.0 else ""
+    return (
+        f"{head}{also}a type-II measure of at least {wanted.type_ii:g}; the greatest that was met "
+        f"is {sample.type_ii:.3g}: ask for less (type_ii), or change what the Jacobian depends on, "
+        f"the legs' {keys}"
     )
 
 

@@ -78,7 +78,8 @@ class NumericalCertificate(Certificate):
     tolerance : float
         Relative to the largest singular value (svd) or column (qr).
     smallest_kept, largest_dropped : float
-        The two values, relative to the largest, between which the rank was decided.
+        The two values, relative to the largest, between which the rank was decided. A column that
+        was dropped for its length counts by that, relative to the longest.
     residual : float
         Largest relative misfit of the dependent columns by the kept ones.
     """
@@ -98,9 +99,9 @@ class NumericalCertificate(Certificate):
         """Return the certificate in a few sentences."""
         return (
             f"Numerical rank {self.rank} of {self.columns} columns ({self.method}, {self.states} "
-            f"random states, columns scaled). Smallest value kept {self.smallest_kept:.1e}, "
-            f"largest dropped {self.largest_dropped:.1e}, relative to the largest: a gap of "
-            f"{self.gap:.0e}. "
+            "random states, rows and columns scaled). Smallest value kept "
+            f"{self.smallest_kept:.1e}, largest dropped {self.largest_dropped:.1e}, "
+            f"relative to the largest: a gap of {self.gap:.0e}. "
             f"Residual of the grouping {self.residual:.0e}. "
             + _UNCLEAR * (self.largest_dropped > ROUNDING)
             + "It confirms a rank, it proves none."

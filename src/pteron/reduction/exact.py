@@ -22,6 +22,7 @@ from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, PrimeField, bare
 from pteron.kinematics import is_singular_everywhere
+from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.manipulator import Manipulator
 from pteron.reduction.certificate import ExactCertificate
 from pteron.reduction.elimination import dependencies, reconstruct, remainder
@@ -178,7 +179,8 @@ def exact_grouping(
 def _without_dynamics(robot: Manipulator) -> SingularPose:
     return SingularPose(
         "singular at every pose (type II), so that it has no inverse dynamics and no base "
-        "parameters",
+        "parameters; change what the Jacobian depends on, a leg's "
+        f"{alternatives(jacobian_keys(robot))}",
         kind="II",
         measure=0.0,
         index=(),

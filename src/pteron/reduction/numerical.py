@@ -8,14 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.dynamics import regressor
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
+from pteron.kinematics.architecture import expect_regular
+from pteron.kinematics.measure_floors import median_floors
 from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.certificate import NumericalCertificate, NumericalRank
 from pteron.reduction.grouping import Grouping, Shares
 
 _TOLERANCE = 1e-10
-"""Singular values up to this share of the largest count as zero, with columns scaled to unit
+"""Singular values up to this share of the largest count as zero, with rows and columns of unit
 length: rounding leaves 1e-14, what is identifiable at all 1e-6 and more. The certificate reports
 the gap."""
 
@@ -35,8 +38,10 @@ class _Scaled(NamedTuple):
 
     matrix: Array
     lengths: Array
-    """Lengths of the columns before scaling; infinite where a column is rounding alone."""
+    """Lengths of the columns before that, in their units; infinite of rounding alone."""
     states: int
+    dropped: float
+    """Greatest length of a column that counts as rounding, over the longest."""
 
 
 def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
@@ -70,12 +75,12 @@ def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: 
 
 def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRank:
     """Return the rank that the singular values of the scaled regressor show."""
-    values = np.linalg.svd(_scaled_regressor(robot, sharing, seed).matrix, compute_uv=False)
+    scaled = _scaled_regressor(robot, sharing, seed)
+    values = np.linalg.svd(scaled.matrix, compute_uv=False)
     relative = values / values[0]
     kept = relative > _TOLERANCE
-    return NumericalRank(
-        int(kept.sum()), float(relative[kept][-1]), float(relative[~kept].max(initial=0.0))
-    )
+    dropped = float(relative[~kept].max(initial=scaled.dropped))
+    return NumericalRank(int(kept.sum()), float(relative[kept][-1]), dropped)
 
 
 def fitted_shares(
@@ -92,26 +97,53 @@ def _least_squares(scaled: _Scaled, kept: list[int], dropped: list[int]) -> Arra
 
 
 def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> _Scaled:
+    """Return the regressors at random states, without units: rows and columns of length 1.
+
+    Positive factors of rows and columns leave the rank as it is. Those of rows make forces and
+    moments, and poses near to and far from singularities, count alike.
+    """
     rng = np.random.default_rng(seed)
-    states = _STATES_PER_COLUMN * sharing.shape[1]
-    # Six forces on one body are hardly ever as far from singular as three or four may be.
-    apart = 0.2 if robot.freedom < 6 else 0.002
-    poses = random_poses(robot, states, seed=rng, type_i=0.2, type_ii=apart)
+    poses = _poses(robot, _STATES_PER_COLUMN * sharing.shape[1], rng)
     # In the machine's own units of length and time, so that its size does not matter.
     size = max(leg.size for leg in robot.legs)
     second = np.sqrt(size / _ACCELERATION)
     units = np.where(np.arange(robot.freedom) < len(robot.platform.directions), size, 1.0)
     velocity = units / second * rng.normal(size=poses.shape)
     acceleration = units / second**2 * rng.normal(size=poses.shape)
-    stacked = regressor(robot, poses, velocity, acceleration) @ sharing
-    stacked = stacked.reshape(-1, sharing.shape[1])
-    scale = np.linalg.norm(stacked, axis=0)
-    # A column that does nothing stays zero instead of being blown up to noise; columns of kg,
-    # kg m and kg m^2 are compared by what a body of the machine's size would have of them.
+    # Columns of kg, kg m and kg m^2 are compared by what a body of the machine's size would have.
     powers = np.array([p.length_power for p in parameter_data(robot)])
-    extent = scale * size ** (powers @ sharing / sharing.sum(axis=0))
-    scale = np.where(extent > _TOLERANCE * extent.max(), scale, np.inf)
-    return _Scaled(stacked / scale, scale, states)
+    extents = size ** (powers @ sharing / sharing.sum(axis=0))
+    rows = (regressor(robot, poses, velocity, acceleration) @ sharing) * extents
+    levers = np.array([size if leg.joint.unit == "rad" else 1.0 for leg in robot.legs])
+    stacked = (rows / levers[:, None]).reshape(-1, sharing.shape[1])
+    stacked = stacked / _lengths(stacked, axis=1)[0][:, None]
+    # A column that does nothing stays zero instead of being blown up to noise.
+    lengths, dropped = _lengths(stacked, axis=0)
+    return _Scaled(stacked / lengths, lengths / extents, len(poses), dropped)
+
+
+def _lengths(matrix: Array, axis: int) -> tuple[Array, float]:
+    """Return the lengths along an axis, infinite of those that vanish beside the longest.
+
+    Also the greatest of these, over the longest.
+    """
+    lengths = np.linalg.norm(matrix, axis=axis)
+    shares = lengths / max(float(lengths.max(initial=0.0)), np.finfo(float).tiny)
+    vanish = shares <= _TOLERANCE
+    return np.where(vanish, np.inf, lengths), float(shares[vanish].max(initial=0.0))
+
+
+def _poses(robot: Manipulator, count: int, rng: np.random.Generator) -> Array:
+    """Return random poses (count, m): the better ones of those in reach, whatever machine it is.
+
+    They keep the limits where enough poses do; the rank is the same beyond them.
+    """
+    expect_regular(robot)
+    try:
+        return random_poses(robot, count, seed=rng, **median_floors(robot)._asdict())
+    except ModelError:
+        least = median_floors(robot, limits=False)
+        return random_poses(robot, count, seed=rng, limits=False, **least._asdict())
 
 
 def independent(
@@ -148,7 +180,7 @@ def _grouping(
         states=scaled.states,
         tolerance=_TOLERANCE,
         smallest_kept=float(gap[0]),
-        largest_dropped=float(gap[1]),
+        largest_dropped=max(float(gap[1]), scaled.dropped),
         residual=float(np.abs(misfit).max(initial=0.0)),
     )
     return Grouping(tuple(kept), _given(kept, dropped, shares, scaled), certificate)

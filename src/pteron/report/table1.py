@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from pteron.manipulator import load
+from pteron.manipulator import RobotLike
 from pteron.reduction import base_parameters
 
 PRINTED = (
@@ -63,9 +63,9 @@ class Row:
     restored: bool
 
 
-def rows() -> tuple[Row, ...]:
-    """Return the rows of Table 1, computed for the catalog's Quadrupteron."""
-    base = base_parameters(load("quadrupteron"))  # Table 1
+def rows(robot: RobotLike = "quadrupteron") -> tuple[Row, ...]:
+    """Return the rows of Table 1, computed for a Quadrupteron: by default that of the catalog."""
+    base = base_parameters(robot)  # Table 1
     columns = base.names, PRINTED, base.expressions(), base.expressions(digits=12)
     return tuple(
         Row(f"P_b{i}", name, printed, shown, agree(printed, exact), i in RESTORED)

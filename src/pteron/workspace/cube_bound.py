@@ -1,4 +1,4 @@
-"""`cube_bound`: a proved upper bound on the edge of cubes that fit in the workspace."""
+"""`cube_bound`: a proved upper bound on the edge of cubes along the pose's axes in a workspace."""
 
 from __future__ import annotations
 
@@ -18,11 +18,17 @@ _WIDER = 1e-9
 
 
 def cube_bound(paving: Paving) -> float:
-    """Return an edge that no cube in a paved workspace exceeds, m.
+    """Return an edge, m, that no cube along the pose's axes in a paved workspace exceeds.
 
-    A cube of edge a holds, along each axis, at least floor(a / h) - 1 whole cells of a lattice of
-    spacing h in a row. None of them is proved outside; so there is no such cube where the paving
-    has no such block. Beside the edge of `largest_cube` it says how much more there can be.
+    Cubes whose edges are along the pose's coordinates are bounded, as `largest_cube` finds them; in
+    a plane, squares. Such a cube of edge a holds, along each axis, at least floor(a / h) - 1 whole
+    cells of a lattice of spacing h in a row. None of them is proved outside; so there is no such
+    cube where the paving has no such block. Beside the edge of `largest_cube` it says how much more
+    there can be.
+
+    A cube that is turned may be larger: by up to sqrt(3), or sqrt(2) in a plane, since the ball in
+    it holds a cube along the axes. No cube of any orientation has more than the cube root of
+    `paving.outer_volume` for its edge; in a plane, the square root.
 
     Parameters
     ----------
@@ -56,7 +62,7 @@ def cube_bound(paving: Paving) -> float:
 
 
 def _has_block(cells: Lattice, edge: float) -> bool:
-    """Return whether some block as a cube of this edge must hold may be all inside."""
+    """Return whether some block as a cube along the axes must hold may be all inside."""
     counts = np.maximum(np.floor(edge / cells.size).astype(int) - 1, 0)
     if not counts.all():
         return True

@@ -1,0 +1,82 @@
+"""Least singularity measures of random poses, relative to those that a machine's poses have.
+
+The measures are absolute, 1 at best, and many sound machines come nowhere near 1: the type-II
+measure of a Quadrupteron may be 0.02 at its best pose. A floor that is the same for all machines
+refuses such a machine; these follow from the distribution of its own measures over poses in reach.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.kernels import Array, numeric
+from pteron.kinematics.sampling import sampled_poses, type_ii_sizes
+from pteron.manipulator import Manipulator
+
+_SAMPLE = 100
+"""Poses in reach whose measures are taken: a tenth of them is 10, whose own deviation is 3."""
+
+_USUAL = 0.1
+"""Least measure of poses that count as away from singularities, where a machine has such poses."""
+
+_SHARE = 0.1
+"""Least share of poses in reach with the usual measure, so that it serves: drawing ten poses for
+one that is wanted is cheap. Of the catalog it is 0.25 and more."""
+
+_ROUNDING = 1e-9
+"""Share by which a measure may be below the median: one that is the same at every pose is so but
+for rounding."""
+
+
+class Floors(NamedTuple):
+    """Least measures of a pose."""
+
+    type_i: float
+    type_ii: float
+
+
+def usual_floors(
+    robot: Manipulator, type_i: float | None, type_ii: float | None, limits: bool
+) -> Floors:
+    """Return the floors of poses away from singularities; those given stay as they are.
+
+    One that is not given is 0.1 where at least a tenth of the machine's poses have as much, and
+    else the median of its poses.
+    """
+    if type_i is not None and type_ii is not None:
+        return Floors(type_i, type_ii)
+    bent, held = _measures(robot, type_i or 0.0, limits)
+    least = _usual(bent) if type_i is None else type_i
+    return Floors(least, _usual(held[bent >= least]) if type_ii is None else type_ii)
+
+
+def median_floors(robot: Manipulator, limits: bool = True) -> Floors:
+    """Return the median type-I measure, and the median type-II measure of poses that exceed it.
+
+    So a quarter of the poses in reach pass both, whatever machine it is.
+    """
+    bent, held = _measures(robot, 0.0, limits)
+    least = _median(bent)
+    return Floors(least, _median(held[bent >= least]))
+
+
+@lru_cache(maxsize=64)
+def _measures(robot: Manipulator, type_i: float, limits: bool) -> tuple[Array, Array]:
+    """Return the type-I measure (K,), the least of all legs, and the type-II measure of poses."""
+    poses = sampled_poses(robot, _SAMPLE, np.random.default_rng(0), type_i, limits=limits)
+    return numeric(robot, "reach")(poses)[1].min(axis=-1), type_ii_sizes(robot, poses)
+
+
+def _usual(measures: Array) -> float:
+    """Return the usual floor where enough measures pass it, else the median."""
+    enough = int((measures >= _USUAL).sum()) >= _SHARE * len(measures)
+    return _USUAL if enough else _median(measures)
+
+
+def _median(measures: Array) -> float:
+    """Return the median of measures above 0; 0 where there is none."""
+    measures = measures[measures > 0.0]
+    return float(np.median(measures)) * (1.0 - _ROUNDING) if len(measures) else 0.0
