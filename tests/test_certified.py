@@ -10,13 +10,14 @@ import casadi as ca
 import codac_bounds
 import numpy as np
 import pytest
-from mechanisms import CATALOG, CLIENTS, MECHANISMS, in_turn
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated, in_turn
 from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.errors import DataError, ModelError
 from pteron.kernels import TARGETS, Port, bounds, numeric
-from pteron.kernels.bounds import Bounded
+from pteron.kernels.bounds import UNBOUNDED, Bounded
+from pteron.kernels.entries import TABLE
 from pteron.kinematics import random_poses
 from pteron.workspace import (
     Box,
@@ -24,8 +25,11 @@ from pteron.workspace import (
     components,
     conditions,
     cube_bound,
+    home_pose,
+    largest_ball,
     largest_cube,
     largest_cylinder,
+    largest_tilt,
     mode_contacts,
     mode_pavings,
     over_angles,
@@ -35,6 +39,7 @@ from pteron.workspace import (
 )
 from pteron.workspace.conditions import keeps
 from pteron.workspace.margins import distance_to_limits
+from pteron.workspace.tilts import TiltedBall
 
 MACHINES = {**CATALOG, **MECHANISMS}
 SOME = ["quadrupteron-oblique", "delta", "3-rrr", "random 3T1R 0", "random PRR 0"]
@@ -127,6 +132,56 @@ def test_bounds_hold_at_every_pose_of_a_box(name):
         assert (values[there] <= high + room).all(), what
         assert there[np.broadcast_to(found.defined, values.shape)].all(), what
         assert defined.any(), what
+
+
+def with_elbow_limits(name):
+    """Return a machine of the catalog whose elbows have limits that home keeps."""
+    robot = CATALOG[name]
+    legs = tuple(replace(leg, elbow_limits=(0.2, 2.9)) for leg in robot.legs)
+    return replace(robot, name=f"{name} with elbow limits", legs=legs)
+
+
+BOUNDED = {
+    **{name: CATALOG[name] for name in ("delta", "par4", "3-rpr", "tripteron-oblique")},
+    **{f"{n}, elbows": with_elbow_limits(n) for n in ("quadrupteron", "five-bar", "3-rrr")},
+}
+
+
+@pytest.mark.parametrize(
+    "name", gated(BOUNDED, ["quadrupteron, elbows", "five-bar, elbows"], CLIENTS)
+)
+def test_every_function_of_the_pose_is_bounded(name):
+    """Limits of elbows included, whose slopes have signs; but for functions of singular values."""
+    robot, count = BOUNDED[name], 0
+    home = home_pose(robot)
+    box = np.array([home - 1e-5, home + 1e-5])
+    poses = box[0] + np.random.default_rng(0).random((20, robot.freedom)) * (box[1] - box[0])
+    for what in TABLE:
+        try:
+            function = pteron.compile(robot, what)
+        except ModelError:  # the machine has no such function, or it is of base parameters
+            continue
+        if [port.name for port in function.inputs] != ["pose"]:
+            continue
+        names = [port.name for port in function.outputs]
+        values = dict(zip(names, results(function(poses)), strict=True))
+        for output, found in bounds(robot, what, box).items():
+            there = np.isfinite(values[output])
+            room = 1e-9 * (1.0 + np.abs(values[output][there]))
+            low, high, defined = (
+                np.broadcast_to(part, values[output].shape)[there]
+                for part in (found.low, found.high, found.defined)
+            )
+            assert (low - room <= values[output][there]).all(), (what, output)
+            assert (values[output][there] <= high + room).all(), (what, output)
+            assert defined.all() or what in UNBOUNDED, (what, output)
+            count += 1
+    assert count > 20
+
+
+def results(outputs):
+    """Return a kernel's outputs as a tuple, also where it has one."""
+    return outputs if isinstance(outputs, tuple) else (outputs,)
 
 
 def test_bounds_come_as_near_as_the_square_of_the_width():
@@ -305,13 +360,60 @@ def test_a_region_that_touches_the_boundary_is_not_decided():
 
 
 @CLIENTS
+@pytest.mark.parametrize(
+    ("attempt", "message"),
+    [
+        (lambda home: largest_tilt("stewart", home, radius=-0.5), "radius: -0.5 m given"),
+        (lambda home: largest_tilt("stewart", home, radius=np.nan), "radius: nan m given"),
+        (lambda home: largest_tilt("stewart", home, tolerance=0.0), "tolerance: 0.0 given"),
+        (lambda home: largest_ball("stewart", home, tilt=-0.1), "tilt: -0.1 rad given"),
+        (
+            lambda home: largest_ball("stewart", home, tilt=0.1, tolerance=1.5),
+            "tolerance: 1.5 given, a share above 0 and below 1 expected",
+        ),
+        (
+            lambda home: TiltedBall(tuple(home), 9.0, -0.1, (0, 1, 2), (3, 4)),
+            "tilt: -0.1 rad given",
+        ),
+        (lambda home: largest_cube("delta", home[:3], tolerance=-1.0), "tolerance: -1.0 given"),
+        (lambda home: paving("five-bar", [0.0, 0.3], tolerance=2.0), "tolerance: 2.0 given"),
+        (lambda home: prove("delta", NoPose()), "holds no pose"),
+    ],
+)
+def test_a_proof_that_examines_nothing_is_refused(attempt, message):
+    with pytest.raises(DataError, match=message):
+        attempt(home_pose("stewart"))
+
+
+class NoPose:
+    """A region without a pose."""
+
+    box = np.array([[0.0, 0.0, -0.9], [0.1, 0.1, -0.8]])
+
+    def holds(self, poses):
+        return np.zeros(poses.shape[:-1], dtype=bool)
+
+    def misses(self, low, high):
+        return np.ones(len(low), dtype=bool)
+
+
+@pytest.mark.parametrize("name", ["wrist", "ankle", "sprint-z3", "five-bar", "3-rrr"])
+def test_a_cylinder_is_refused_where_a_pose_has_not_three_lengths(name):
+    home = home_pose(name)
+    if len(home) == 3:  # a cylinder's middle has at least three numbers
+        with pytest.raises(DataError, match="a cylinder is a set of places in x, y and z"):
+            prove(name, Cylinder(tuple(home), 0.1, 0.1))
+    with pytest.raises(DataError, match="a cylinder is a set of places in x, y and z"):
+        largest_cylinder(name, home)
+
+
 def test_cylinders_are_proved_too():
     found = largest_cylinder("tripteron-router", np.full(3, 0.1))
     assert found.proof.holds
     assert 0.19 < found.edge <= 0.2
     tilted = Cylinder((0.0, 0.0, 0.0, 0.0), 0.03, 0.1, (1.0, 1.0, 1.0))
     assert prove(QUADRUPTERON, tilted).holds
-    with pytest.raises(DataError, match="a planar machine has no cylinder"):
+    with pytest.raises(DataError, match="a cylinder is a set of places in x, y and z"):
         prove("3-rrr", Cylinder((0.0, 0.0, 0.0), 0.1, 0.1))
     with pytest.raises(DataError, match="must be finite"):
         replace(tilted, radius=np.inf)

@@ -118,6 +118,17 @@ def expect(holds: object, name: str, given: object, wanted: object) -> None:
         raise DataError(f"{name}: {given} given, {wanted} expected")
 
 
+def expect_share(name: str, given: float) -> None:
+    """Refuse a number that is no share of a whole: it must be above 0 and below 1.
+
+    Raises
+    ------
+    DataError
+        If it is not, or is NaN.
+    """
+    expect(0.0 < given < 1.0, name, repr(given), "a share above 0 and below 1")
+
+
 def number_or_nan(value: object) -> float:
     """Return what `float` makes of a value, NaN of what is no number.
 

@@ -19,6 +19,7 @@ from pteron.closures.closure import against, plain_rows
 from pteron.closures.determinants import adjugate
 from pteron.equations.machine import Machine, State
 from pteron.equations.singular_values import largest, singular_values, smallest
+from pteron.errors import ModelError
 
 
 class Homogeneous(NamedTuple):
@@ -202,12 +203,23 @@ def _conspiring(columns: Expression) -> Expression:
 
 def _lengths(machine: Machine, rows: Expression) -> Expression:
     """Return the columns of the pose's lengths."""
-    return rows[:, : _lengths_of(machine)]
+    return _some(machine, rows[:, : _lengths_of(machine)], "only turns")
 
 
 def _turns(machine: Machine, rows: Expression) -> Expression:
     """Return the columns of the platform's turns."""
-    return rows[:, _lengths_of(machine) :]
+    return _some(machine, rows[:, _lengths_of(machine) :], "does not turn")
+
+
+def _some(machine: Machine, columns: Expression, lacking: str) -> Expression:
+    """Return the columns, or refuse a platform that has none of them."""
+    if columns.shape[1] == 0:
+        motion = machine.robot.platform.motion
+        raise ModelError(
+            f"a {motion} platform {lacking}, so that it has no such index; "
+            "pteron.indices.indices_of lists those of a machine"
+        )
+    return columns
 
 
 def _inverse(rows: Expression) -> tuple[Expression, Expression]:

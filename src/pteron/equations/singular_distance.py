@@ -45,6 +45,5 @@ def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expressio
 
 
 def _first_order(measure: Expression, square: Expression, most: float) -> Expression:
-    """Return |mu| over its slope, given squared; a least slope keeps the distance to `most`."""
-    least = measure / most
-    return ca.fabs(measure) / ca.sqrt(square + least * least + _TINY)
+    """Return |mu| over its slope, whose square is given: at most `most`."""
+    return ca.fmin(ca.fabs(measure) / ca.sqrt(square + _TINY), most)

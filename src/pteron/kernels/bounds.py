@@ -26,6 +26,12 @@ from pteron.kernels.programs import program
 from pteron.kernels.targets import FIXED
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
+UNBOUNDED = (
+    *("condition", "condition_points", "kappa", "speed_least", "speed_most", "turning_speed"),
+    *("force_least", "force_most", "turning_moment"),
+)
+"""Functions of singular values, of which bounds are defined at single poses alone."""
+
 
 @dataclass(frozen=True)
 class Bounded:
@@ -131,6 +137,10 @@ def _bounded(robot: Manipulator, what: str) -> Bounded:
 
 def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure]:
     """Return proved bounds on a function of the pose, in boxes of poses.
+
+    Every function of the pose alone has them. Of those that are made of singular values
+    (`UNBOUNDED`) they may be infinite and undefined in every box that is more than a pose: the
+    rotations that make them turn by any angle where two singular values may be equal.
 
     Parameters
     ----------

@@ -195,6 +195,9 @@ TABLE |= {
 FUNCTIONS = tuple(TABLE)
 """The functions that `compile` accepts, beside the indices and their ingredients."""
 
+INTERNAL = ("driven_motion",)
+"""Functions of the table whose inputs depend on the drives: the simulation's alone."""
+
 
 def _driven_motion(m: Machine, v: Symbols) -> Outputs:
     kind: transmissions.DriveKind = v["kind"]

@@ -22,7 +22,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -305,7 +304,7 @@ RULES: dict[str, Callable[..., Interval]] = {
     "atan2": angle,
     "fabs": absolute,
     "floor": partial(_stepwise, np.floor),
-    str(ca.OP_SIGN): partial(_stepwise, np.sign),
+    "sign": partial(_stepwise, np.sign),
     "fmin": minimum,
     "fmax": maximum,
     "less": less,

@@ -29,6 +29,7 @@ from pteron.errors import ModelError
 from pteron.kernels.functions import (
     ANGLES,
     FUNCTIONS,
+    INTERNAL,
     TABLE,
     TYPE_I,
     TYPE_II,
@@ -99,7 +100,7 @@ def program(
     ModelError
         If there is no function of that name, or an option is out of place.
     """
-    if what not in TABLE:
+    if what not in TABLE or what in INTERNAL:
         raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
     if what in SELECTED and columns is None:
         raise ModelError(f'base: missing; "{what}" needs base=base_parameters(robot)')

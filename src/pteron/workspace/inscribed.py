@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pteron.arguments import expect
+from pteron.arguments import expect, expect_share
 from pteron.equations.machine import numbers
-from pteron.errors import DataError, ModelError
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
@@ -17,7 +17,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.fit import Fit, largest_fit, proved_fit
-from pteron.workspace.proofs import Proof, prove
+from pteron.workspace.proofs import Proof, expect_space, prove
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.samples import Shape, cube
 from pteron.workspace.smooth_conditions import smooth_conditions
@@ -146,12 +146,12 @@ def largest_cylinder(
     ModelError
         If there is none.
     DataError
-        If the machine is planar, or the ratio not positive.
+        If the machine does not move in x, y and z, the ratio is not positive, or the tolerance is
+        no share between 0 and 1.
     """
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
-    if robot.platform.planar:
-        raise DataError("robot: a planar machine has no cylinder in its workspace; ask for a cube")
+    expect_space(robot, "robot")
     expect(ratio > 0.0, "ratio", repr(ratio), "a number above 0")
     unit = np.array(Cylinder((0.0, 0.0, 0.0), 1.0, 1.0, axis).axis)
     across = np.linalg.svd(unit[None])[2][1:]
@@ -182,6 +182,7 @@ def _largest(
     given: tuple[Condition, ...] | None,
 ) -> Inscribed:
     expect_places(robot, "it only turns; ask for its `largest_tilt`")
+    expect_share("tolerance", tolerance)
     asked = conditions(robot) if given is None else given
     smooth, geometry = smooth_conditions(robot, asked), np.array(numbers(robot))
     lengths = len(robot.platform.lengths)

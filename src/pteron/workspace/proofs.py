@@ -67,6 +67,9 @@ class Proof:
     causes: tuple[Condition, ...] = ()
     boxes: int = 0
 
+    def __post_init__(self) -> None:
+        assert not self.holds or self.boxes > 0, "a proof has examined something"
+
     def __str__(self) -> str:
         told = ", ".join(map(str, self.causes))
         if self.holds:
@@ -138,8 +141,8 @@ def prove(
     Raises
     ------
     DataError
-        If the region is none, its poses have not the machine's coordinates, it is a cylinder and
-        the machine is planar, or a floor is negative.
+        If the region is none or holds no pose, its poses have not the machine's coordinates, it is
+        a cylinder and the machine does not move in x, y and z, or a floor is negative.
     SingularPose
         If the machine is singular at every pose.
 
@@ -156,8 +159,8 @@ def prove(
     if box.shape[1] != robot.freedom:
         names = ", ".join(robot.coordinates)
         raise DataError(f"region: {box.shape[1]} coordinates given, {names} expected")
-    if isinstance(region, Cylinder) and robot.platform.planar:
-        raise DataError("region: a planar machine has no cylinder in its workspace; give a box")
+    if isinstance(region, Cylinder):
+        expect_space(robot, "region")
     expect_regular(robot)
     asked = conditions(robot, type_i=type_i, type_ii=type_ii)
     if given is not None:
@@ -177,6 +180,8 @@ def prove(
             parts.append(part[outside | (bits != 0)])
             still.append(bits[outside | (bits != 0)])
         left, open_ = np.concatenate(parts), np.concatenate(still)
+        if not seen:
+            raise DataError("region: it holds no pose, so that nothing can be proved of it")
         if not len(left):
             return Proof(True, robot, region, asked, boxes=seen)
         found = _counterexample(robot, test, region, left)
@@ -195,6 +200,17 @@ def prove(
                 None, robot, region, asked, None, left[smallest], causes=causes, boxes=seen
             )
         left, open_ = halved(left, sizes), np.repeat(open_, 2)
+
+
+def expect_space(robot: Manipulator, name: str) -> None:
+    """Refuse a cylinder, the argument of this name, of a machine without x, y and z in its pose."""
+    lengths = robot.platform.lengths
+    if len(lengths) != 3:
+        motion, places = robot.platform.motion, ", ".join(lengths) or "no lengths"
+        raise DataError(
+            f"{name}: a cylinder is a set of places in x, y and z, and the pose of {robot.name} "
+            f"({motion}) has {places}; give a Box"
+        )
 
 
 def _counterexample(

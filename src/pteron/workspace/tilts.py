@@ -10,7 +10,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.arguments import expect
+from pteron.arguments import expect, expect_share
 from pteron.bodies.vectors import PARALLEL_TOLERANCE, dot
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -59,6 +59,11 @@ class TiltedBall:
     tilt: float
     lengths: tuple[int, ...]
     angles: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        expect(0.0 <= self.radius < math.inf, "radius", f"{self.radius:g} m", "0 or more")
+        expect(0.0 <= self.tilt < _MOST, "tilt", f"{self.tilt:g} rad", "one from 0 to below pi/2")
+        expect(np.isfinite(self.center).all(), "center", self.center, "finite numbers")
 
     @property
     def box(self) -> Array:
@@ -159,6 +164,8 @@ def largest_tilt(
 
     Raises
     ------
+    DataError
+        If the radius is negative, or the tolerance no share between 0 and 1.
     ModelError
         If the platform does not tilt by two angles, or the level pose does not serve.
     """
@@ -193,12 +200,13 @@ def largest_ball(
 
     Raises
     ------
+    DataError
+        If the tilt is negative or a right angle, or the tolerance no share between 0 and 1.
     ModelError
         If the platform does not tilt and move, or the centre does not serve at that tilt.
     """
     robot, at = _checked(robot, pose)
     expect_places(robot, "it only turns")
-    expect(0.0 <= tilt < _MOST, "tilt", f"{tilt:g} rad", "one from 0 to below pi/2")
     far = sum(leg.size for leg in robot.legs)
     return _largest(robot, at, far, tolerance, given, lambda radius: (radius, tilt))
 
@@ -228,6 +236,7 @@ def _largest(
     given: tuple[Condition, ...] | None,
     sizes: Callable[[float], tuple[float, float]],
 ) -> LargestTilt:
+    expect_share("tolerance", tolerance)
     asked = conditions(robot) if given is None else given
     angular = np.flatnonzero(robot.platform.angular)
     lengths = tuple(np.flatnonzero(~robot.platform.angular).tolist())

@@ -26,7 +26,7 @@ def point_to_point(
 ) -> Motion:
     """Return the motion from rest in one pose straight to rest in another.
 
-    The tool's centre point goes along a line, and the platform turns evenly with it.
+    The tool's centre point goes along a line, and the pose's angles change in proportion with it.
 
     Parameters
     ----------
