@@ -412,6 +412,52 @@ def test_sensitivities_against_machines_with_moved_parts(name):
         np.testing.assert_allclose(one, exact, rtol=0, atol=1e-4, err_msg=dimension)
 
 
+@pytest.mark.parametrize("name", ["quadrupteron-oblique", "wrist", "ankle"])
+def test_sensitivities_against_machines_with_another_centre_and_axes(name):
+    """Of a platform that turns: its axis, or the centre and the axes about which it does."""
+    robot, step = pteron.load(name), 1e-4
+    pose = pteron.random_poses(robot, 1, seed=3)[0]
+    found = geometric_sensitivities(robot, pose)
+    own = [n for n in found.names if n.startswith("platform: ")]
+    platform = robot.platform
+    assert len(own) == 3 * (platform.center is not None) + 2 * len(turning_axes(platform))
+    joints, rows = pteron.inverse_kinematics(robot, pose), pteron.jacobian(robot, pose)
+
+    def settled(**change):
+        """Return where a machine is with the same joints, by Newton's method."""
+        machine = replace(robot, platform=replace(platform, **change))
+        at = pose
+        for _ in range(5):
+            missed = pteron.inverse_kinematics(machine, at) - joints
+            at = at - np.linalg.solve(rows, missed)
+        return at
+
+    for dimension in own:
+        key, axis = dimension.removeprefix("platform: ").replace(" about", "").split()
+        unit = np.array(platform.frame)["xyz".index(axis)]
+
+        def changed(h, key=key, axis=axis, unit=unit):
+            if key == "center":
+                return {key: tuple(np.array(platform.center) + h * np.eye(3)["xyz".index(axis)])}
+            turn = Rotation.from_rotvec(h * unit).as_matrix()
+            keys = [key, *(["x_axis"] if platform.second_axis is None else [])]
+            return {k: tuple(turn @ getattr(platform, k)) for k in keys}
+
+        exact = (settled(**changed(step)) - settled(**changed(-step))) / (2 * step)
+        column = found.matrix[:, found.names.index(dimension)]
+        size = max(1.0, np.abs(exact).max())
+        np.testing.assert_allclose(column, exact, rtol=0, atol=1e-4 * size, err_msg=dimension)
+
+
+def turning_axes(platform):
+    """Return the axes of a platform that its file names."""
+    return (
+        [platform.axis, platform.second_axis]
+        if platform.second_axis
+        else ([] if platform.center else [platform.axis])
+    )
+
+
 def test_errors_add_up():
     robot = CATALOG["quadrupteron"]
     robot = replace(robot, platform=replace(robot.platform, tool=(0.03, 0.0, -0.05)))

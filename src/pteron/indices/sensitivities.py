@@ -11,6 +11,7 @@ import numpy as np
 
 from pteron.bodies.vectors import Vector, cross, dot
 from pteron.equations.machine import numbers
+from pteron.equations.variations import slope_matrix, slope_terms, variations
 from pteron.kernels import Array, general_program, layout_of
 from pteron.kinematics import twist
 from pteron.kinematics.evaluate import checked, evaluated
@@ -30,7 +31,7 @@ class Sensitivities:
     ----------
     names : tuple of str
         Names of the dimensions: "leg 1: upper_length", "leg 1: guide_point x", "leg 2: direction
-        about y".
+        about y", "platform: center z".
     roles : tuple of {"point", "length", "angle"}
         The role of each.
     units : tuple of str
@@ -57,7 +58,9 @@ def geometric_sensitivities(
     has two angles by which it may be tilted, about axes of the base frame made perpendicular to it;
     directions of the leg perpendicular to it are tilted with it, and may be turned about it. Angles
     out of a planar machine's plane and between a leg's parallel axes are left out: they would
-    strain the machine or tilt its platform, which a pose cannot express.
+    strain the machine or tilt its platform, which a pose cannot express. The point and the axes
+    about which a platform turns count too, as for `calibrate`: turns of its axes are about those of
+    its frame.
 
     Parameters
     ----------
@@ -164,6 +167,17 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
             if name.startswith("platform_point"):
                 unit = per_radian
             yield f"leg {i}: {name}", role, unit, way
+    yield from _of_platform(robot)
+
+
+def _of_platform(robot: Manipulator) -> Iterator[_Dimension]:
+    """Yield the same of the point and the directions about which the platform turns."""
+    changes = [change for change in variations(robot) if change.leg < 0]
+    ways = slope_matrix(robot, changes, slope_terms(robot, changes), np.array(numbers(robot)))
+    for change, way in zip(changes, ways.T, strict=True):
+        role = "angle" if change.group == "directions" else "point"
+        joint = " about " if role == "angle" else " "
+        yield f"platform: {change.key}{joint}{'xyz'[change.axis or 0]}", role, change.unit, way
 
 
 def _of_leg(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
