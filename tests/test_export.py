@@ -8,6 +8,7 @@ import subprocess
 import textwrap
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -22,6 +23,7 @@ from pteron.cli.main import app
 from pteron.equations.drives import drive_numbers
 from pteron.errors import DataError, ModelError, OutputError, UnlikelyValue
 from pteron.export import FUNCTIONS
+from pteron.export.functions import chosen
 from pteron.identification import Terms, identify
 from pteron.identification.signals import States
 from pteron.kernels.vm import VirtualMachine
@@ -131,7 +133,7 @@ def test_every_function_can_be_exported_and_the_test_program_can_fail(tmp_path, 
     build(tmp_path, files, "-O0")
     code, output = run(tmp_path)
     assert code == 1
-    assert "direct_kinematics: off by" in output
+    assert "direct_kinematics, column 1: off by" in output
 
 
 @cache
@@ -455,6 +457,46 @@ def test_a_file_that_is_no_identification_of_the_machine_is_refused(tmp_path):
     with pytest.raises(DataError, match=r"no\.json: No such file"):
         pteron.export_c(DELTA, folder=tmp_path / "c", base=tmp_path / "no.json")
     assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    "name", gated(["tripteron", "quadrupteron", "delta-4", "five-bar"], ["tripteron"], CLIENTS)
+)
+def test_no_function_is_well_where_a_pose_or_a_joint_is_no_number(name, tmp_path):
+    """Not even where the outputs do not depend on it; and no output that is well is NaN."""
+    robot = pteron.load(name)
+    exported = []
+    for what in FUNCTIONS:
+        try:
+            (item,) = chosen(
+                robot, what, specialised=False, wrench=False, output="force", base=None
+            )
+        except ModelError:  # the machine has no such function
+            continue
+        if {"pose", "joints"} & {port.name for port in item.inputs}:
+            exported.append(item)
+    call, _ = compiled(robot, [item.name for item in exported], tmp_path)
+    pose = states(robot, 1)[0][0]
+    given = {
+        "pose": pose,
+        "joints": pteron.inverse_kinematics(robot, pose),
+        "parameters": pteron.parameters(robot),
+        "drives": drive_numbers(robot),
+    }
+    rng = np.random.default_rng(0)
+    for item in exported:
+        inputs = [
+            np.array(given.get(port.name, rng.normal(size=port.shape))) for port in item.inputs
+        ]
+        sizes = [port.size for port in item.outputs]
+        assert call(item.name, *inputs, sizes=sizes)[0] == 0, item.name
+        for k, port in enumerate(item.inputs):
+            if port.name not in ("pose", "joints"):
+                continue
+            for j, bad in product(range(port.size), (np.nan, np.inf, -np.inf)):
+                changed = [value.copy() for value in inputs]
+                changed[k][j] = bad
+                assert call(item.name, *changed, sizes=sizes)[0] == 1, (item.name, port, j, bad)
 
 
 @pytest.mark.parametrize("name", gated(["quadrupteron", "delta"], ["delta"]))

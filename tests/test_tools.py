@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 from mechanisms import CLIENTS
+from scipy.spatial.transform import Rotation
 from test_cli import done, refused
 from test_export import compiled, states
 
@@ -178,3 +179,31 @@ def test_an_fmu_lists_the_tools(tmp_path):
     (path,) = export_fmu(equipped("quadrupteron", GRIPPER), tmp_path)
     told = ZipFile(path).read("modelDescription.xml").decode()
     assert "Tool gripper, its centre point at 0 0 -0.08 m: mass := [0.3]" in told
+
+
+@pytest.mark.parametrize(
+    ("name", "inertia"),
+    [
+        ("ankle", (0.002, 1e-4, -2e-4, 0.0015, 3e-4, 0.0018)),
+        ("wrist", (0.002, 1e-4, -2e-4, 0.0015, 3e-4, 0.0018)),
+        ("quadrupteron", 0.002),
+    ],
+)
+def test_tools_turn_with_the_machine(name, inertia):
+    """A 2R platform's frame is the base's at angles zero, so that its tools have other numbers."""
+    tool = Tool("pen", (0.02, -0.01, 0.05), 0.4, (0.01, 0.02, 0.03), inertia)
+    robot = replace(pteron.load(name), tools=(tool,))
+    turn = Rotation.random(rng=3).as_matrix()
+    pose = pteron.random_poses(robot, 5, seed=1)
+    rng = np.random.default_rng(2)
+    motion = [pose, *rng.normal(size=(2, *pose.shape))]
+    moved = [part.copy() for part in motion]
+    for part in moved:
+        if len(robot.platform.lengths) == 3:
+            part[:, :3] = part[:, :3] @ turn.T
+    np.testing.assert_allclose(
+        pteron.inverse_dynamics(with_tool(pteron.turned(robot, turn), "pen"), *moved),
+        pteron.inverse_dynamics(with_tool(robot, "pen"), *motion),
+        rtol=0,
+        atol=1e-10,
+    )

@@ -46,4 +46,6 @@ def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expressio
 
 def _first_order(measure: Expression, square: Expression, most: float) -> Expression:
     """Return |mu| over its slope, whose square is given: at most `most`."""
-    return ca.fmin(ca.fabs(measure) / ca.sqrt(square + _TINY), most)
+    size = ca.fabs(measure)
+    # `fmin` of the quotient would take `most` for a quotient that is not a number.
+    return size / ca.fmax(ca.sqrt(square + _TINY), size / most)

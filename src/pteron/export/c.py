@@ -9,16 +9,18 @@ controller's code gives the bits that `simulate` has, on whatever machine it run
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
+
+import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
-from pteron.export.functions import Asked, Exported, chosen
+from pteron.export.functions import PLACES, Asked, Exported, chosen
 from pteron.export.names import prefix_of
 from pteron.kernels import Array
 from pteron.kernels.code import (
@@ -138,7 +140,7 @@ def c_texts(
         "tables": {table.name: table for item in exported for table in item.tables}.values(),
         "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
-        "tolerance": 1e-4 if single else 1e-10,
+        "tolerance": _tolerance_of(float(np.finfo(np.float32 if single else np.float64).eps)),
         **arithmetic(),
     }
     files = {
@@ -148,6 +150,15 @@ def c_texts(
         "CMakeLists.txt": "CMakeLists.txt.j2",
     }
     return {file: rendered("pteron.export", name, **values) for file, name in files.items()}
+
+
+def _tolerance_of(rounding: float) -> Callable[[float], float]:
+    """Return what gives the tolerance of a result's columns, relative, from its gain.
+
+    Of a hexapod's thousand operations rounding sums up to some tens of units in the last place, and
+    the gain magnifies it; the least is 1000 units.
+    """
+    return lambda gain: 1000.0 * rounding * max(gain, 1.0)
 
 
 @dataclass(frozen=True)
@@ -229,16 +240,36 @@ class CPrinter:
                 if nodes[k].operation != CONSTANT:
                     finite.append(f"{self.prefix}_finite({port.name}[{j}])")
         used = {i for i, _ in used_inputs(graph)}
-        lines += [f"(void){port.name};" for i, port in enumerate(item.inputs) if i not in used]
-        if item.several:  # one real pose is enough
-            rows = finite[:: item.outputs[0].shape[1]]
-            return lines, [(_all(f"({test} == 0)" for test in rows), "UNREACHABLE")]
+        placed = [i for i, port in enumerate(item.inputs) if port.name in PLACES]
+        lines += [
+            f"(void){port.name};"
+            for i, port in enumerate(item.inputs)
+            if i not in used and i not in placed
+        ]
+        # A number that no output depends on is tested too: the caller's pose is wrong.
+        known = [
+            f"({self.prefix}_finite({item.inputs[i].name}[{j}]) != 0)"
+            for i in placed
+            for j in range(item.inputs[i].size)
+        ]
+        failures = [(f"!({_all(known)})", "UNREACHABLE")] if known else []
+        if item.several:
+            failures.append((self._no_pose(item), "UNREACHABLE"))
+            return lines, failures
         reached = [f"(isgreaterequal({name}, {self.number(0.0)}) != 0)" for name in radicands]
-        failures = [(f"!({_all(reached)})", "UNREACHABLE")] if reached else []
+        failures += [(f"!({_all(reached)})", "UNREACHABLE")] if reached else []
         if finite:
             regular = _all(f"({test} != 0)" for test in finite)
             failures.append((f"!({regular})", "NOT_FINITE"))
         return lines, failures
+
+    def _no_pose(self, item: Exported) -> str:
+        """Return the condition that no row of an output is a pose of finite numbers."""
+        (port,) = item.outputs
+        rows, columns = port.shape
+        tests = [f"({self.prefix}_finite({port.name}[{j}]) != 0)" for j in range(port.size)]
+        poses = [tests[i * columns : (i + 1) * columns] for i in range(rows)]
+        return _all(f"!({' && '.join(pose)})" for pose in poses)
 
 
 def _all(tests: Iterable[str]) -> str:

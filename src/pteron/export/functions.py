@@ -59,6 +59,14 @@ FEED = ("feed_forward", "joint_feed_forward")
 Asked = str | Controller | Custom | Sequence[str | Controller | Custom]
 """A choice of functions, by name, and of controllers, whose laws they are."""
 
+PLACES = ("pose", "joints", "motors")
+"""Inputs that say where the machine is."""
+
+_CHANGE, _CHANGES = 1e-9, 8
+"""Share by which inputs of an example are changed to see how its results do, and how many times.
+
+Far above rounding, far below the shares at which results bend."""
+
 _PAYLOAD = "set_payload"
 """The function that makes the parameters of a payload."""
 
@@ -87,6 +95,9 @@ class Example:
     inputs: tuple[Array, ...]
     results: tuple[Array, ...]
     status: int
+    gains: tuple[float, ...] = ()
+    """For each result the greatest relative change of a column, per relative change of the inputs:
+    by so much rounding is magnified near a singular pose."""
 
 
 @dataclass(frozen=True)
@@ -358,11 +369,30 @@ def _states(
 def _evaluated(given: Program, graph: Graph, inputs: list[Array]) -> Example:
     values = given.function.call([np.reshape(value, (-1, 1)) for value in inputs])
     results = tuple(np.array(value).ravel("F") for value in values)
-    # Of several poses one will do; and what a machine has not is NaN throughout.
+    if given.name == "direct_kinematics":  # of several poses one will do
+        poses = results[0].reshape(given.outputs[0].shape)
+        status = 0 if np.isfinite(poses).all(axis=1).any() else 1
+        return Example(tuple(inputs), results, status, _gains(given, inputs, results))
+    # What a machine has not is NaN throughout.
     computed = [
         value[[graph.nodes[k].operation != CONSTANT for k in nodes]]
         for value, nodes in zip(results, graph.outputs, strict=True)
     ]
-    finite = np.isfinite(np.concatenate(computed))
-    enough = finite.any() if given.name == "direct_kinematics" else finite.all()
-    return Example(tuple(inputs), results, 0 if enough else 1)
+    finite = np.isfinite(np.concatenate(computed)).all()
+    return Example(tuple(inputs), results, 0 if finite else 1, _gains(given, inputs, results))
+
+
+def _gains(given: Program, inputs: list[Array], results: tuple[Array, ...]) -> tuple[float, ...]:
+    """Return the gains of an example, from inputs changed at random by a small share."""
+    rng = np.random.default_rng(0)
+    gains = np.ones(len(results))
+    for _ in range(_CHANGES):
+        changed = [v * (1.0 + _CHANGE * rng.choice([-1.0, 1.0], np.shape(v))) for v in inputs]
+        values = given.function.call([np.reshape(value, (-1, 1)) for value in changed])
+        for k, (value, result) in enumerate(zip(values, results, strict=True)):
+            columns = (-1, given.outputs[k].shape[-1] if len(given.outputs[k].shape) > 1 else 1)
+            size = np.abs(np.nan_to_num(result)).reshape(columns).max(axis=0, initial=0.0)
+            change = np.nan_to_num(np.array(value).ravel("F") - result).reshape(columns)
+            share = np.abs(change).max(axis=0, initial=0.0) / np.maximum(size, 1e-300)
+            gains[k] = max(gains[k], float(share.max(initial=0.0)) / _CHANGE)
+    return tuple(gains.tolist())

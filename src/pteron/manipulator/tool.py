@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
+
+import numpy as np
 
 from pteron.arguments import checked_arguments
 from pteron.bodies.inertia import inertia_count
@@ -65,6 +67,24 @@ class Tool:
     def center(self) -> Vector:
         """Its centre of mass in the platform's frame, m."""
         return self.point if self.center_of_mass is None else self.center_of_mass
+
+    def turned(self, turn: Callable[[Vector], Vector]) -> Tool:
+        """Return the tool in a frame of the platform that turns: every vector v becomes turn(v)."""
+        center, inertia = self.center_of_mass, self.central_inertia
+        if isinstance(inertia, tuple):
+            rotation = np.array(
+                [turn((1.0, 0.0, 0.0)), turn((0.0, 1.0, 0.0)), turn((0.0, 0.0, 1.0))]
+            ).T
+            places, tensor = np.triu_indices(3), np.zeros((3, 3))
+            tensor[places] = inertia
+            tensor = tensor + np.triu(tensor, 1).T
+            inertia = tuple((rotation @ tensor @ rotation.T)[places].tolist())
+        return replace(
+            self,
+            point=turn(self.point),
+            center_of_mass=None if center is None else turn(center),
+            central_inertia=inertia,
+        )
 
 
 def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:

@@ -89,5 +89,6 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
         robot,
         platform=robot.platform.turned(turn),
         legs=legs,
+        tools=tuple(tool.turned(turn) for tool in robot.tools) if on_platform else robot.tools,
         gravity=turn(robot.gravity) if gravity else robot.gravity,
     )
