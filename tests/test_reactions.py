@@ -1,5 +1,6 @@
 """Reactions: statics that was published, virtual work, momentum, least norm."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from differences import OFFSETS
 from mechanisms import CATALOG, gated, in_turn, random_machine, scaled, states
 
 import pteron
-from pteron.errors import DataError, UnreachablePose
+from pteron.errors import DataError, ModelError, UnreachablePose
+from pteron.export import export_mjcf, export_pinocchio, export_sdf, export_urdf
+from pteron.export.engines.formatting import look, number, row, small
 from pteron.indices import Elasticity, Section, reactions, stiffness
 
 ROUTER = Path(__file__).parent / "data" / "router_reactions.csv"
@@ -191,3 +194,35 @@ def test_stiffness_does_not_depend_on_the_unit_of_length(name):
     assert np.abs(found[0]).max() > 0.0
     for one in found[1:]:
         np.testing.assert_allclose(one, found[0], rtol=0, atol=1e-8 * np.abs(found[0]).max())
+
+
+def test_a_rod_along_its_own_guide_is_where_its_leg_is_best(tmp_path):
+    """Joints of a single rod are counted about an axis across the guide: no NaN where J is regular.
+
+    Universal joints about the guide are singular there, while the leg is at its best.
+    """
+    robot = pteron.load(Path(__file__).parent / "data" / "rod-along-guide.toml")
+    pose, velocity = np.zeros(3), np.array([1.0, 2.0, 3.0])
+    rod = pteron.kinematics.link_vectors(robot, pose)[1][2]
+    np.testing.assert_allclose(np.cross(robot.legs[2].slider_direction, rod), 0.0, atol=1e-12)
+    screws = pteron.kinematics.joint_screws(robot, pose)[2]
+    rates = pteron.kinematics.joint_rates(robot, pose, velocity)
+    joints = np.append(rates.actuated[2], rates.passive[2])
+    there = ~np.isnan(joints)
+    twist = pteron.kinematics.twist(robot, pose, velocity)
+    np.testing.assert_allclose(
+        joints[there] @ screws[there], [*twist[3:], *twist[:3]], rtol=0, atol=1e-12
+    )
+    assert there.sum() == 6, "P, a universal joint, a ball joint"
+    found = reactions(robot, pose, velocity, np.ones(3))
+    assert np.isfinite(found.actuators).all()
+    for export in (export_urdf, export_sdf, export_pinocchio, export_mjcf):
+        for path in export(robot, tmp_path):
+            assert not re.search(r"\bnan\b", path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_an_export_never_writes_what_is_no_number(value):
+    for form in (number, small, row, look):
+        with pytest.raises(ModelError, match="is (nan|inf) in its home pose"):
+            form(value)

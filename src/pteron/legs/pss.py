@@ -17,7 +17,7 @@ import casadi as ca
 from pteron.bodies.inertia import PointMass, RodInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
-from pteron.legs.circles import random_vector
+from pteron.legs.circles import perpendicular_to, random_vector
 from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.kind import Quantity
 from pteron.legs.leg import Joint, LegMotion, Sphere
@@ -46,10 +46,21 @@ class PSS(RodLeg, SlideLeg):
         return (
             Quantity("guide_point", "point", self.guide_point),
             Quantity("slider_direction", "direction", self.slider_direction, "e"),
-            Quantity("bar_direction", "normal", self.bar_direction or self.slider_direction),
+            Quantity("bar_direction", "normal", self._counting_axis),
             Quantity("lower_length", "length", (self.lower_length,), "ll"),
             Quantity("elbow", "sign", (self.elbow,)),
         )
+
+    @property
+    def _counting_axis(self) -> Vector:
+        """The axis about which the joints of the rod are counted first: the bar of parallel rods.
+
+        A single rod's is across the guide: universal joints about it are singular where the rod
+        lies along it, and there the leg is singular anyway (type I).
+        """
+        if self.bar_direction is not None:
+            return self.bar_direction
+        return self.slider_direction if self.rods > 1 else perpendicular_to(self.slider_direction)
 
     @property
     def bar(self) -> Vector | None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pteron.errors import ModelError
 from pteron.export.descriptions import TEXTS
 from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
@@ -29,12 +30,12 @@ BASE_COLOR = "0.45 0.46 0.48 1"
 
 def number(value: float) -> str:
     """Return a coordinate, rounded to 1e-15, in the shortest form that reads back unchanged."""
-    return repr(round(float(value), _DIGITS) + 0.0).removesuffix(".0")
+    return repr(round(_finite(value), _DIGITS) + 0.0).removesuffix(".0")
 
 
 def small(value: float) -> str:
     """Return a number that may be tiny: a moment of inertia."""
-    return repr(float(value)).removesuffix(".0")
+    return repr(_finite(value)).removesuffix(".0")
 
 
 def row(values: Sequence[float] | Array) -> str:
@@ -44,7 +45,17 @@ def row(values: Sequence[float] | Array) -> str:
 
 def look(values: Sequence[float] | Array | float) -> str:
     """Return the sizes or colours of a drawn shape as text, to six decimals."""
-    return " ".join(f"{round(float(value), 6) + 0.0:g}" for value in np.ravel(values))
+    return " ".join(f"{round(_finite(value), 6) + 0.0:g}" for value in np.ravel(values))
+
+
+def _finite(value: float) -> float:
+    """Return a float, or refuse one that no engine reads: infinity and NaN never enter a file."""
+    if not np.isfinite(value):
+        raise ModelError(
+            f"a number of the model is {value} in its home pose; give another home, or report it "
+            "with the robot's file"
+        )
+    return float(value)
 
 
 def frame(body: TreeBody) -> Array:

@@ -10,10 +10,12 @@ Any kind of leg is served: all is read from `LegMotion.chain` and `LegMotion.bod
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from pteron.errors import SingularPose
 from pteron.export.engines.chains import LegStance, leg_stances, shaft_ratio
 from pteron.export.engines.home_pose import chosen_home
 from pteron.export.engines.inertia import about_center, cube_moments, plane_moments, rod_moments
@@ -49,6 +51,8 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     ------
     DataError, UnreachablePose
         If `home` is no pose, or out of reach.
+    SingularPose
+        If a joint of a leg has no axis in that pose.
     ModelError
         If a kind of leg does not say which joint carries which body.
 
@@ -66,6 +70,7 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     refuse_readings(robot, "a model for another engine")
     pose = chosen_home(robot, home)
     stances = leg_stances(robot, pose)
+    _expect_axes(stances, pose)
     size = _size(stances, robot.platform.at(pose)[0])
     bodies, carriers, closings = platform_bodies(robot, pose)
     names = robot.joint_names
@@ -84,6 +89,21 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     count = len(robot.legs)
     closings = closings[-count:] + closings[:-count]
     return Tree(robot, pose, tuple(bodies), tuple(closings), tuple(motors), (), size)
+
+
+def _expect_axes(stances: Sequence[LegStance], pose: Array) -> None:
+    """Refuse a pose in which an axis of a leg's joints is undefined, so that a file would be."""
+    for i, stance in enumerate(stances, start=1):
+        places = (*stance.axes, *stance.points, *stance.references.values(), stance.end)
+        if not np.isfinite(np.concatenate(places)).all():
+            raise SingularPose(
+                f"home: {pose.round(6).tolist()}: a joint of leg {i} has no axis there, as of a "
+                "universal joint whose axes coincide; give another home",
+                kind="I",
+                measure=0.0,
+                index=(),
+                leg=i,
+            )
 
 
 def _with_shaft(platform: TreeBody, limits: tuple[float, float] | None, ratio: float) -> TreeBody:
