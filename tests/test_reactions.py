@@ -224,5 +224,5 @@ def test_a_rod_along_its_own_guide_is_where_its_leg_is_best(tmp_path):
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_an_export_never_writes_what_is_no_number(value):
     for form in (number, small, row, look):
-        with pytest.raises(ModelError, match="is (nan|inf) in its home pose"):
+        with pytest.raises(ModelError, match=r"is (nan|inf) in its home pose"):
             form(value)
