@@ -9,7 +9,16 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from mechanisms import CATALOG, CLIENTS, NIGHTLY, TILTED, in_turn, random_machine, with_elbows
+from mechanisms import (
+    CATALOG,
+    CLIENTS,
+    NIGHTLY,
+    TILTED,
+    gated,
+    in_turn,
+    random_machine,
+    with_elbows,
+)
 from scipy.integrate import solve_ivp
 from test_sizing import driven
 
@@ -192,6 +201,49 @@ def test_starts_and_targets_are_safe_and_differ(name):
         sides = np.linalg.det(pteron.jacobian(world.robot, np.vstack([world.home, poses])))
         assert (sides * sides[0] > 0.0).all()
     assert not state.velocity.any()
+
+
+@pytest.mark.parametrize("name", gated(pteron.catalog(), ["rubin-m2-hexapod", "five-bar"], CLIENTS))
+def test_start_target_and_home_differ_on_every_machine(name):
+    """Also where the travel is a tenth of a degree; and none is a success at once."""
+    world = PteronEnv(name).world
+    state = world.started([np.random.default_rng(seed) for seed in range(40)], None)
+    margins = pteron.workspace.pose_margins(world.robot, np.vstack([state.pose, state.target]))
+    assert margins.least.min() >= world.least
+    assert world.distance(state).min() > world.tolerance
+    for poses in (state.pose, state.target):
+        assert np.abs(poses - world.home).max(axis=1).min() > 0.0
+        assert np.ptp(poses, axis=0).min() > 0.0
+
+
+def test_a_spread_beyond_the_machine_is_as_far_as_it_goes():
+    world = PteronEnv("five-bar", spread=10.0).world
+    assert world.spread < 1.0
+    state = world.started([np.random.default_rng(seed) for seed in range(20)], None)
+    assert world.distance(state).min() > world.tolerance
+
+
+def test_what_is_observed_is_true_where_sliders_have_no_limits():
+    """A linear Delta without limits, far below home: pose and target are as they are."""
+    robot = CATALOG["linear-delta"]
+    robot = replace(robot, legs=tuple(replace(leg, limits=None) for leg in robot.legs))
+    env = PteronEnv(robot)
+    home = env.world.home
+    far, target = home - [0.0, 0.0, 5.0], home - [0.0, 0.0, 5.1]
+    seen, info = env.reset(seed=1, options={"pose": far, "target": target})
+    np.testing.assert_allclose(seen[:3], far, rtol=1e-6)
+    np.testing.assert_allclose(seen[6:9], target, rtol=1e-6)
+    assert info["distance"] == pytest.approx(0.1)
+    assert seen in env.observation_space
+    check_env(env, skip_render_check=True, skip_close_check=True)
+
+
+def test_seeds_are_an_array_too_and_slow_machines_have_a_frame_a_second():
+    envs = PteronVectorEnv("five-bar", num_envs=3)
+    first = envs.reset(seed=np.array([4, 5, 6]))[0]
+    np.testing.assert_array_equal(first, envs.reset(seed=4)[0])
+    np.testing.assert_array_equal(first, envs.reset(seed=np.int64(4))[0])
+    assert PteronEnv("five-bar", period=10.0).metadata["render_fps"] == 1
 
 
 def ended_by(name, force, count=200):

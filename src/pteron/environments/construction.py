@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,6 +25,10 @@ _LIVELY = 20.0
 _LEAST = 0.2
 """Least margin of the poses at which episodes start and that are targets."""
 
+_TOLERANCE, _SUCCESS = 0.005, 0.1
+"""Usual distance to the target that is a success, m; at most this share of the way from home to the
+rim of the starts and targets."""
+
 _SPREAD = 0.25
 """Greatest distance of these poses from home, as a share of the longest leg."""
 
@@ -34,7 +39,7 @@ def world_of(
     motion: Motion | None = None,
     period: float = 0.01,
     spread: float | None = None,
-    tolerance: float = 0.005,
+    tolerance: float | None = None,
     machines: Machines | None = None,
 ) -> World:
     """Return the world of a machine, or of several about it, after checks."""
@@ -50,7 +55,13 @@ def world_of(
     step = min(_STEP, longest_step(machine, home[None], machines) / 2.0, period)
     count = int(np.ceil(period / step - 1e-9))
     given = (home, _forces(machine, home), period, period / count, count)
-    world = World(machine, *given, spread, tolerance, least, motion, machines)
+    world = World(machine, *given, spread, tolerance or _TOLERANCE, least, motion, machines)
+    box = world.travel(spread)
+    # As far as the machine goes: of a hexapod with strokes of millimetres far less than asked.
+    within = float(np.sqrt((world.metres(np.abs(box)) ** 2).mean()))
+    spread = min(spread, within)
+    tolerance = tolerance or min(_TOLERANCE, _SUCCESS * within)
+    world = replace(world, box=box, spread=spread, tolerance=tolerance)
     if motion is not None:
         if not isinstance(motion, Motion):
             raise DataError(

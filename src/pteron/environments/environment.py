@@ -47,9 +47,11 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         Time of an action, s.
     spread : float, optional
         Half the side of the box about the home pose in which starts and targets are, m; by default
-        a quarter of the longest leg's links.
-    tolerance : float
-        Distance that is a success, m.
+        a quarter of the longest leg's links. Along each coordinate it ends where the machine's
+        travel does.
+    tolerance : float, optional
+        Distance that is a success, m; by default 5 mm, or a tenth of the way to the rim of the box
+        where that is less.
     render_mode : {None, "rgb_array"}
         Whether `render` draws the machine.
 
@@ -66,7 +68,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
     >>> env = gymnasium.make("pteron/Reach-v0", robot="five-bar")
     >>> observation, info = env.reset(seed=1)
     >>> env.action_space.shape, observation.shape, round(info["distance"], 3)
-    ((2,), (8,), 0.042)
+    ((2,), (8,), 0.013)
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012
@@ -78,7 +80,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         motion: Motion | None = None,
         period: float = 0.01,
         spread: float | None = None,
-        tolerance: float = 0.005,
+        tolerance: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.world = world_of(
@@ -88,7 +90,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
             self.world.bounds, len(self.world.forces)
         )
         self.render_mode = checked_mode(render_mode)
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / period)}
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / period))}
         self._state: EpisodeState | None = None
         self._picture = EnvironmentPicture(self.world)
 

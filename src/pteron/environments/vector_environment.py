@@ -69,7 +69,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         motion: Motion | None = None,
         period: float = 0.01,
         spread: float | None = None,
-        tolerance: float = 0.005,
+        tolerance: float | None = None,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         machines: Machines | None = None,
@@ -96,7 +96,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self.single_observation_space, self.single_action_space = pair
         self.observation_space, self.action_space = (batch_space(one, num_envs) for one in pair)
         self.render_mode = checked_mode(render_mode)
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / period)}
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / period))}
         self._most = max_episode_steps
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._state: EpisodeState | None = None
@@ -141,11 +141,13 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:
             return [None] * self.num_envs
+        if isinstance(seed, np.ndarray):
+            seed = seed.tolist()
         if isinstance(seed, int | np.integer):
             return [int(seed) + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise DataError(f"seed: {len(seed)} seeds given, {self.num_envs} expected")
-        return list(seed)
+        return [None if one is None else int(one) for one in seed]
 
     def _start(self, chosen: Bools, options: dict[str, Any] | None) -> None:
         generators = [self._generators[i] for i in np.flatnonzero(chosen).tolist()]

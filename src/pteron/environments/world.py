@@ -9,7 +9,7 @@ from math import hypot
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
@@ -33,6 +33,15 @@ ENDS = 0.02
 
 _ANGLE = np.pi / 4.0
 """Greatest angle of starts and targets from home, rad."""
+
+_HALVINGS = 20
+"""Halvings of the way from home along a coordinate until its poses have margin enough: 1e-6."""
+
+_APART = 2.0
+"""Least distance between start and target, in tolerances."""
+
+_GREATEST = float(np.finfo(np.float32).max)
+"""Bound of an observed number that has none: as Gymnasium's own environments have it."""
 
 _DRAWS = 16
 """Random poses drawn at a time for each start or target."""
@@ -61,9 +70,12 @@ class World:
     count : int
         Steps of an action.
     spread : float
-        Half the side of the box about home, m, in which starts and targets are.
+        Half the side of the box about home, m, in which starts and targets are, or less where the
+        machine's travel is.
     tolerance : float
         Distance to the target that is a success, m.
+    box : array, shape (2, m)
+        Ways from home, m and rad, down and up along each coordinate, within which they are drawn.
     least : float
         Margin, see `pteron.workspace.PoseMargins`, of starts and targets.
     motion : Motion or None
@@ -83,17 +95,33 @@ class World:
     least: float
     motion: Motion | None
     machines: Machines | None = None
+    box: Array | None = None
 
     @cached_property
     def bounds(self) -> Array:
-        """The greatest size of each number of an observation, (4 m,)."""
+        """The greatest size of each number of an observation, (4 m,).
+
+        Coordinates whose joints have no limits, angles without limits and speeds have none.
+        """
         robot = self.robot
-        size = max(
-            hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
-        )
-        turning = self.robot.platform.angular
-        pose, rate = np.where(turning, 2.0 * np.pi, size), np.where(turning, TURN, SPEED)
-        return np.concatenate([pose, rate, pose, rate])
+        reach = []
+        for leg in robot.legs:
+            travel = max(map(abs, leg.limits)) if leg.limits else _GREATEST
+            slides = travel if leg.joint.unit == "m" else 0.0
+            reach.append(hypot(*leg.guide_point) + leg.size + slides + hypot(*leg.platform_point))
+        limits = robot.platform.angle_limits
+        pose = [
+            min(max(reach), _GREATEST)
+            if not turns
+            else max(map(abs, limits[name]), default=_GREATEST)
+            if name in limits
+            else _GREATEST
+            for name, turns in zip(robot.coordinates, robot.platform.angular, strict=True)
+        ]
+        # The state that ends an episode may be beyond a limit: half as far again is told truly.
+        most = np.minimum(1.5 * np.array(pose), _GREATEST)
+        rate = np.full(robot.freedom, _GREATEST)
+        return np.concatenate([most, rate, most, rate])
 
     def observed(self, state: EpisodeState) -> NDArray[np.float32]:
         """Return observations (..., 4 m): pose, velocity, the target's pose and velocity."""
@@ -110,10 +138,25 @@ class World:
 
     def distance(self, state: EpisodeState) -> Array:
         """Return how far machines are from their targets (...), m."""
-        away = (self.target(state)[0] - state.pose) * np.where(
-            self.robot.platform.angular, LEVER, 1.0
-        )
-        return np.asarray(np.sqrt((away**2).sum(axis=-1)))
+        return self.metres(self.target(state)[0] - state.pose)
+
+    def metres(self, differences: Array) -> Array:
+        """Return the sizes (...) of differences of poses (..., m), m: a radian is `LEVER`."""
+        scaled = differences * np.where(self.robot.platform.angular, LEVER, 1.0)
+        return np.asarray(np.sqrt((scaled**2).sum(axis=-1)))
+
+    def travel(self, spread: float) -> Array:
+        """Return ways (2, m) from home, down and up each coordinate, whose poses have margin.
+
+        They are at most `spread` or, of angles, `_ANGLE`.
+        """
+        most = np.where(self.robot.platform.angular, _ANGLE, spread)
+        shares = np.concatenate([[0.0], 0.5 ** np.arange(_HALVINGS, -1, -1.0)])
+        signs = np.array([-1.0, 1.0])
+        ways = signs[:, None, None, None] * shares[:, None] * np.diag(most)[:, None, :]
+        keeps = self.margin_of(self.home + ways) >= self.least  # (2, m, shares)
+        last = np.logical_and.accumulate(keeps, axis=-1).sum(axis=-1) - 1
+        return np.asarray(signs[:, None] * shares[np.maximum(last, 0)] * most)
 
     def started(
         self, generators: Sequence[np.random.Generator], options: Mapping[str, Any] | None
@@ -126,7 +169,8 @@ class World:
             If an option is unknown, or a pose is none that the machine may have.
         """
         given = {key: self._pose(key, value) for key, value in (options or {}).items()}
-        poses, targets = self._drawn(generators), self._drawn(generators)
+        poses = self._drawn(generators, None)
+        targets = self._drawn(generators, given.get("pose", poses))
         velocity, clock = np.zeros_like(poses), np.zeros(len(poses))
         if self.motion is not None:
             clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
@@ -141,19 +185,25 @@ class World:
             clock,
         )
 
-    def _drawn(self, generators: Sequence[np.random.Generator]) -> Array:
+    def _drawn(self, generators: Sequence[np.random.Generator], others: ArrayLike | None) -> Array:
         """Return a random pose of each generator with margin enough, or home where it has none.
 
-        Where all are too far from home they are brought nearer.
+        It is apart from the other poses (m,) or (B, m). Where all draws are too far from home they
+        are brought nearer.
         """
-        half = np.where(self.robot.platform.angular, _ANGLE, self.spread)
         shape = (_DRAWS, self.robot.freedom)
-        drawn = half * np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
+        drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
+        box = self.travel(self.spread) if self.box is None else self.box
+        drawn = np.where(drawn < 0.0, -drawn * box[0], drawn * box[1])
         found = np.tile(self.home, (len(drawn), 1))
         left = np.arange(len(drawn))
+        elsewhere = None if others is None else np.broadcast_to(others, found.shape)
         for share in _SHARES:
             poses = self.home + share * drawn[left]
             good: Any = self.margin_of(poses) >= self.least
+            if elsewhere is not None:
+                away = self.metres(poses - elsewhere[left, None, :])
+                good &= away > _APART * self.tolerance
             has = good.any(axis=-1)
             found[left[has]] = poses[has, good[has].argmax(axis=-1)]
             left = left[~has]
@@ -209,10 +259,14 @@ class World:
         distance = self.distance(new)
         reward = 1.0 - np.tanh(2.0 * distance / self.spread)
         reward = reward - EFFORT * (action**2).mean(axis=-1)
-        rates = self.bounds[self.robot.freedom : 2 * self.robot.freedom]
         ended = ~np.asarray(going, dtype=bool) | (self.margin_of(pose) < ENDS)
-        ended = ended | (np.abs(velocity) > rates).any(axis=-1)
+        ended = ended | (np.abs(velocity) > self._speeds).any(axis=-1)
         return new, distance, np.where(ended, -1.0, reward), ended
+
+    @property
+    def _speeds(self) -> Array:
+        """The speeds (m,) above which an episode ends."""
+        return np.where(self.robot.platform.angular, TURN, SPEED)
 
     def _action(self, action: Any, shape: tuple[int, ...]) -> Array:
         """Return an action of machines (..., n) after a check; a machine has as many drives."""
@@ -225,8 +279,7 @@ class World:
 
     def why(self, pose: Array, velocity: Array) -> str:
         """Return why the episode of a machine ended, in its last state (m,)."""
-        rates = self.bounds[self.robot.freedom : 2 * self.robot.freedom]
-        if (np.abs(velocity) > rates).any():
+        if (np.abs(velocity) > self._speeds).any():
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
         found = pose_margins(self.robot, pose)
         leg = int(found.type_i.argmin()) + 1
