@@ -1,8 +1,8 @@
 """The console blocks of a page: their commands, run in order in one folder, and their outputs.
 
-A block is fenced as `console` or indented by four columns. Its commands stand after `$ `, with their
-output below; where no line has a `$ `, each line is a command whose output the page does not show. A
-line that begins with `# ` is a remark, one that ends with a backslash goes on in the next.
+A block is fenced as `console` or indented by four columns. Its commands stand after `$ `, with
+their output below; where no line has a `$ `, each line is a command whose output the page does not
+show. A line that begins with `# ` is a remark, one that ends with a backslash goes on in the next.
 
 Outputs agree if their words do and their numbers do within a tolerance: a number with a decimal
 point or an exponent within one unit of its last digit that is shown, an integer exactly, or as
@@ -28,7 +28,7 @@ from pteron.kernels.c import compiler
 
 ROOT = Path(__file__).parent.parent
 
-PROGRAMS = ("pteron", "python", "cp", "cc", "controller/test")
+PROGRAMS = ("pteron", "python", "cp", "cc", "grep", "controller/test")
 """Programs that are run."""
 
 OTHERS = ("make", "pip", "jupyter", "halcompile", "dask")
@@ -57,8 +57,8 @@ class Step:
 class Tolerance:
     """A tolerance for the numbers of an output, and the reason that it has its size.
 
-    `relative` is of the number that is shown; `only` is a regular expression of the shown lines that
-    have it, by default all.
+    `relative` is of the number that is shown; `only` is a regular expression of the shown lines
+    that have it, by default all.
     """
 
     relative: float
@@ -141,7 +141,7 @@ def run(step: Step, folder: Path) -> tuple[int, str]:
     if program == "cp":
         shutil.copy(*words)
         return 0, ""
-    before = {"python": [sys.executable], "cc": list(compiler() or ["cc"])}
+    before = {"python": [sys.executable], "cc": list(compiler() or ["cc"]), "grep": ["grep"]}
     done = subprocess.run(
         [*before.get(program, [f"./{program}"]), *words],
         cwd=folder,
@@ -156,31 +156,35 @@ def run(step: Step, folder: Path) -> tuple[int, str]:
 
 def difference(shown: str, printed: str, tolerances: tuple[Tolerance, ...] = ()) -> str:
     """Return the first difference of a shown output and a printed one; nothing where they agree."""
-    words = [
-        (word, _relative(line, tolerances)) for line in shown.split("\n") for word in line.split()
-    ]
-    parts: list[list[tuple[str, float | None]]] = [[]]
-    for word, relative in words:
-        if word == "...":
-            parts.append([])
-        else:
-            parts[-1].append((word, relative))
+    parts: list[list[_Word]] = [[]]
+    for line in shown.split("\n"):
+        relative = _relative(line, tolerances)
+        for word in line.split():
+            if word == "...":
+                parts.append([])
+            else:
+                parts[-1].append((word, relative))
     given = printed.split()
     at = 0
     for k, part in enumerate(parts):
         last = k == len(parts) - 1
-        places = range(at, len(given) - len(part) + 1)
+        places = list(range(at, max(at, len(given) - len(part)) + 1))
         if k == 0:
-            places = range(min(1, len(places)))
+            places = places[:1]
         elif last and part:
             places = places[-1:]
-        place = next((p for p in places if not _first_other(part, given[p:])), None)
-        if place is None:
-            return _first_other(part, given[at:]) or "the output is too short"
+        common = {place: _common(part, given[place:]) for place in places}
+        place = max(places, key=lambda p: (common[p], -p))
+        if common[place] < len(part):
+            return _told(part[common[place]][0], given, place + common[place])
         at = place + len(part)
-        if last and not (k and not part) and at != len(given):
-            return f"more is printed: {' '.join(given[at : at + 12])}"
+    if parts[-1] and at != len(given):
+        return f"more is printed: {' '.join(given[at : at + 12])}"
     return ""
+
+
+_Word = tuple[str, float | None]
+"""A shown word, and the relative tolerance of its numbers; None for that of the last digit."""
 
 
 def _relative(line: str, tolerances: tuple[Tolerance, ...]) -> float | None:
@@ -188,23 +192,41 @@ def _relative(line: str, tolerances: tuple[Tolerance, ...]) -> float | None:
     return next((t.relative for t in tolerances if re.search(t.only, line)), None)
 
 
-def _first_other(part: list[tuple[str, float | None]], given: list[str]) -> str:
-    for k, (word, relative) in enumerate(part):
-        if k >= len(given):
-            return f"shown {word!r}, and no more is printed"
-        if not agrees(word, given[k], relative):
-            around = " ".join(given[max(0, k - 4) : k + 5])
-            return f"shown {word!r}, printed {given[k]!r} in {around!r}"
-    return ""
+def _common(part: list[_Word], given: list[str]) -> int:
+    """Return how many words agree from the first on."""
+    k = 0
+    while k < min(len(part), len(given)) and agrees(part[k][0], given[k], part[k][1]):
+        k += 1
+    return k
+
+
+def _told(word: str, given: list[str], k: int) -> str:
+    if k >= len(given):
+        return f"shown {word!r}, and no more is printed"
+    return f"shown {word!r}, printed {given[k]!r} in {' '.join(given[max(0, k - 4) : k + 5])!r}"
 
 
 def agrees(shown: str, printed: str, relative: float | None = None) -> bool:
-    """Return whether a printed word is the shown one, its numbers within the tolerance."""
-    if shown == printed:
+    """Return whether a printed word is the shown one, its numbers within the tolerance.
+
+    `...` in a word stands for any letters; the rule below a table's head may have any length.
+    """
+    if shown == printed or not (set(shown) | set(printed)) - {"─"}:
         return True
-    if _NUMBER.sub("#", shown) != _NUMBER.sub("#", printed):
+    return _numbers_agree(shown, printed, relative)
+
+
+def _numbers_agree(shown: str, printed: str, relative: float | None) -> bool:
+    head, dots, tail = shown.partition("...")
+    parts = [re.escape(_NUMBER.sub("#", part)) for part in (head, tail)]
+    if not re.fullmatch((".*" if dots else "").join(parts), _NUMBER.sub("#", printed)):
         return False
-    pairs = zip(_NUMBER.findall(shown), _NUMBER.findall(printed), strict=True)
+    theirs = _NUMBER.findall(printed)
+    first, last = _NUMBER.findall(head), _NUMBER.findall(tail)
+    pairs = [
+        *zip(first, theirs, strict=False),
+        *zip(reversed(last), reversed(theirs), strict=False),
+    ]
     return all(abs(float(a) - float(b)) <= _allowed(a, relative) for a, b in pairs)
 
 

@@ -1,7 +1,8 @@
 """README and docs show what is there: links, names, commands, examples, pictures, equations.
 
-What Sphinx itself refuses is left to `make docs`. The commands of docs/from-log-to-controller.md
-run in test_walk.py, README's doctests where pytest collects them, the examples in test_examples.py.
+What Sphinx itself refuses is left to `make docs`. Commands and their outputs are tried in
+test_console_blocks.py, README's doctests where pytest collects them, the examples in
+test_examples.py.
 """
 
 import ast
@@ -9,15 +10,14 @@ import doctest
 import importlib
 import re
 import runpy
-import shlex
 import shutil
 import sys
 from pathlib import Path
 
 import pytest
+from console_blocks import steps
 from mechanisms import CLIENTS, gated
 from typer.main import get_command
-from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
@@ -86,86 +86,18 @@ def test_names_and_paths_are_there(name):
 
 # Commands.
 
-_LINE = re.compile(r"(?m)^(?: {4})?(?:\$ )?((?:\.venv/bin/)?pteron(?: .*)?)$")
-
-
-def commands(text):
-    """Return the commands of the program that stand on lines of their own, without remarks."""
-    text = re.sub(r"(?ms)^```(?!console).*?^```", "", text)
-    lines = (line for line in _LINE.findall(text) if not line.startswith("pteron."))
-    return [re.split(r" +# ", line)[0].rstrip().removeprefix(".venv/bin/") for line in lines]
-
 
 @NAMES
 def test_options_that_are_shown_exist(name):
     group = get_command(app)
-    for line in commands(TEXTS[name]):
-        _, subcommand, *words = shlex.split(line)
+    for step in steps(name, TEXTS[name]):
+        if step.words[0] != "pteron":
+            continue
+        line, (subcommand, *words) = step.command, step.words[1:]
         assert subcommand in group.commands, f"{name}: {line}"
         known = {option for p in group.commands[subcommand].params for option in p.opts}
         used = {word.split("=")[0] for word in words if word.startswith("--")}
         assert used <= known, f"{name}: {line}"
-
-
-RUN = tuple(f"docs/start/{name}.md" for name in ("first-result", "install", "tour"))
-"""Those of README run in `make first`."""
-LEFT = {
-    "choose": "test_choosing.py",
-    "design": "test_design.py",
-    "excite": "searches for its motion; test_excitation_files.py",
-    "film": "test_films.py",
-    "identify": "wants a log; test_walk.py",
-    "play": "wants a motion; test_pages.py",
-    "report": "test_report.py",
-    "simulate": "test_simulate_cli.py",
-    "workspace": "test_workspace_cli.py",
-    "view": "stays open until it is ended; test_viewer.py",
-}
-"""Subcommands that are not run here, and where they are."""
-
-
-@CLIENTS
-@pytest.mark.parametrize("name", RUN)
-def test_commands_run(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    ran = 0
-    for line in commands(TEXTS[name]):
-        _, subcommand, *words = shlex.split(line)
-        if subcommand in LEFT or "..." in words:
-            continue
-        result = CliRunner().invoke(app, [subcommand, *words])
-        assert result.exit_code == 0, f"{line}\n{result.stderr}"
-        ran += 1
-    assert ran
-
-
-def sessions(text):
-    """Yield commands after `$ ` with what is shown below them."""
-    for block in re.findall(r"(?m)(?:^(?: {4}.*)?\n)+", text):
-        shown = re.split(r"(?m)^ {4}\$ ", block)
-        for part in shown[1:]:
-            line, _, output = part.partition("\n")
-            if output.strip() and line.startswith("pteron "):
-                yield line, [row.strip() for row in output.splitlines() if row.strip()]
-
-
-NOT_REPEATED = {"pteron play quadrupteron far.csv": "the page does not show the file"}
-"""Commands whose output is not compared here, and why; that their options exist is."""
-SESSIONS = [
-    (name, *found)
-    for name, text in TEXTS.items()
-    for found in sessions(text)
-    if found[0] not in NOT_REPEATED
-]
-
-
-@CLIENTS
-@pytest.mark.parametrize(("name", "line", "shown"), SESSIONS, ids=[s[1] for s in SESSIONS])
-def test_output_is_what_is_shown(name, line, shown, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, shlex.split(line)[1:])
-    printed = " ".join(result.output.split())
-    assert printed == " ".join(" ".join(shown).split()), name
 
 
 # Examples in Python.
