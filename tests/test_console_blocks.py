@@ -33,8 +33,6 @@ NOT_RUN = {
     r"halcompile .*": ("is a part of LinuxCNC", "test_tilting_exports.py"),
     r"python benchmarks/genhexkins\.py .*": ("loads LinuxCNC's module", "test_tilting_exports.py"),
     r"python benchmarks/mujoco_convergence\.py": ("takes minutes", "test_benchmarks.py"),
-    r"python benchmarks/control\.py": ("takes minutes", "test_benchmarks.py"),
-    r"python benchmarks/time_optimal\.py": ("takes minutes", "test_benchmarks.py"),
     r"python benchmarks/environment\.py": ("prints times alone", "test_benchmarks.py"),
     r"pteron design .*": ("searches for minutes", "test_design.py"),
     r"pteron choose .*": ("searches for minutes", "test_choosing.py"),
@@ -232,6 +230,12 @@ TOLERANCES: dict[str, tuple[Tolerance, ...]] = {
     ),
     r"python examples/identify\.py": (
         Tolerance(0.02, "estimates of iterations; 2 % is far below their intervals"),
+    ),
+    r"python benchmarks/control\.py": (
+        Tolerance(0.05, "distances of a simulation that learns, which amplifies rounding"),
+    ),
+    r"python benchmarks/time_optimal\.py": (
+        Tolerance(0.005, "linear programs on a grid; what is slowed between samples differs"),
     ),
     r"python benchmarks/fmu\.py": (
         Tolerance(1e3, "rounding of two integrators that agree: its size is what is shown"),

@@ -16,7 +16,10 @@ from pathlib import Path
 
 import pytest
 from console_blocks import steps
-from mechanisms import CLIENTS, gated
+from mechanisms import CATALOG, CLIENTS, TILTED, gated
+from test_simulation import FREE
+from test_software_in_the_loop import IN_THE_LOOP
+from test_sticking import LIMITED
 from typer.main import get_command
 
 import pteron
@@ -175,6 +178,91 @@ def test_the_check_of_a_site_finds_what_is_wrong(tmp_path):
         "next.html: index.html#top names no place of its page",
         "next.html: no way leads there",
     }
+
+
+# Counts.
+
+
+NUMBERS = "four five six seven eight nine ten eleven twelve"
+WORDS = {word: n for n, word in enumerate(NUMBERS.split(), start=4)} | {"twenty-seven": 27}
+"""Numbers from four on: two or three machines are named one by one, or in a title."""
+
+
+def script(path, name):
+    """Return what a script of the clone calls so."""
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    try:
+        return runpy.run_path(str(ROOT / path))[name]
+    finally:
+        sys.path.pop(0)
+
+
+COUNTS = (
+    ("README.md", r"lists ([\w-]+) robots", lambda: len(pteron.catalog())),
+    ("README.md", r"\[([\w-]+) machines\]\(docs/evidence", lambda: intervals_of_evidence()),
+    ("docs/start/tour.md", r"lists ([\w-]+) machines", lambda: len(pteron.catalog())),
+    ("docs/start/first-result.md", r"([\w-]+) machines come", lambda: len(pteron.catalog())),
+    ("docs/evidence.md", r"all (\w+) machines of the catalog", lambda: len(CATALOG | TILTED)),
+    (
+        "docs/evidence.md",
+        r"MuJoCo's closed loops, 20 random states of each of (\w+) machines",
+        lambda: len(script("benchmarks/mujoco_convergence.py", "MACHINES")),
+    ),
+    (
+        "docs/evidence.md",
+        r"energy of free motion, 100 random states of each of (\w+) machines",
+        lambda: len(FREE),
+    ),
+    (
+        "docs/evidence.md",
+        r"exact rates, pick-and-place cycle at 10 m/s\^2, (\w+) machines",
+        lambda: len(script("benchmarks/control.py", "_MACHINES")),
+    ),
+    ("docs/evidence.md", r"time-optimal pick-and-place, (\w+) machines", lambda: len(CATALOG)),
+    ("docs/trajectories.md", r"0\.99983 (\d+) machines: ", lambda: len(CATALOG)),
+    (
+        "docs/identification.md",
+        r"each fault into logs of (\w+) machines",
+        lambda: TEXTS["docs/faults.md"].partition("| fault |")[2].split("\n")[0].count("|"),
+    ),
+    ("docs/other-tools.md", r"The (\w+) machines of the catalog that tilt", lambda: len(TILTED)),
+    ("docs/simulation.md", r"alike in C and NumPy: (\w+) machines", lambda: len(LIMITED)),
+    ("docs/simulation.md", r"all laws, (\w+) machines", lambda: len(IN_THE_LOOP)),
+)
+"""Pages, the words on them that count machines, and where the true count comes from."""
+
+
+def intervals_of_evidence():
+    """Return of how many machines the evidence gives intervals."""
+    return len(re.findall(r"(?m)^\| .*, \d+ values \|", TEXTS["docs/evidence.md"]))
+
+
+@pytest.mark.parametrize(("name", "words", "count"), COUNTS)
+def test_counts_are_those_of_what_is_counted(name, words, count):
+    (shown,) = re.findall(words, " ".join(TEXTS[name].split()))
+    shown = shown.lower()
+    assert (int(shown) if shown.isdigit() else WORDS[shown]) == count(), f"{name}: {shown}"
+
+
+@NAMES
+def test_every_count_of_machines_is_derived(name):
+    """One that is not in the table above would grow old unseen."""
+    text = " ".join(re.sub(r"(?ms)^```.*?^```", "", TEXTS[name]).split())
+    number = rf"\b(?:\d+|{'|'.join(WORDS)})"
+    every = re.findall(rf"(?i){number} (?:machines|robots)\b", text)
+    known = [pattern for page, pattern, _ in COUNTS if page == name]
+    expected = 0 if name in FROM_OTHERS else len(every)
+    assert len(known) >= expected, f"{name}: {every}"
+
+
+FROM_OTHERS = {"docs/theory/direct-position.md": "a run of hours, benchmarks/direct_position.py"}
+"""Pages whose counts of machines come from elsewhere."""
+
+
+def test_the_catalogs_page_has_a_row_for_each_machine():
+    table, *_ = TEXTS["docs/catalog.md"].partition("\n## ")
+    rows = re.findall(r"(?m)^\| <img [^|]*\| `([\w-]+)` \|", table)
+    assert sorted(rows) == sorted(pteron.catalog())
 
 
 # The theory.
