@@ -358,6 +358,49 @@ FROM_OTHERS = {"docs/theory/direct-position.md": "a run of hours, benchmarks/dir
 """Pages whose counts of machines come from elsewhere."""
 
 
+INTERVALS = {
+    "Quadrupteron": "quadrupteron",
+    "oblique Quadrupteron": "quadrupteron-oblique",
+    "Tripteron": "tripteron",
+    "Delta": "delta",
+    "Par4": "par4",
+    "6-UPS (`stewart`)": "stewart",
+    "3-RRS (`ball-table`)": "ball-table",
+}
+"""Rows of the evidence, and the machine of the measured results."""
+
+
+def test_intervals_of_the_evidence_are_those_that_were_measured():
+    results = (ROOT / "benchmarks" / "identification" / "RESULTS.md").read_text(encoding="utf-8")
+    measured = {}
+    for line in results.split("\n"):
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if cells[0] in pteron.catalog() and len(cells) == 11:
+            measured[cells[0]] = cells
+    rows = re.findall(r"(?m)^\| (.*), (\d+) values \| (.*) \|$", TEXTS["docs/evidence.md"])
+    assert [row[0] for row in rows] == list(INTERVALS)
+    for machine, count, cells in rows:
+        true = measured.pop(INTERVALS[machine])
+        assert [count, *cells.split(" | ")[:3]] == true[1:5], machine
+        assert cells.split(" | ")[3] in (f"{float(true[8]) + e:.2f}" for e in (0.0, 1e-9)), machine
+    assert not measured
+    shares = [float(row[2].split(" %")[0]) for row in rows]
+    assert f"{min(shares):g} to {max(shares):g} % of the time" in TEXTS["README.md"]
+
+
+def test_times_of_the_evidence_are_those_that_were_measured():
+    """The first number of each row; the others are ratios to it, or other programs'."""
+    results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
+    _, _, section = TEXTS["docs/evidence.md"].partition("## How fast is it?")
+    tables, _, _ = section.partition("| Quadrupteron, operations a state")
+    rows = re.findall(r"(?m)^\| [^|]*[\w)] \| ([\d.]+)", tables)
+    assert len(rows) >= 7
+    for number in rows:
+        assert re.search(rf"(?<![\d.]){re.escape(number)}(?![\d.])", results), number
+    (batch,) = re.findall(r"forces of a batch of states \| ([\d.]+) ns", TEXTS["README.md"])
+    assert f"| batch of 100 000 | {batch};" in tables
+
+
 def test_the_catalogs_page_has_a_row_for_each_machine():
     table, *_ = TEXTS["docs/catalog.md"].partition("\n## ")
     rows = re.findall(r"(?m)^\| <img [^|]*\| `([\w-]+)` \|", table)
