@@ -235,6 +235,7 @@ TOLERANCES: dict[str, tuple[Tolerance, ...]] = {
         Tolerance(0.2, "what the model misses where forces are held for a sample", "held-out"),
         Tolerance(1e-5, "what rounding and the search leave of values without noise"),
     ),
+    r"pteron inverse delta 0 0 -0\.9": (Tolerance(1e-9, "the last digits are the processor's"),),
     r"pteron size quadrupteron .*": (
         Tolerance(0.02, "a search over places ends within 2 % of the worst"),
     ),
