@@ -44,6 +44,7 @@ def main() -> None:
         cycles[name] = pick_and_place(robot, home_pose(robot), samples=4001)
     print("Computed torque, true model, default gains (bandwidth 0.1/period): largest distance, um")
     print(f"{'':<22}{'scale':>7}{'cycle s':>9}{'1 kHz':>9}{'4 kHz':>9}")
+    distances = []
     for name, cycle in cycles.items():
         robot = pteron.load(name)
         found = [largest(robot, ComputedTorque(period), cycle) for period in (1e-3, 2.5e-4)]
@@ -51,13 +52,19 @@ def main() -> None:
         print(f"{name:<22}{cycle.scale:>7.3f}{cycle.duration:>9.3f}{sizes}", flush=True)
         assert found[0] < 5e-6, name
         assert found[1] < 1e-6, name
+        distances.append(found)
+    most = 1e6 * np.max(distances, axis=0)
+    print(f"at most {most[0]:.2f} um at 1 kHz, {most[1]:.3f} um at 4 kHz")
     print("\nAdaptive control, every body off by 20 %, 1 kHz, default gains: largest distance, um")
     heading = f"{'seed':>5}{'1st cycle':>11}{'10th':>8}{'ratio':>7}{'room used':>11}"
     print(f"{'':<22}{heading}")
+    ratios = []
     for name, cycle in cycles.items():
         robot = pteron.load(name)
         for seed in range(1 if quick() else 3):
-            learnt(name, seed, wrong(robot, seed), Adaptive(motion=cycle), robot, cycle)
+            plant, controller = wrong(robot, seed), Adaptive(motion=cycle)
+            ratios.append(learnt(name, seed, plant, controller, robot, cycle))
+    print(f"ratios {min(ratios):.0f} to {max(ratios):.0f}")
     print(
         "\nThe same with drives, whose friction and rotors are half as large again as modelled, and"
     )
@@ -75,8 +82,8 @@ def learnt(
     controller: Adaptive,
     model: pteron.Manipulator,
     cycle: Motion,
-) -> None:
-    """Print a line of what adaptive control makes of ten cycles."""
+) -> float:
+    """Print a line of what adaptive control makes of ten cycles, and return the ratio."""
     law = controller.law(model)
     run = tracked(plant, law, cycle.repeated(_CYCLES), 1e-3)
     first, *_, last = (part.max() for part in np.array_split(run.distance, _CYCLES))
@@ -86,6 +93,7 @@ def learnt(
     print(f"{name:<22}{seed:>5}{sizes}", flush=True)
     assert first > 10.0 * last, name
     assert used < 1.0, name
+    return float(first / last)
 
 
 def driven(robot: pteron.Manipulator, share: float) -> pteron.Manipulator:

@@ -57,7 +57,8 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 templates_path = ["_templates"]
 html_search_scorer = str(DOCS / "_static" / "search-order.js")
-html_theme_options = {"navigation_with_keys": True}
+# An arrow key in code that scrolls is meant for the code.
+html_theme_options = {"navigation_with_keys": False}
 html_copy_source = False
 html_show_sphinx = False
 toc_object_entries_show_parents = "hide"
@@ -73,7 +74,7 @@ nb_execution_raise_on_error = True
 nb_merge_streams = True
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
-copybutton_exclude = ".linenos, .gp, .go"
+copybutton_exclude = ".linenos, .gp, .go, .gt, .gr, .ne"
 
 # Reference.
 default_role = "py:obj"

@@ -6,6 +6,7 @@ import json
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 from measured import built, positions
@@ -60,6 +61,15 @@ def test_the_files_agree_with_the_terminal():
         ("log.csv --robot linear-delta --prior no.toml --out a", "no.toml: there is no such file"),
         ("log.csv --robot linear-delta --out log.csv", "it is a file"),
         ("--plan 9 --robot ankle --out plan.csv", "a point that stays where it is"),
+        ("log.csv --plane z=0 --robot linear-delta --out a", "--plane goes with --plan"),
+        (
+            "--plan 9 --plane y=0 --measure heights --robot linear-delta --out plan.csv",
+            "z=HEIGHT expected",
+        ),
+        (
+            "--plan 9 --plane z=0.3 --measure heights --robot linear-delta --out plan.csv",
+            "is proved to be in reach",
+        ),
         ("log.csv --robot robot.toml --out .", "would replace a file that is read"),
     ],
 )
@@ -76,6 +86,9 @@ def test_planned_poses_are_a_table_that_the_machine_runs():
     poses, joints = table.select("x", "y", "z").to_numpy(), table.select("^rho.$").to_numpy()
     assert pteron.inverse_kinematics(DRAWN, poses) == pytest.approx(joints, abs=1e-12)
     assert len(table) == 9
-    assert len(set(poses[:, 2])) == 1
-    assert "every pose is proved to serve" in text
-    assert "From 59 poses on, some are held out" in " ".join(text.split())
+    # On the printer's bed, and out to its rim.
+    assert set(poses[:, 2]) == {0.0}
+    assert np.hypot(*poses[:, :2].T).max() > 0.085
+    assert "over the plane z = 0 mm, in a disc of radius 87 mm" in " ".join(text.split())
+    assert "every pose of it is proved to serve" in " ".join(text.split())
+    assert "From 54 poses on, some are held out" in " ".join(text.split())

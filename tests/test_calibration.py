@@ -544,6 +544,25 @@ def test_planned_poses_tell_more_than_random_ones_of_the_same_box(measure):
         assert volumes[0] < volumes[1] - 1.0
 
 
+@pytest.mark.parametrize(
+    ("name", "offset", "radius"),
+    [("linear-delta", 0.0, 0.087), ("delta", -1.26, 0.43), ("delta-omnid", 0.26, 0.08)],
+)
+def test_planned_heights_lie_on_the_bed_or_below_home_and_reach_the_rim(name, offset, radius):
+    """A printer's z = 0 is its bed; a Delta that hangs from its base, or stands on it, has none."""
+    robot = pteron.load(name)
+    chosen = plan(robot, 20, "heights")
+    assert chosen.plane is not None
+    assert chosen.plane.known == (name == "linear-delta")
+    assert chosen.plane.offset == pytest.approx(offset, abs=0.01)
+    np.testing.assert_allclose(chosen.poses[:, 2], chosen.plane.offset, rtol=0.0, atol=1e-12)
+    assert chosen.region.holds(chosen.poses).all()
+    assert pteron.workspace.prove(robot, chosen.region).holds
+    reached = np.hypot(*chosen.poses[:, :2].T)
+    assert reached.max() > 0.98 * radius
+    assert (reached > 0.9 * chosen.region.radius).sum() >= 8
+
+
 def test_wrong_names_and_numbers_are_one_line():
     robot = pteron.load("delta")
     given = measured(robot)

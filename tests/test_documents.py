@@ -1,7 +1,8 @@
 """README and docs show what is there: links, names, commands, examples, pictures, equations.
 
-What Sphinx itself refuses is left to `make docs`. The commands of docs/from-log-to-controller.md
-run in test_walk.py, README's doctests where pytest collects them, the examples in test_examples.py.
+What Sphinx itself refuses is left to `make docs`. Commands and their outputs are tried in
+test_console_blocks.py, README's doctests where pytest collects them, the examples in
+test_examples.py.
 """
 
 import ast
@@ -9,15 +10,18 @@ import doctest
 import importlib
 import re
 import runpy
-import shlex
 import shutil
 import sys
 from pathlib import Path
 
+import console_blocks
 import pytest
-from mechanisms import CLIENTS, gated
+from console_blocks import steps
+from mechanisms import CATALOG, CLIENTS, TILTED, gated
+from test_simulation import FREE
+from test_software_in_the_loop import IN_THE_LOOP
+from test_sticking import LIMITED
 from typer.main import get_command
-from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
@@ -86,86 +90,18 @@ def test_names_and_paths_are_there(name):
 
 # Commands.
 
-_LINE = re.compile(r"(?m)^(?: {4})?(?:\$ )?((?:\.venv/bin/)?pteron(?: .*)?)$")
-
-
-def commands(text):
-    """Return the commands of the program that stand on lines of their own, without remarks."""
-    text = re.sub(r"(?ms)^```(?!console).*?^```", "", text)
-    lines = (line for line in _LINE.findall(text) if not line.startswith("pteron."))
-    return [re.split(r" +# ", line)[0].rstrip().removeprefix(".venv/bin/") for line in lines]
-
 
 @NAMES
 def test_options_that_are_shown_exist(name):
     group = get_command(app)
-    for line in commands(TEXTS[name]):
-        _, subcommand, *words = shlex.split(line)
+    for step in steps(name, TEXTS[name]):
+        if step.words[0] != "pteron":
+            continue
+        line, (subcommand, *words) = step.command, step.words[1:]
         assert subcommand in group.commands, f"{name}: {line}"
         known = {option for p in group.commands[subcommand].params for option in p.opts}
         used = {word.split("=")[0] for word in words if word.startswith("--")}
         assert used <= known, f"{name}: {line}"
-
-
-RUN = tuple(f"docs/start/{name}.md" for name in ("first-result", "install", "tour"))
-"""Those of README run in `make first`."""
-LEFT = {
-    "choose": "test_choosing.py",
-    "design": "test_design.py",
-    "excite": "searches for its motion; test_excitation_files.py",
-    "film": "test_films.py",
-    "identify": "wants a log; test_walk.py",
-    "play": "wants a motion; test_pages.py",
-    "report": "test_report.py",
-    "simulate": "test_simulate_cli.py",
-    "workspace": "test_workspace_cli.py",
-    "view": "stays open until it is ended; test_viewer.py",
-}
-"""Subcommands that are not run here, and where they are."""
-
-
-@CLIENTS
-@pytest.mark.parametrize("name", RUN)
-def test_commands_run(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    ran = 0
-    for line in commands(TEXTS[name]):
-        _, subcommand, *words = shlex.split(line)
-        if subcommand in LEFT or "..." in words:
-            continue
-        result = CliRunner().invoke(app, [subcommand, *words])
-        assert result.exit_code == 0, f"{line}\n{result.stderr}"
-        ran += 1
-    assert ran
-
-
-def sessions(text):
-    """Yield commands after `$ ` with what is shown below them."""
-    for block in re.findall(r"(?m)(?:^(?: {4}.*)?\n)+", text):
-        shown = re.split(r"(?m)^ {4}\$ ", block)
-        for part in shown[1:]:
-            line, _, output = part.partition("\n")
-            if output.strip() and line.startswith("pteron "):
-                yield line, [row.strip() for row in output.splitlines() if row.strip()]
-
-
-NOT_REPEATED = {"pteron play quadrupteron far.csv": "the page does not show the file"}
-"""Commands whose output is not compared here, and why; that their options exist is."""
-SESSIONS = [
-    (name, *found)
-    for name, text in TEXTS.items()
-    for found in sessions(text)
-    if found[0] not in NOT_REPEATED
-]
-
-
-@CLIENTS
-@pytest.mark.parametrize(("name", "line", "shown"), SESSIONS, ids=[s[1] for s in SESSIONS])
-def test_output_is_what_is_shown(name, line, shown, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, shlex.split(line)[1:])
-    printed = " ".join(result.output.split())
-    assert printed == " ".join(" ".join(shown).split()), name
 
 
 # Examples in Python.
@@ -243,6 +179,232 @@ def test_the_check_of_a_site_finds_what_is_wrong(tmp_path):
         "next.html: index.html#top names no place of its page",
         "next.html: no way leads there",
     }
+
+
+CSS = """
+@media screen { body article img { filter: invert(0.9); } }
+@media print {
+  .skip-to-content { display: none; }
+}
+table.docutils thead:not(:has(th p:not(:empty))) { display: none; }
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({}, None),
+        ({"css": CSS.replace("table.docutils", "table")}, "a table's head has words and is hidden"),
+        ({"frame": '<iframe src="a.html">'}, "the frame of a.html scrolls within the page"),
+        ({"picture": '<img src="a.png">'}, "the picture a.png has no name"),
+        ({"picture": f'<img src="a.png" alt="{32 * "a"}.png">'}, "the picture a.png has no name"),
+        ({"css": CSS.replace("@media screen {", "@media all {")}, "pictures are inverted on paper"),
+        ({"css": CSS.replace("none", "block", 1)}, "the way past the menu is printed"),
+        ({"keys": "NAVIGATION_WITH_KEYS: true"}, "an arrow key in code that scrolls"),
+    ],
+)
+def test_the_check_of_a_site_finds_what_cannot_be_read(tmp_path, change, fault):
+    parts = {
+        "css": CSS,
+        "frame": '<iframe src="a.html" scrolling="no"></iframe>',
+        "picture": '<img src="a.png" alt="A Delta">',
+        "keys": "NAVIGATION_WITH_KEYS: false",
+    } | change
+    for name in ("a.html", "a.png"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "_static").mkdir()
+    (tmp_path / "_static" / "site.css").write_text(parts["css"])
+    (tmp_path / "_static" / "documentation_options.js").write_text(parts["keys"])
+    (tmp_path / "searchindex.js").write_text('"jacobian" "delta"')
+    (tmp_path / "index.html").write_text(
+        f'<a href="a.html">a</a>{parts["frame"]}{parts["picture"]}'
+        '<table class="dataframe"><thead><tr><th>torque</th></tr></thead></table>'
+        '<table class="docutils"><thead><tr><th><p></p></th></tr></thead></table>'
+    )
+    found = runpy.run_path(str(DOCS / "check_site.py"))["faults"](tmp_path)
+    assert [line for line in found if fault is None or fault not in line] == []
+    assert bool(found) == (fault is not None)
+
+
+def test_the_sites_own_style_is_fit_for_paper():
+    checks = runpy.run_path(str(DOCS / "check_site.py"))
+    style = (DOCS / "_static" / "site.css").read_text(encoding="utf-8")
+    assert checks["style_faults"](style) == []
+
+
+def test_pictures_without_a_name_get_the_heading_above_them():
+    from for_everyone import name_pictures
+
+    page = (
+        '<h2>Forces<a class="headerlink" href="#f">#</a></h2><img alt="../_images/'
+        f'{64 * "0"}.png" src="a.png"><img alt="A Delta" src="b.png">'
+        '<div><img alt="" src="c.png"><p>x</p><div class="sphx-glr-thumbnail-title">A film</div>'
+    )
+    assert re.findall('alt="(.*?)"', name_pictures(page)) == ["Figure: Forces", "A Delta", "A film"]
+
+
+def test_each_page_has_a_title_of_its_own_and_the_how_tos_are_named_by_it():
+    pages = [page for page in PAGES if page.is_relative_to(DOCS)]
+    titles = {}
+    for page in (*pages, *(DOCS / "notebooks").glob("*.ipynb")):
+        title = re.search(r'(?m)^ *"?# (.*?)(?:\\n",)?$', page.read_text(encoding="utf-8"))
+        titles[str(page.relative_to(ROOT))] = title[1]
+    assert len(titles) == len(set(titles.values()))
+    for page in ("docs/how-to/index.md", "docs/notebooks/index.md"):
+        for words, path in re.findall(r"\[([^\]]+)\]\(([^)#]+\.(?:md|ipynb))\)", TEXTS[page]):
+            target = str(((ROOT / page).parent / path).resolve().relative_to(ROOT))
+            assert words == titles[target], page
+
+
+BREADTH = 88
+"""Columns of code that fit the site's page at 1440 pixels."""
+WIDE = {
+    **dict.fromkeys(
+        (name for name in TEXTS if name.startswith("docs/theory/")), "still to be broken"
+    ),
+    "docs/start/first-result.md": "still to be broken",
+}
+"""Pages that may have longer lines, and why."""
+
+
+@NAMES
+def test_code_is_no_wider_than_the_page(name):
+    long = [
+        f"{name}:{first + k}: {line}"
+        for first, language, lines in console_blocks.blocks(TEXTS[name])
+        if not language.startswith("{")
+        for k, line in enumerate(lines)
+        if len(line) > BREADTH
+    ]
+    assert name in WIDE or long == []
+
+
+# Counts.
+
+
+NUMBERS = "four five six seven eight nine ten eleven twelve"
+WORDS = {word: n for n, word in enumerate(NUMBERS.split(), start=4)} | {"twenty-seven": 27}
+"""Numbers from four on: two or three machines are named one by one, or in a title."""
+
+
+def script(path, name):
+    """Return what a script of the clone calls so."""
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    try:
+        return runpy.run_path(str(ROOT / path))[name]
+    finally:
+        sys.path.pop(0)
+
+
+COUNTS = (
+    ("README.md", r"lists ([\w-]+) robots", lambda: len(pteron.catalog())),
+    ("README.md", r"\[([\w-]+) machines\]\(docs/evidence", lambda: intervals_of_evidence()),
+    ("docs/start/tour.md", r"lists ([\w-]+) machines", lambda: len(pteron.catalog())),
+    ("docs/start/first-result.md", r"([\w-]+) machines come", lambda: len(pteron.catalog())),
+    ("docs/evidence.md", r"all (\w+) machines of the catalog", lambda: len(CATALOG | TILTED)),
+    (
+        "docs/evidence.md",
+        r"MuJoCo's closed loops, 20 random states of each of (\w+) machines",
+        lambda: len(script("benchmarks/mujoco_convergence.py", "MACHINES")),
+    ),
+    (
+        "docs/evidence.md",
+        r"energy of free motion, 100 random states of each of (\w+) machines",
+        lambda: len(FREE),
+    ),
+    (
+        "docs/evidence.md",
+        r"exact rates, pick-and-place cycle at 10 m/s\^2, (\w+) machines",
+        lambda: len(script("benchmarks/control.py", "_MACHINES")),
+    ),
+    ("docs/evidence.md", r"time-optimal pick-and-place, (\w+) machines", lambda: len(CATALOG)),
+    ("docs/trajectories.md", r"0\.99983 (\d+) machines: ", lambda: len(CATALOG)),
+    (
+        "docs/identification.md",
+        r"each fault into logs of (\w+) machines",
+        lambda: TEXTS["docs/faults.md"].partition("| fault |")[2].split("\n")[0].count("|"),
+    ),
+    ("docs/other-tools.md", r"The (\w+) machines of the catalog that tilt", lambda: len(TILTED)),
+    ("docs/simulation.md", r"alike in C and NumPy: (\w+) machines", lambda: len(LIMITED)),
+    ("docs/simulation.md", r"all laws, (\w+) machines", lambda: len(IN_THE_LOOP)),
+)
+"""Pages, the words on them that count machines, and where the true count comes from."""
+
+
+def intervals_of_evidence():
+    """Return of how many machines the evidence gives intervals."""
+    return len(re.findall(r"(?m)^\| .*, \d+ values \|", TEXTS["docs/evidence.md"]))
+
+
+@pytest.mark.parametrize(("name", "words", "count"), COUNTS)
+def test_counts_are_those_of_what_is_counted(name, words, count):
+    (shown,) = re.findall(words, " ".join(TEXTS[name].split()))
+    shown = shown.lower()
+    assert (int(shown) if shown.isdigit() else WORDS[shown]) == count(), f"{name}: {shown}"
+
+
+@NAMES
+def test_every_count_of_machines_is_derived(name):
+    """One that is not in the table above would grow old unseen."""
+    text = " ".join(re.sub(r"(?ms)^```.*?^```", "", TEXTS[name]).split())
+    number = rf"\b(?:\d+|{'|'.join(WORDS)})"
+    every = re.findall(rf"(?i){number} (?:machines|robots)\b", text)
+    known = [pattern for page, pattern, _ in COUNTS if page == name]
+    expected = 0 if name in FROM_OTHERS else len(every)
+    assert len(known) >= expected, f"{name}: {every}"
+
+
+FROM_OTHERS = {"docs/theory/direct-position.md": "a run of hours, benchmarks/direct_position.py"}
+"""Pages whose counts of machines come from elsewhere."""
+
+
+INTERVALS = {
+    "Quadrupteron": "quadrupteron",
+    "oblique Quadrupteron": "quadrupteron-oblique",
+    "Tripteron": "tripteron",
+    "Delta": "delta",
+    "Par4": "par4",
+    "6-UPS (`stewart`)": "stewart",
+    "3-RRS (`ball-table`)": "ball-table",
+}
+"""Rows of the evidence, and the machine of the measured results."""
+
+
+def test_intervals_of_the_evidence_are_those_that_were_measured():
+    results = (ROOT / "benchmarks" / "identification" / "RESULTS.md").read_text(encoding="utf-8")
+    measured = {}
+    for line in results.split("\n"):
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if cells[0] in pteron.catalog() and len(cells) == 11:
+            measured[cells[0]] = cells
+    rows = re.findall(r"(?m)^\| (.*), (\d+) values \| (.*) \|$", TEXTS["docs/evidence.md"])
+    assert [row[0] for row in rows] == list(INTERVALS)
+    for machine, count, cells in rows:
+        true = measured.pop(INTERVALS[machine])
+        assert [count, *cells.split(" | ")[:3]] == true[1:5], machine
+        assert cells.split(" | ")[3] in (f"{float(true[8]) + e:.2f}" for e in (0.0, 1e-9)), machine
+    assert not measured
+    shares = [float(row[2].split(" %")[0]) for row in rows]
+    assert f"{min(shares):g} to {max(shares):g} % of the time" in TEXTS["README.md"]
+
+
+def test_times_of_the_evidence_are_those_that_were_measured():
+    """The first number of each row; the others are ratios to it, or other programs'."""
+    results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
+    _, _, section = TEXTS["docs/evidence.md"].partition("## How fast is it?")
+    tables, _, _ = section.partition("| Quadrupteron, operations a state")
+    rows = re.findall(r"(?m)^\| [^|]*[\w)] \| ([\d.]+)", tables)
+    assert len(rows) >= 7
+    for number in rows:
+        assert re.search(rf"(?<![\d.]){re.escape(number)}(?![\d.])", results), number
+    (batch,) = re.findall(r"forces of a batch of states \| ([\d.]+) ns", TEXTS["README.md"])
+    assert f"| batch of 100 000 | {batch};" in tables
+
+
+def test_the_catalogs_page_has_a_row_for_each_machine():
+    table, *_ = TEXTS["docs/catalog.md"].partition("\n## ")
+    rows = re.findall(r"(?m)^\| <img [^|]*\| `([\w-]+)` \|", table)
+    assert sorted(rows) == sorted(pteron.catalog())
 
 
 # The theory.

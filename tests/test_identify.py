@@ -515,7 +515,8 @@ def test_a_trusted_error_above_the_noise_is_told_beside_it():
         " ".join(verdict_of([prediction((0.04, 0.01), noise)], repeats=False).reasons)
         for noise in ((0.02, 0.01), (0.03, 0.01))
     )
-    assert "actuator 1 is 2 times the noise: the model misses 3.5 % of its force beyond" in told
+    expected = "misses 3.5 % of the force of actuator 1 beyond the noise (its error is 2 times the"
+    assert expected in told
     assert "times the noise" not in quiet
 
 

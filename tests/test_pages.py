@@ -78,7 +78,7 @@ def page_of(folder):
 
 
 @contextmanager
-def opened(browser, path, width=1440, **context) -> Iterator:
+def opened(browser, path, width=1440, query="", **context) -> Iterator:
     """Open a page; it must ask for nothing but itself, and have nothing to complain of."""
     look = {"viewport": {"width": width, "height": 900}, "reduced_motion": "reduce", **context}
     there = browser.new_context(**look)
@@ -87,10 +87,10 @@ def opened(browser, path, width=1440, **context) -> Iterator:
     page.on("console", lambda message: faults.append(message.text))
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
-    page.goto(path.as_uri())
+    page.goto(path.as_uri() + query)
     yield page
     assert faults == []
-    assert set(asked) == {path.as_uri()}
+    assert set(asked) == {path.as_uri() + query}
     there.close()
 
 
@@ -187,6 +187,18 @@ def test_the_machine_is_in_the_view_at_any_angle(browser, page_of, name, width):
         image = drawn(page)
         assert not border(image, 8).any()
         assert border(image, image.shape[0] // 8).any(), "it fills the view, too"
+
+
+@CLIENTS
+@pytest.mark.parametrize("width", [360, 800])
+def test_in_a_frame_of_another_page_there_is_nothing_to_scroll(browser, page_of, width):
+    with opened(browser, page_of("motion", "par4"), width=width, query="?embedded") as page:
+        page.set_viewport_size({"width": width, "height": 544})
+        assert page.evaluate("document.documentElement.scrollHeight") <= 544
+        shown = [name for name in ("#view", "#play", "#seek") if page.locator(name).is_visible()]
+        assert shown == ["#view", "#play", "#seek"]
+        assert page.locator("#view").bounding_box()["height"] > 300
+        assert not page.locator("h1").is_visible()
 
 
 @CLIENTS

@@ -37,6 +37,8 @@ def driven(name):
 GIVEN = {"sensors": Sensors(1e-6), "delay": 5e-4, "duration": 0.05}
 
 
+IN_THE_LOOP = ("five-bar", "quadrupteron", "delta", "par4", "stewart", "3-rrr")
+
 LAWS = {
     one.what: one
     for one in (PDGravity(), FeedForwardPD(), ComputedTorque(), Adaptive(friction=True))
@@ -46,7 +48,7 @@ LAWS = {
 @pytest.mark.parametrize(
     ("name", "law"),
     mechanisms.several(
-        list(product(("five-bar", "quadrupteron", "delta", "par4", "stewart", "3-rrr"), LAWS)),
+        list(product(IN_THE_LOOP, LAWS)),
         [("five-bar", "computed_torque")],
     ),
 )

@@ -2,45 +2,27 @@
 
 import ctypes
 import re
-import runpy
-import shlex
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from test_console_blocks import run_page
 
 import pteron
-from pteron.cli.main import app
 from pteron.kernels.c import compiler
 
 ROOT = Path(__file__).parent.parent
-PAGE = (ROOT / "docs" / "from-log-to-controller.md").read_text(encoding="utf-8")
-COMMANDS = re.findall(r"(?m)^    ((?:pteron|python|cc|cp|controller/test)\b.*)$", PAGE)
-
-
-def done(line, monkeypatch, capsys):
-    """Run a line of the page and return what it prints; it is for the folder of a clone."""
-    program, *words = shlex.split(line)
-    if program == "pteron":
-        result = CliRunner().invoke(app, words)
-        assert result.exit_code == 0, f"{line}\n{result.stderr}"
-        return result.stdout
-    if program == "python":
-        monkeypatch.setattr("sys.argv", words)
-        runpy.run_path(str(ROOT / words[0]), run_name="__main__")
-        return capsys.readouterr().out
-    command = {"cc": compiler(), "cp": ["cp"]}.get(program, [f"./{program}"])
-    return subprocess.run([*command, *words], capture_output=True, text=True, check=True).stdout
+NAME = "docs/from-log-to-controller.md"
+PAGE = (ROOT / NAME).read_text(encoding="utf-8")
 
 
 @pytest.mark.clients
-def test_the_whole_way(tmp_path, monkeypatch, capsys):
+def test_the_whole_way(tmp_path, monkeypatch):
     if compiler() is None:
         pytest.skip("no C compiler")
     monkeypatch.chdir(tmp_path)
-    printed = {line: done(line, monkeypatch, capsys) for line in COMMANDS}
+    printed = run_page(NAME, tmp_path)
     assert len(printed) == 17
     assert printed["controller/test"] == "all functions agree with the library\n"
     verdicts = [text for line, text in printed.items() if line.startswith("pteron identify")]

@@ -3,22 +3,52 @@
 from __future__ import annotations
 
 import re
+from html import escape, unescape
 from typing import Any
 
 from sphinx.application import Sphinx
 
 _SCROLLS = re.compile(r"<pre>")
 _CAPTION = 'class="caption" role="heading"'
+_HEADING_OR_PICTURE = re.compile(r"<h[1-6][^>]*>(?P<heading>.*?)</h[1-6]>|<img\b[^>]*>", re.DOTALL)
+_NAMELESS = re.compile(r'alt="(?:(?:[\w.-]+/)*[0-9a-f]{32,}(?:\.\w+)?|)"')
+_THUMB = re.compile(
+    r'(<img alt=")("[^>]*>.*?<div class="sphx-glr-thumbnail-title">)(.*?)(</div>)', re.DOTALL
+)
 
 
 def open_to_all(
     app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: object
 ) -> None:
-    """Let code that scrolls be focused, and give the sidebar's captions a level."""
+    """Let code that scrolls be focused, name pictures, and give the sidebar's captions a level."""
     if "body" in context:
-        context["body"] = _SCROLLS.sub('<pre tabindex="0">', context["body"])
+        body = _SCROLLS.sub('<pre tabindex="0">', context["body"])
+        context["body"] = name_pictures(body)
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace(_CAPTION, f'{_CAPTION} aria-level="2"')
+
+
+def name_pictures(body: str) -> str:
+    """Return a page whose pictures without a name, or with a file's, have one for who hears it.
+
+    A thumbnail of the gallery has its title; the picture of a notebook's cell the heading above it.
+    """
+    body = _THUMB.sub(lambda m: f"{m[1]}{_text(m[3])}{m[2]}{m[3]}{m[4]}", body)
+    heading = ""
+
+    def named(match: re.Match[str]) -> str:
+        nonlocal heading
+        if match["heading"] is not None:
+            heading = _text(match["heading"])
+            return match[0]
+        return _NAMELESS.sub(f'alt="Figure: {heading}"', match[0]) if heading else match[0]
+
+    return _HEADING_OR_PICTURE.sub(named, body)
+
+
+def _text(markup: str) -> str:
+    """Return the words of a piece of HTML, for an attribute, without the mark of its link."""
+    return escape(unescape(re.sub(r"<a class=\"headerlink.*?</a>|<[^>]+>", "", markup)).strip())
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

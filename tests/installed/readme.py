@@ -1,7 +1,7 @@
 """The commands of README and of the tour in a fresh copy of this clone: ``make first``.
 
 What `git` tracks is copied to an empty folder, `make demo` is run there, as README says, and then
-each command that README and docs/start/tour.md show with `.venv/bin/`, one after the other, in an
+each command that README and docs/start/tour.md show, with `.venv/bin/`, one after the other, in an
 empty home. `log.csv` and its held-out companion, which a reader records on the machine, are
 recorded in simulation. A viewer must answer and is then ended. It takes some minutes; seconds and
 commands are printed.
@@ -30,12 +30,10 @@ OPENED = 60.0
 
 
 def commands(text: str) -> list[list[str]]:
-    """Return a page's commands of the environment, as words, without remarks."""
-    lines = re.findall(r"(?m)^ {4}(?:\$ )?(\.venv/bin/.*)$", text)
-    return [
-        [word for word in shlex.split(re.split(r" +# ", line)[0]) if word != "..."]
-        for line in lines
-    ]
+    """Return a page's commands of the environment, as words."""
+    joined = re.sub(r"\\\n +", "", re.sub(r"(?ms)^```.*?^```", "", text))
+    lines = re.findall(r"(?m)^ {4}(?:\$ )?(?:\.venv/bin/)?((?:pteron|python) .*)$", joined)
+    return [shlex.split(f".venv/bin/{line}") for line in lines]
 
 
 def copied(folder: Path) -> Path:

@@ -1,6 +1,7 @@
 """`plan`: chooses the most informative poses to measure for a calibration.
 
-They lie in a box of poses that is proved to be in reach and away from singularities.
+They lie in a region of poses that is proved to be in reach and away from singularities: a box, or
+on a plane that a probe touches a disc, which goes to the rim of what is in reach.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import numeric
 from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.workspace import Box, home_pose, prove
+from pteron.workspace import Box, Cylinder, home_pose, prove
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,9 @@ _CANDIDATES = 1500
 
 _TO_THE_EDGE = 1.0 / 3.0
 """Exponent of random numbers in [0, 1] that crowds candidates towards the box's faces."""
+
+_TO_THE_RIM = 0.5 * _TO_THE_EDGE
+"""The same of a disc's radius, whose area grows with its square."""
 
 _SHARE = 0.3
 """Least measures that are proved in the box, over those at its centre: nearer to a singularity the
@@ -57,6 +61,9 @@ _RISES = 1e-6
 _ABOVE = 0.005
 """Height above a plane to which a probe is lifted between two places, m."""
 
+_ROUNDING = 1e-12
+"""Relative distance of candidates from a disc's rim: far more than their rounding."""
+
 _NOISE = dict.fromkeys(KINDS, 2e-5)
 """Noise that is expected where nobody says it, m and rad."""
 
@@ -75,10 +82,12 @@ class Plan:
         m and rad.
     readings : array, shape (N, n)
         What the joints read there on the machine as drawn.
-    region : Box
-        The proved box of poses that holds them, and the straight ways between them.
+    region : Box or Cylinder
+        The proved region of poses that holds them, and the straight ways between them.
+    plane : Plane or None
+        The plane over which heights are measured.
     before, after : float
-        Expected greatest error of the tool's place in that box, as a standard deviation, by
+        Expected greatest error of the tool's place in that region, as a standard deviation, by
         tolerances alone and after a calibration, m.
     checked : int
         How many poses, or more, leave some to check the calibration by.
@@ -88,7 +97,8 @@ class Plan:
     measure: Measure
     poses: Array
     readings: Array
-    region: Box
+    region: Box | Cylinder
+    plane: Plane | None
     before: float
     after: float
     checked: int
@@ -120,8 +130,10 @@ def plan(
     count : int
         How many poses.
     measure : {"poses", "positions", "heights", "distances"}
-        What is to be measured at each. Heights are over the setup's plane, by default one at the
-        bottom of the proved box; distances to its anchor, by default an unknown one below home.
+        What is to be measured at each. Heights are over the setup's plane; by default z = 0, the
+        plane of a log that names none, where the tool's home is above it and poses on it are
+        proved to serve, as on a printer's bed, else an unknown plane at the bottom of the proved
+        box. Distances are to the setup's anchor, by default an unknown one below home.
     setup : Setup, optional
         Noise, marks, planes, anchors and frame, as a log's TOML says them.
     free, prior
@@ -141,7 +153,7 @@ def plan(
     DataError
         If the count is not above 0, a choice is unknown, or the tool stays where it is.
     ModelError
-        If no box of poses around home, or on the plane, is proved to serve.
+        If no region of poses around home, or on the plane, is proved to serve.
     """
     robot = as_manipulator(robot)
     expect(count >= 1, "count", count, "1 or more")
@@ -155,14 +167,12 @@ def plan(
     home = home_pose(robot)
     setup = setup or Setup()
     drawn = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
+    region: Box | Cylinder
     if measure == "heights":
-        home, setup = _on_plane(drawn, home, setup)
-    region = proved_box(robot, home, measure == "heights")
-    rng = np.random.default_rng(seed)
-    low, high = region.box
-    sides = rng.uniform(-1.0, 1.0, (_CANDIDATES, robot.freedom))
-    sides = np.sign(sides) * np.abs(sides) ** _TO_THE_EDGE
-    poses = 0.5 * (low + high) + 0.5 * (high - low) * sides
+        home, setup, region = _on_plane(drawn, home, setup)
+    else:
+        region = proved_box(robot, home)
+    poses = _candidates(robot, region, np.random.default_rng(seed))
     if measure == "heights":
         poses[:, _upright(robot)] = home[_upright(robot)]
         poses[:, robot.platform.angular] = home[robot.platform.angular]
@@ -191,7 +201,23 @@ def plan(
     )
     readings = start.readings(slopes.joints(start, picked))
     checked = rows_for_check(given, blocks)
-    return Plan(robot, measure, picked, readings, region, before, after, checked)
+    plane = next(iter(setup.planes.values())) if measure == "heights" else None
+    return Plan(robot, measure, picked, readings, region, plane, before, after, checked)
+
+
+def _candidates(robot: Manipulator, region: Box | Cylinder, rng: np.random.Generator) -> Array:
+    """Return random poses (N, m) of a region, more of them near its faces than within."""
+    low, high = region.box
+    sides = rng.uniform(-1.0, 1.0, (_CANDIDATES, robot.freedom))
+    if isinstance(region, Cylinder):
+        angles = np.pi * sides[:, 0]
+        radii = (1.0 - _ROUNDING) * region.radius * np.abs(sides[:, 1]) ** _TO_THE_RIM
+        poses = np.tile(0.5 * (low + high), (_CANDIDATES, 1))
+        poses[:, :2] = np.array(region.center[:2])
+        poses[:, :2] += radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return poses
+    sides = np.sign(sides) * np.abs(sides) ** _TO_THE_EDGE
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * sides)
 
 
 def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
@@ -205,8 +231,7 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
     ModelError
         If there is none.
     """
-    type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
-    floors = _SHARE * float(type_i.min()), _SHARE * abs(float(type_ii))
+    floors = _floors(robot, center)
     drawn = random_poses(robot, 400)
     sides = np.maximum(np.abs(drawn - center).max(axis=0), 1e-9)
     thin = np.zeros(robot.freedom)
@@ -224,12 +249,54 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
         else:
             most = share
     if found is None:
-        raise ModelError(
-            f"no box of poses around {np.round(center, 4).tolist()} is proved to be in reach, "
-            "within limits and away from singularities; move the plane, or the machine's limits",
-            subject=robot.name,
-        )
+        raise _no_region(robot, center)
     return _widened(robot, found, sides, floors)
+
+
+def _floors(robot: Manipulator, center: Array) -> tuple[float, float]:
+    """Return the least type-I and type-II measures of a region around a pose."""
+    type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
+    floors = _SHARE * float(type_i.min()), _SHARE * abs(float(type_ii))
+    if not np.isfinite(floors).all():
+        raise _no_region(robot, center)
+    return floors
+
+
+def _no_region(robot: Manipulator, center: Array) -> ModelError:
+    return ModelError(
+        f"no box of poses around {np.round(center, 4).tolist()} is proved to be in reach, "
+        "within limits and away from singularities; move the plane, or the machine's limits",
+        subject=robot.name,
+    )
+
+
+def _proved_level(robot: Manipulator, center: Array) -> Box | Cylinder:
+    """Return the larger of a proved box and a proved disc on a level, both `_ABOVE` high.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    box = proved_box(robot, center, flat=True)
+    if robot.coordinates[:3] != ("x", "y", "z"):
+        return box
+    floors = _floors(robot, center)
+    middle = center.copy()
+    middle[2] += 0.5 * _ABOVE
+    height = 2.0 * (middle[2] - center[2])
+    sides = (box.box[1] - box.box[0])[:2]
+    # Corners of the box are in reach: the disc through them is the greatest that may be.
+    least, most = 0.0, float(np.linalg.norm(sides))
+    for _ in range(_HALVINGS):
+        radius = 0.5 * (least + most)
+        disc = Cylinder(tuple(middle), radius, height)
+        if prove(robot, disc, type_i=floors[0], type_ii=floors[1], most=_MOST).holds:
+            least = radius
+        else:
+            most = radius
+    larger = np.pi * least**2 > sides.prod()
+    return Cylinder(tuple(middle), least, height) if larger else box
 
 
 def _widened(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, float]) -> Box:
@@ -255,23 +322,39 @@ def _upright(robot: Manipulator) -> int:
     return int(lengths[np.abs(robot.platform.directions[:, 2]).argmax()])
 
 
-def _on_plane(drawn: Guess, home: Array, setup: Setup) -> tuple[Array, Setup]:
-    """Return home with the tool on the setup's plane; without one, a plane below home."""
+def _on_plane(drawn: Guess, home: Array, setup: Setup) -> tuple[Array, Setup, Box | Cylinder]:
+    """Return home with the tool on the setup's plane, the setup and the proved region there.
+
+    Without a plane it is z = 0, the bed, where that serves, else an unknown one below home.
+    """
     robot = drawn.robot
     if not np.abs(robot.platform.directions[:, 2]).max(initial=0.0) > _RISES:
         raise DataError(f"measure: the heights of a {robot.platform.motion} platform do not vary")
     at = _upright(robot)
     point = drawn.points([TOOL], home[None])[0]
-    moved = home.copy()
     if setup.planes:
-        plane = next(iter(setup.planes.values()))
-        normal = np.array(plane.normal)
-        moved[at] += (plane.offset - normal @ point) / normal[2]
-        return moved, setup
+        moved = _lowered(home, at, point, next(iter(setup.planes.values())))
+        return moved, setup, _proved_level(robot, moved)
+    if point[2] > 0.0:
+        bed = Plane()
+        moved = _lowered(home, at, point, bed)
+        try:
+            return moved, replace(setup, planes={TOOL: bed}), _proved_level(robot, moved)
+        except ModelError:
+            pass  # There is no bed at z = 0.
+    moved = home.copy()
     below = proved_box(robot, home).box[0, at] - home[at]
     moved[at] += below
     plane = Plane(offset=float(point[2] + below), known=False)
-    return moved, replace(setup, planes={TOOL: plane})
+    return moved, replace(setup, planes={TOOL: plane}), _proved_level(robot, moved)
+
+
+def _lowered(home: Array, at: int, point: Array, plane: Plane) -> Array:
+    """Return home with the tool, which is at a point (3,), moved to a plane along a coordinate."""
+    normal = np.array(plane.normal)
+    moved = home.copy()
+    moved[at] += (plane.offset - normal @ point) / normal[2]
+    return moved
 
 
 def _imagined(drawn: Guess, poses: Array, measure: Measure, setup: Setup) -> Measurements:

@@ -15,7 +15,7 @@ from pteron.errors import DataError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from pteron.calibration import Calibration
+    from pteron.calibration import Calibration, Plan, Setup
     from pteron.manipulator import Manipulator
 
 _MOST = 12
@@ -36,6 +36,7 @@ def calibrate(
     prior: str | None = None,
     plan: int | None = None,
     measure: Measure = "positions",
+    plane: str | None = None,
 ) -> Result:
     """Find a machine's true geometry from measurements, and say what they cannot show.
 
@@ -59,6 +60,8 @@ def calibrate(
     --prior TOML: Standard deviations by group or value, m and rad.
     --plan N: Choose so many poses to measure, in place of a LOG.
     --measure: What will be measured at the planned poses.
+    --plane z=HEIGHT: The level that a planned probe touches, m. [default: z=0 where the tool works
+        down to it, as on a printer's bed; else the bottom of the proved poses]
 
     Examples
     --------
@@ -66,12 +69,15 @@ def calibrate(
     pteron calibrate printer.cfg --robot printer.toml --free radius --free zeros --out calibrated
     pteron calibrate a.csv b.csv --held-out c.csv --robot delta --prior shop.toml --out calibrated
     pteron calibrate --plan 40 --measure heights --robot printer.toml --out plan.csv
+    pteron calibrate --plan 40 --measure heights --plane z=0.002 --robot printer.toml --out p.csv
     """
     if (plan is None) == (not log):
         raise DataError("give logs of measurements, or --plan with the number of poses to measure")
+    if plane is not None and (plan is None or measure != "heights"):
+        raise DataError("--plane goes with --plan and --measure heights")
     if plan is not None:
         tolerances = None if prior is None else _prior(prior)
-        return _plan(machine, plan, measure, out, free, tolerances)
+        return _plan(machine, plan, measure, out, free, tolerances, plane)
     with spinner("Reading the measurements"):
         from pteron.calibration import calibrate as calibrated, read_measurements
         from pteron.report.calibration import numbers, write_calibration
@@ -113,27 +119,22 @@ def _plan(
     out: str,
     free: list[str] | None,
     prior: dict[str, float] | None,
+    plane: str | None,
 ) -> Result:
     """Choose the poses to measure, and write the table that the machine runs."""
     from pteron.tables import check_output, write_table
 
     check_output(out)
+    setup = None if plane is None else _level(plane)
     with spinner(f"Choosing {count} poses"):
         import polars as pl
 
         from pteron.calibration import plan
 
-        found = plan(machine, count, measure, free=free, prior=prior)
+        found = plan(machine, count, measure, setup=setup, free=free, prior=prior)
         path = write_table(pl.DataFrame(found.columns()), out)
     box = {name: list(side) for name, side in zip(("low", "high"), found.region.box, strict=True)}
     expected = {"before": found.before, "after": found.after}
-    low, high = found.region.box
-    sides = ", ".join(
-        f"{name} {1e3 * a:.0f} to {1e3 * b:.0f} {'mm' if unit == 'm' else 'mrad'}"
-        for name, unit, a, b in zip(
-            machine.coordinates, machine.units, low.tolist(), high.tolist(), strict=True
-        )
-    )
     what, unit = ("tool's place", "mm") if machine.platform.lengths else ("angles", "mrad")
     off = "is" if unit == "mm" else "are"
     few = (
@@ -141,13 +142,51 @@ def _plan(
         "fewer give a second log (--held-out)."
     )
     told = [
-        f"{plain(machine.name)}: {count} poses at which to measure {measure}, in a box where every "
-        f"pose is proved to serve: {sides}",
+        f"{plain(machine.name)}: {count} poses at which to measure {measure}{_over(found)}, in a "
+        f"{_region(found)}; every pose of it is proved to serve",
         f"The {what} {off} off by up to {1e3 * found.before:.3g} {unit} as drawn (one standard "
         f"deviation of the tolerances); {1e3 * found.after:.3g} {unit} are expected to be left.",
         *([few] if count < found.checked else []),
     ]
     return Result({"file": str(path), "expected": expected, "region": box}, told, [path])
+
+
+def _level(text: str) -> Setup:
+    """Return a setup with the plane of --plane."""
+    from pteron.calibration import Plane, Setup
+    from pteron.cli.pose_ranges import pose_ranges
+
+    held, ranges = pose_ranges(text, "--plane")
+    if set(held) != {"z"} or ranges:
+        raise DataError(f"--plane: {text!r} given; z=HEIGHT expected, in m, such as z=0")
+    return Setup(planes={"": Plane(offset=held["z"])})
+
+
+def _over(planned: Plan) -> str:
+    """Return over which plane heights are measured."""
+    plane = planned.plane
+    if plane is None:
+        return ""
+    known = "" if plane.known else ", which is found with the geometry"
+    return f" over the plane z = {1e3 * plane.offset + 0.0:.4g} mm{known}"
+
+
+def _region(planned: Plan) -> str:
+    """Return the shape and the size of a plan's region, mm and mrad."""
+    from pteron.workspace import Cylinder
+
+    region, machine = planned.region, planned.robot
+    sides = [
+        f"{name} {1e3 * a + 0.0:.0f} to {1e3 * b + 0.0:.0f} {'mm' if unit == 'm' else 'mrad'}"
+        for name, unit, a, b in zip(
+            machine.coordinates, machine.units, *region.box.round(9).tolist(), strict=True
+        )
+    ]
+    if isinstance(region, Cylinder):
+        x, y = (f"{1e3 * value + 0.0:.4g}" for value in region.center[:2])
+        disc = f"disc of radius {1e3 * region.radius:.0f} mm about x {x} mm, y {y} mm"
+        return ", ".join([disc, *sides[2:]])
+    return f"box, {', '.join(sides)}"
 
 
 def _show(result: Calibration) -> None:

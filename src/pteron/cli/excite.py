@@ -75,7 +75,7 @@ def excite(
     TOML file beside each motion tells units, columns, period and assembly mode. Copy it beside the
     log, log.toml beside log.csv, and pteron identify reads a log in the same layout.
 
-    Ctrl-C ends the search and keeps the best until then.
+    The search takes about a minute: --seconds. Ctrl-C ends it and keeps the best until then.
 
     Options
     -------

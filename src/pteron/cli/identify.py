@@ -235,6 +235,9 @@ def _values(result: Identification) -> Table:
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
     caption = "Base parameters are sums, named by one term; the page has them in full."
+    negative = [row.name for row in parameter_rows(result) if row.unit == "kg" and row.value < 0.0]
+    if negative:
+        caption += f" A sum may be below zero, as {negative[0]}: in it masses are subtracted."
     if short:
         caption += " (!) Too short: they do not allow for the faults that are named."
     made = table(*columns, numbers=numbers, caption=caption)

@@ -173,7 +173,8 @@ class Commands(Mapping[str, Any]):
 def pteron(context: Context, *, version: bool = False) -> None:
     """Kinematics, dynamics and base parameters of parallel manipulators (Quadrupteron, Delta, ...).
 
-    SI units and radians everywhere.
+    SI units and radians everywhere. Where the output goes into a pipe or a file, tables of poses
+    and indices are CSV, without the sentences that a screen gets; --json gives data for programs.
 
     Options
     -------

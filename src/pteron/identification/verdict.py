@@ -190,9 +190,9 @@ def _of_prediction(prediction: Prediction) -> Opinion:
         )
     if found.grade == "trustworthy" and ratio[worst] > AT_THE_FLOOR:
         found.add(
-            f"The error of actuator {worst + 1} is {times(ratio[worst])} the noise: the model "
-            f"misses {percentages([missed[worst]], 1)} of its force beyond it; up to {SMALL:g} % "
-            "is trusted."
+            f"The model misses {percentages([missed[worst]], 1)} of the force of actuator "
+            f"{worst + 1} beyond the noise (its error is {times(ratio[worst])} the noise); up to "
+            f"{SMALL:g} % is trusted."
         )
     elif found.grade != "trustworthy":
         friction = prediction.nrms_without_friction[worst] - prediction.nrms[worst]

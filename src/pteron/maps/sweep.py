@@ -101,7 +101,7 @@ def sweep(
     DataError
         If `scheduler` and `workers` are both given, or there are no workers or threads.
     ModelError
-        If `dask.distributed` is not installed: ``pip install "pteron[cluster]"``.
+        If `dask.distributed` is not installed: the extra `cluster` brings it.
     PteronError
         If the scheduler does not answer, has no workers, or those have another version of Pteron;
         if it ends meanwhile, or all its workers do, or a chunk ends one worker after another. What

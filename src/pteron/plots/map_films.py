@@ -58,7 +58,7 @@ def map_film(
     OutputError
         If the file cannot be written, or its ending is neither .mp4 nor .gif.
     PteronError
-        If the encoder of MP4 files is not there: ``pip install 'pteron[film]'`` brings it.
+        If the encoder of MP4 files is not there; the extra `film` brings it.
     """
     target = checked_film(path)
     if len(given.grid.axes) != 3 or name not in given.values:

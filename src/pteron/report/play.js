@@ -4,6 +4,7 @@
   const canvas = document.getElementById("view");
   if (!canvas.getContext("2d")) return;
   document.documentElement.classList.add("scripted");
+  if (window.location.search === "?embedded") document.documentElement.classList.add("embedded");
   const play = document.getElementById("play"), seek = document.getElementById("seek"), pace = document.getElementById("pace");
   const frames = data.time.length, calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   const path = data.tool || data.position, trail = data.closed ? path.concat([path[0]]) : path;
