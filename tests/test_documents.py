@@ -258,13 +258,6 @@ def test_each_page_has_a_title_of_its_own_and_the_how_tos_are_named_by_it():
 
 BREADTH = 88
 """Columns of code that fit the site's page at 1440 pixels."""
-WIDE = {
-    **dict.fromkeys(
-        (name for name in TEXTS if name.startswith("docs/theory/")), "still to be broken"
-    ),
-    "docs/start/first-result.md": "still to be broken",
-}
-"""Pages that may have longer lines, and why."""
 
 
 @NAMES
@@ -276,7 +269,7 @@ def test_code_is_no_wider_than_the_page(name):
         for k, line in enumerate(lines)
         if len(line) > BREADTH
     ]
-    assert name in WIDE or long == []
+    assert long == []
 
 
 # Counts.

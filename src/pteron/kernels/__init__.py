@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING
 from pteron.public import publish as _publish
 
 if TYPE_CHECKING:
-    from pteron.kernels.bounds import Bounded as Bounded, bounded as bounded, bounds as bounds
+    from pteron.kernels.bounds import (
+        UNBOUNDED as UNBOUNDED,
+        Bounded as Bounded,
+        bounded as bounded,
+        bounds as bounds,
+    )
     from pteron.kernels.choice import numeric as numeric
     from pteron.kernels.fields import (
         Field as Field,

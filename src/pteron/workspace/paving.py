@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.arguments import expect_share
+from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.kinematics.architecture import expect_regular
@@ -204,7 +204,7 @@ def paving(
     ModelError
         If the reach has no end.
     DataError
-        If the tolerance is no share between 0 and 1, or the box is none.
+        If the tolerance is not positive, or the box is none.
     SingularPose
         If the machine is singular at every pose.
 
@@ -217,7 +217,8 @@ def paving(
     """
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
-    expect_share("tolerance", tolerance)
+    # The undecided part may be larger than what is inside: a tolerance above 1.
+    expect(0.0 < tolerance < np.inf, "tolerance", repr(tolerance), "a share above 0")
     expect_regular(robot)
     if within is None:
         expect_places(robot, "say within which angles")
