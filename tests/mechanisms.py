@@ -259,10 +259,11 @@ def scaled(robot, factor):
     def body(inertia):
         if isinstance(inertia, float):
             return inertia
+        about = inertia.inertia
         return replace(
             inertia,
             first_moment=times(inertia.first_moment),
-            inertia=factor**2 * inertia.inertia,
+            inertia=times(about, 2) if isinstance(about, tuple) else factor**2 * about,
         )
 
     legs = []
@@ -279,6 +280,7 @@ def scaled(robot, factor):
         robot.platform,
         inertia=body(robot.platform.inertia),
         tool=times(robot.platform.tool),
+        center=robot.platform.center and times(robot.platform.center),
         bars=tuple(replace(bar, hinge=times(bar.hinge)) for bar in robot.platform.bars),
         geared=tuple(replace(g, inertia=factor**2 * g.inertia) for g in robot.platform.geared),
     )

@@ -5,12 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
-from mechanisms import TILTED, gated, several
+from mechanisms import TILTED, gated, scaled, several
 from scipy.linalg import eigh
 
 import pteron
 from pteron.errors import ModelError
-from pteron.indices import Elasticity, evaluate, geometric_sensitivities, indices_of, stiffness
+from pteron.indices import (
+    Elasticity,
+    Section,
+    evaluate,
+    geometric_sensitivities,
+    indices_of,
+    stiffness,
+)
 from pteron.workspace import home_pose
 
 CASES = [("1T2R", ("RPS",)), ("2R", ("UPS", "PSS", "RSS"))]
@@ -80,6 +87,29 @@ def test_singular_values_of_six_columns(shape):
             one = rng.normal(size=shape) * 10.0 ** rng.uniform(-graded, graded, shape[1])
             found = np.sort(np.asarray(values(one)).ravel())[::-1]
             np.testing.assert_allclose(found, np.linalg.svd(one)[1], rtol=1e-11)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_natural_frequencies_with_elastic_links_do_not_depend_on_the_unit_of_length(factor):
+    """A tripod written in mm has the same: its parasitic motions are held, whatever they count."""
+    robot = pteron.load("sprint-z3")
+    pose = home_pose(robot) + [0.0, 0.1, -0.05]
+    section = {"axial": 2e7, "bending": 4e3, "sideways": 4e3, "torsion": 3e3}
+    # In N = kg m/s^2: forces scale with the length, E A too, E I with its third power.
+    other = {key: value * factor ** (1 if key == "axial" else 3) for key, value in section.items()}
+    at = np.where(robot.platform.angular, pose, factor * pose)
+    plain, elastic = (
+        stiffness(machine, where, Elasticity(2e6, Section(**part), Section(**part))).frequencies
+        for machine, where, part in ((robot, pose, section), (scaled(robot, factor), at, other))
+    )
+    np.testing.assert_allclose(elastic, plain, rtol=1e-8)
+    # T^T C^-1 T by hand, both at P: C has no direction in which nothing gives way.
+    robot = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
+    found = stiffness(robot, pose, Elasticity(2e6, Section(**section), Section(**section)))
+    twists = pteron.twist(robot, pose, np.eye(3)).T
+    stiff = twists.T @ np.linalg.solve(found.compliance, twists)
+    squares = eigh(stiff, pteron.mass_matrix(robot, pose), eigvals_only=True)
+    np.testing.assert_allclose(found.frequencies, np.sqrt(squares) / (2 * np.pi), rtol=1e-8)
 
 
 @pytest.mark.parametrize("name", gated(["wrist", "ball-table", "stewart"], ["ball-table"]))

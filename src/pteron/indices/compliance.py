@@ -182,8 +182,9 @@ def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple
         at_p = _compliance(robot, given, energy, np.zeros((len(energy), 3)))
         compliance[good] = at_p
         if robot.platform.tilts:
-            rates = np.linalg.pinv(twist(robot, poses[good][:, None], np.eye(m)).mT)
-            at_p = rates @ at_p @ rates.mT
+            twists = twist(robot, poses[good][:, None], np.eye(m)).mT
+            size_of_legs = float(np.mean([leg.size for leg in robot.legs]))
+            at_p = np.stack([_held(*pair, size_of_legs) for pair in zip(at_p, twists, strict=True)])
         frequencies[good] = _frequencies(at_p, mass[good])
         if any(robot.platform.tool):
             arm = tool_arm(robot, poses[good])
@@ -298,6 +299,25 @@ def _beam(section: Section, arm: Array, way: Array, axis: Array) -> Array:
 
 def _square(rows: Array) -> Array:
     return np.asarray(rows[:, :, None] * rows[:, None, :])
+
+
+def _held(compliance: Array, twists: Array, length: float) -> Array:
+    """Return the compliance (m, m) of a pose's coordinates while parasitic motions are held.
+
+    The platform moves by twists x' alone, `twists` (6, m), so that its stiffness is T^T C^-1 T. A
+    direction in which nothing gives way (C is singular where links are rigid) allows no x' that
+    moves along it; `length` balances moments and forces in the decision which those are.
+    """
+    balance = np.array([1.0, 1.0, 1.0, length, length, length])
+    values, vectors = np.linalg.eigh(balance[:, None] * compliance * balance)
+    scaled = vectors.T @ (balance[:, None] * twists)
+    soft = values > _FREE * values[-1]
+    sizes, rows = np.linalg.svd(scaled[~soft], full_matrices=True)[1:]
+    rank = int((sizes > np.sqrt(_FREE) * np.linalg.norm(scaled)).sum())
+    free = rows[rank:].T
+    moved = scaled[soft] @ free
+    stiffness_of_free = moved.T @ (moved / values[soft, None])
+    return np.asarray(free @ np.linalg.solve(stiffness_of_free, free.T))
 
 
 def _frequencies(compliance: Array, mass: Array) -> Array:
