@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 import tilting
-from mechanisms import gated
+from mechanisms import gated, scaled
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -119,6 +119,22 @@ def test_poses_are_counted_another_way(name):
         if not any(np.abs(known - other).max() < 1e-6 for other in found):
             found.append(known)
     assert len(found) == counts(poses)
+
+
+@pytest.mark.parametrize("name", gated(["ankle", "wrist", "ball-table"], ["ankle"]))
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_a_machine_of_another_size_has_the_same_poses(name, factor):
+    """In mm or km; of a 2R platform the angle of its axes has no size."""
+    robot = pteron.load(name)
+    other, scale = scaled(robot, factor), np.where(robot.platform.angular, 1.0, factor)
+    for pose in pteron.random_poses(robot, 4, seed=1):
+        modes, theirs = (
+            pteron.kinematics.assembly_modes(machine, pteron.inverse_kinematics(machine, at))
+            for machine, at in ((robot, pose), (other, pose * scale))
+        )
+        modes, theirs = (part[np.isfinite(part).all(axis=-1)] for part in (modes, theirs))
+        assert len(modes) == len(theirs) > 0
+        np.testing.assert_allclose(theirs / scale, modes, rtol=0, atol=1e-9)
 
 
 def test_dietmaiers_machine_has_forty_poses():

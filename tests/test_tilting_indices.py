@@ -93,7 +93,7 @@ def test_singular_values_of_six_columns(shape):
 def test_natural_frequencies_with_elastic_links_do_not_depend_on_the_unit_of_length(factor):
     """A tripod written in mm has the same: its parasitic motions are held, whatever they count."""
     robot = pteron.load("sprint-z3")
-    pose = home_pose(robot) + [0.0, 0.1, -0.05]
+    pose = np.add(home_pose(robot), [0.0, 0.1, -0.05])
     section = {"axial": 2e7, "bending": 4e3, "sideways": 4e3, "torsion": 3e3}
     # In N = kg m/s^2: forces scale with the length, E A too, E I with its third power.
     other = {key: value * factor ** (1 if key == "axial" else 3) for key, value in section.items()}

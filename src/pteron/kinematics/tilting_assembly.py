@@ -55,16 +55,17 @@ def tilting_poses(
         base, top = a[:, : closed.spheres].mean(axis=1), b[: closed.spheres].mean(axis=0)
     elif platform.center is not None:
         base = np.broadcast_to(np.array(platform.center), base.shape)
-    spheres = slice(0, closed.spheres)
     r[:, closed.spheres :] -= (a[:, closed.spheres :] * base[:, None]).sum(axis=-1)
     a[:, : len(robot.legs)] -= base[:, None]
     b = b - top
-    own = (a[:, spheres] ** 2).sum(axis=-1) + (b[spheres] ** 2).sum(axis=-1)
-    size = np.sqrt(own.mean(axis=-1)) / generic(closed).size
+    # The row of a 2R platform's unit axes has no size in metres.
+    in_metres = slice(0, len(robot.legs))
+    squares_of_ends = (a[:, in_metres] ** 2).sum(axis=-1) + (b[in_metres] ** 2).sum(axis=-1)
+    size = np.sqrt(squares_of_ends.mean(axis=-1)) / generic(closed).size
     machines = np.concatenate([a, np.broadcast_to(b, a.shape), r[..., None]], axis=-1)
-    machines[:, spheres, :6] /= size[:, None, None]
+    machines[:, in_metres, :6] /= size[:, None, None]
     machines[:, closed.spheres :, 3:6] /= size[:, None, None]
-    machines[:, spheres, 6] /= size[:, None] ** 2
+    machines[:, in_metres, 6] /= size[:, None] ** 2
     machines[:, closed.spheres :, 6] /= size[:, None]
     which, z, move = real_poses(closed, machines)
     place, turned = placed(z)
