@@ -39,6 +39,10 @@ _MOST = 10_000_000
 _HALVINGS = 12
 """Most times that steps are halved for a stated error."""
 
+_SAFE = 0.5
+"""Share of a stated error that a change may be: halving a step of first order leaves an error as
+large as the change."""
+
 _STATE = ("start, pose", "start, velocity")
 """Names in messages of the two parts of the start state."""
 
@@ -120,13 +124,14 @@ def simulate(
         refused where a transmission's stiffness or a current needs a shorter one.
     method : {"rk4", "dop853"}
         Fixed steps of Runge and Kutta's method of fourth order, compiled, of second order across a
-        joint's stop or start; or SciPy's method of Dormand and Prince of eighth order, of which
-        `tolerance` bounds the error of each step.
+        joint's stop or start, and of first where one with dry friction reverses; or SciPy's method
+        of Dormand and Prince of eighth order, of which `tolerance` bounds the error of each step.
     tolerance : float
         For "dop853", relative to the state; absolutely a thousandth of it.
     error : float, optional
         Greatest error of the poses that the steps may cause at any sample, m and rad: the steps are
-        halved, from `step` on, until the last halving changes no pose by more. For "rk4".
+        shortened, from `step` on, until twice in a row no pose changes by more than half of it. For
+        "rk4".
 
     Returns
     -------
@@ -191,25 +196,34 @@ def simulate(
         given = (pose, velocity), reference, source, loads, sensors, timing
         return run(robot, *given, limits=limits and controller is not None)
 
-    return made(timing) if error is None else _within(made, timing, error)
+    return made(timing) if error is None else _within(made, timing, error, period)
 
 
-def _within(made: Callable[[Timing], Simulation], timing: Timing, error: float) -> Simulation:
-    """Return a simulation whose steps are halved until no pose changes by more than the error."""
+def _within(
+    made: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
+) -> Simulation:
+    """Return a simulation whose steps are shortened until no pose changes by more than the error.
+
+    A step that holds a joint's reversal is of first order in its length and depends on where in the
+    step that is. So each run has an odd number of steps more than twice the last one's, by which no
+    two runs divide a sample alike, and two changes in a row must be small enough.
+    """
     check_positive(error=error)
     if timing.method != "rk4":
         raise DataError('error: goes with method "rk4"; the steps of "dop853" have `tolerance`')
-    coarse, changes = made(timing), []
+    coarse, changes = made(timing), [np.inf]
     for _ in range(_HALVINGS):
-        timing = replace(timing, step=min(timing.step, coarse.step) / 2.0)
+        length = min(timing.step, coarse.step)
+        count = round(period / length)
+        timing = replace(timing, step=period / (2 * count + 1) if count else length / 2.0)
         fine = made(timing)
         both = min(len(fine.time), len(coarse.time))
         changes.append(float(np.abs(fine.pose[:both] - coarse.pose[:both]).max()))
-        if changes[-1] <= error and len(fine.time) == len(coarse.time):
+        if max(changes[-2:]) <= _SAFE * error and len(fine.time) == len(coarse.time):
             return fine
         coarse = fine
     raise DataError(
-        f"error: {error:g} asked for, but halving steps to {timing.step:.2g} s still changes poses "
+        f"error: {error:g} asked for, but steps of {timing.step:.2g} s still change poses "
         f"by {changes[-1]:.2g}, {min(changes):.2g} at best: encoders that round, or a loop that is "
         "unstable, make much of the smallest difference; ask for less"
     )
