@@ -1,11 +1,17 @@
 """What `import pteron` brings, what it leaves until it is used, and which file may know what."""
 
 import ast
+import compileall
+import importlib
 import io
 import json
+import os
+import pickle
 import re
+import shutil
 import subprocess
 import sys
+import threading
 import tokenize
 from pathlib import Path
 
@@ -13,6 +19,7 @@ import pytest
 from mechanisms import CLIENTS
 
 import pteron
+from pteron.kernels import numeric
 
 SURFACE = {
     "load",
@@ -267,3 +274,157 @@ def test_what_is_looked_for_is_found():
 def test_names_are_listed_where_they_are_completed():
     assert set(pteron.__all__) <= set(dir(pteron))
     assert not {"Any", "import_module", "annotations"} & set(dir(pteron))
+
+
+# What builds on the package: pickles, applications without sources, forks, entry points.
+
+
+def packages():
+    """Yield the name of each package, and the path of its `__init__.py`."""
+    root = Path(pteron.__file__).parent
+    for path in sorted(root.rglob("__init__.py")):
+        yield ".".join(("pteron", *path.parent.relative_to(root).parts)), path
+
+
+def test_public_names_are_those_that_type_checkers_see():
+    """They are read from a package's code; here from its source."""
+    seen = 0
+    for name, path in packages():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        lines = [
+            line
+            for block in tree.body
+            if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+            for line in block.body
+            if isinstance(line, ast.ImportFrom)
+        ]
+        expected = {alias.asname or alias.name for line in lines for alias in line.names}
+        if expected:
+            assert expected <= set(importlib.import_module(name).__all__), name
+            seen += 1
+    assert seen > 15
+
+
+def test_packages_are_pickled_by_their_names():
+    """As by joblib and Dask, which pickle functions with the modules that they use."""
+    for package in (pteron, pteron.motion):
+        assert pickle.loads(pickle.dumps(package)) is package
+    cloudpickle = pytest.importorskip("cloudpickle")
+    scope = {"pteron": pteron}
+    exec("def double(x):\n    return 2 * len(pteron.catalog()) * x", scope)
+    scope["double"].__module__ = "__main__"
+    assert pickle.loads(cloudpickle.dumps(scope["double"]))(1) == 2 * len(pteron.catalog())
+
+
+@CLIENTS
+def test_a_tree_without_sources_works(tmp_path):
+    """As in an application that is shipped as bytecode."""
+    tree = tmp_path / "pteron"
+    shutil.copytree(
+        Path(pteron.__file__).parent, tree, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    assert compileall.compile_dir(tree, legacy=True, quiet=2)
+    for source in tree.rglob("*.py"):
+        source.unlink()
+    script = (
+        "import pteron\n"
+        "assert pteron.__file__.endswith('.pyc')\n"
+        "rest = [0.0, 0.0, 0.0]\n"
+        "print(len(pteron.__all__), pteron.inverse_dynamics('delta', [0, 0, -1], rest, rest))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        env=environment,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(str(len(pteron.__all__)))
+
+
+def test_without_gymnasium_all_of_the_package_can_be_looked_at():
+    script = (
+        "import sys; sys.modules['gymnasium'] = None\n"
+        "import inspect, pydoc, pteron\n"
+        "from pteron import *\n"
+        "assert not hasattr(pteron, 'environments')\n"
+        "assert 'environments' not in dir(pteron)\n"
+        "print(len(inspect.getmembers(pteron)), len(pydoc.render_doc(pteron)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_fork_while_code_is_compiled_goes_on():
+    """The child has no thread that would release what admits one compilation at a time."""
+    script = (
+        "import os, time, numpy as np, pteron\n"
+        "from pteron.kernels import numeric\n"
+        "robot = pteron.load('delta')\n"
+        "kernel = numeric(robot, 'reach')\n"
+        "kernel.tier.missed(1.0)\n"  # it compiles in the background
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    kernel.tier.fetch(at_any_cost=True)\n"
+        "    os._exit(0 if kernel.is_compiled else 1)\n"
+        "print(os.waitpid(child, 0)[1])\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "PTERON_KERNELS"}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", script],
+        capture_output=True,
+        text=True,
+        env=environment,
+        timeout=60,
+    )
+    assert done.stdout.strip() == "0", done.stderr
+
+
+def test_an_interrupt_while_a_compilation_begins_leaves_the_way_free(monkeypatch):
+    monkeypatch.delenv("PTERON_KERNELS")
+    kernel = numeric(pteron.load("five-bar"), "reach")
+
+    class Interrupted:
+        """Code whose source is interrupted."""
+
+        @property
+        def source(self):
+            raise KeyboardInterrupt
+
+    code, kernel.tier.code = kernel.tier.code, Interrupted()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            kernel.tier.missed(1.0)
+    finally:
+        kernel.tier.code = code
+    # Another function is compiled without waiting for ever.
+    other = numeric(pteron.load("five-bar"), "room")
+    worker = threading.Thread(target=other.tier.fetch, kwargs={"at_any_cost": True}, daemon=True)
+    worker.start()
+    worker.join(60.0)
+    assert not worker.is_alive()
+
+
+def test_a_compiler_that_fails_costs_speed_alone(tmp_path):
+    compiler = tmp_path / "cc"
+    compiler.write_text("#!/bin/sh\nexit 1\n")
+    compiler.chmod(0o755)
+    script = (
+        "import numpy as np, pteron\n"
+        "from pteron.motion import simulate\n"
+        "start = np.array([0.0, 0.0, -1.0]), np.zeros(3)\n"
+        "print(simulate('delta', start=start, duration=0.01).pose[-1].tolist())"
+    )
+    poses = []
+    for change in ({"CC": str(compiler), "PTERON_CACHE": str(tmp_path)}, {"PTERON_KERNELS": "vm"}):
+        environment = {k: v for k, v in os.environ.items() if k != "PTERON_KERNELS"}
+        done = subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, env=environment | change
+        )
+        assert done.returncode == 0, done.stderr
+        poses.append(done.stdout)
+    assert poses[0] == poses[1]

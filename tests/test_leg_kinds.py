@@ -1,5 +1,6 @@
 """Kinds of legs from elsewhere that break the protocol are refused in one line."""
 
+import importlib
 import sys
 from dataclasses import dataclass, replace
 from unittest.mock import patch
@@ -168,6 +169,19 @@ def test_a_kind_of_an_installed_package_is_known(named, tmp_path):
     np.testing.assert_array_equal(
         pteron.inverse_kinematics(robot, pose), pteron.inverse_kinematics("3-prr", pose)
     )
+
+
+def test_a_machine_with_an_installed_kind_is_saved_before_a_file_named_it(named, tmp_path):
+    installed(tmp_path, KIND, "own_legs:FromElsewhere")
+    kind = importlib.import_module("own_legs").FromElsewhere
+    robot = CATALOG["3-prr"]
+    legs = tuple(kind(**vars(leg)) for leg in robot.legs)
+    path = pteron.save(replace(robot, legs=legs), tmp_path / "saved.toml")
+    assert pteron.load(path).legs == legs
+    del KINDS["FromElsewhere"]
+    (tmp_path / "own_legs-1.0.dist-info" / "entry_points.txt").write_text("")
+    with pytest.raises(pteron.ModelError, match="no kind of leg 'FromElsewhere' is installed"):
+        pteron.save(replace(robot, legs=legs), tmp_path / "other.toml")
 
 
 @pytest.mark.parametrize(

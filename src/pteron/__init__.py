@@ -86,4 +86,4 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-_publish(__name__)
+_publish(__name__, extras={"environments": "gymnasium"})

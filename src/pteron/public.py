@@ -6,11 +6,12 @@ calls, and no more.
 
 from __future__ import annotations
 
-import ast
+import dis
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from importlib import import_module
-from types import FunctionType, ModuleType
+from importlib.util import find_spec
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 from pteron.renamed import former_name
@@ -26,8 +27,17 @@ class _Package(ModuleType):
         if not (isinstance(value, ModuleType) and name in vars(self)["__all__"]):
             super().__setattr__(name, value)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle it by its name, as cloudpickle does with plain modules."""
+        return import_module, (self.__name__,)
 
-def publish(package: str, *, checked: bool | Collection[str] = False) -> None:
+
+def publish(
+    package: str,
+    *,
+    checked: bool | Collection[str] = False,
+    extras: Mapping[str, str] | None = None,
+) -> None:
     """List a package's public names, for completion and ``import *``.
 
     These are the names that the file imports or defines: those under ``if TYPE_CHECKING:`` are
@@ -41,13 +51,18 @@ def publish(package: str, *, checked: bool | Collection[str] = False) -> None:
         Its `__name__`.
     checked : bool or collection of str
         Whether the arguments of its functions are checked, or those of which.
+    extras : mapping of str to str, optional
+        Names that need a module of an extra, and that module: without it they are not listed.
     """
     module = sys.modules[package]
     names = vars(module)
-    places = _places(names["__loader__"].get_source(package))
+    # From the code, not from the source: applications may be shipped without it.
+    places = _places(names["__loader__"].get_code(package))
+    extras = extras or {}
+    lacking = {name for name, needed in extras.items() if find_spec(needed) is None}
     own = (name for name in names.keys() - _OTHERS if not name.startswith("_"))
     listed = [name for name in own if not isinstance(names[name], ModuleType)]
-    listed = names.setdefault("__all__", sorted({*listed, *places}))
+    listed = names.setdefault("__all__", sorted({*listed, *places} - lacking))
 
     def public(name: str, value: Any) -> Any:
         if isinstance(value, FunctionType) and (checked is True or name in (checked or ())):
@@ -64,7 +79,12 @@ def publish(package: str, *, checked: bool | Collection[str] = False) -> None:
             return former_name(package, name)
         place, called = places[name]
         if place == package:
-            return public(name, import_module(f"{package}.{called}"))
+            try:
+                return public(name, import_module(f"{package}.{called}"))
+            except ImportError as error:
+                if name not in extras:
+                    raise
+                raise AttributeError(f"{package}.{name}: {error}") from error
         return public(name, getattr(import_module(place), called))
 
     for name in listed:
@@ -75,13 +95,20 @@ def publish(package: str, *, checked: bool | Collection[str] = False) -> None:
     module.__class__ = _Package
 
 
-def _places(source: str) -> dict[str, tuple[str, str]]:
+def _places(code: CodeType) -> dict[str, tuple[str, str]]:
     """Return the module of each name that is imported for type checkers, and its name there."""
-    return {
-        alias.asname or alias.name: (line.module or "", alias.name)
-        for block in ast.parse(source).body
-        if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
-        for line in block.body
-        if isinstance(line, ast.ImportFrom)
-        for alias in line.names
-    }
+    places: dict[str, tuple[str, str]] = {}
+    condition, end, module, called = False, -1, "", ""
+    for step in dis.get_instructions(code):
+        if step.opname.startswith("POP_JUMP") and condition:
+            end = max(end, int(step.argval))
+        elif step.opname == "IMPORT_NAME":
+            module = step.argval
+        elif step.opname == "IMPORT_FROM":
+            called = step.argval
+        elif step.opname == "STORE_NAME" and called and step.offset < end:
+            places[step.argval] = module, called
+            called = ""
+        if step.opname not in ("CACHE", "TO_BOOL", "NOT_TAKEN"):
+            condition = step.opname == "LOAD_NAME" and step.argval == "TYPE_CHECKING"
+    return places

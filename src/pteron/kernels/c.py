@@ -155,6 +155,7 @@ class Code:
         self.ports = inputs
         self.dtype = dtype
         self._program = function, outputs
+        self._module: ModuleType | None = None
 
     @cached_property
     def source(self) -> str:
@@ -184,9 +185,18 @@ class Code:
         """Return whether the compiled code is on disk, ready to be loaded."""
         return find(self._entry, _LIBRARY) is not None
 
-    @cached_property
+    @property
     def module(self) -> ModuleType:
-        """The module, compiled and loaded."""
+        """The module, compiled and loaded.
+
+        Not a `cached_property`, whose lock a forked process would wait for if another thread had
+        been at it.
+        """
+        if self._module is None:
+            self._module = self._loaded()
+        return self._module
+
+    def _loaded(self) -> ModuleType:
         path = str(entry(self._entry, _LIBRARY, self._build))
         loader = ExtensionFileLoader("pteron_kernel", path)
         spec = importlib.util.spec_from_file_location("pteron_kernel", path, loader=loader)

@@ -7,6 +7,7 @@ import math
 import os
 import threading
 import time
+import weakref
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
@@ -30,6 +31,25 @@ _AT_EXIT = 3.0
 
 _AT_WORK = threading.Semaphore(1)
 """Admits one compilation at a time; a caller that finds it taken asks again later."""
+
+_PATIENCE = 0.1
+"""Seconds of the virtual machine's work before C code is asked for: a fifth of a compilation."""
+
+_WAITING: weakref.WeakSet[Tier] = weakref.WeakSet()
+"""Functions whose code is being compiled in the background."""
+
+
+def _begin_in_a_fork() -> None:
+    """Let a forked process compile: the thread that would release the semaphore is not in it."""
+    global _AT_WORK
+    _AT_WORK = threading.Semaphore(1)
+    for tier in list(_WAITING):
+        tier.ask_again()
+    _WAITING.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_begin_in_a_fork)
 
 
 def numeric(
@@ -93,7 +113,7 @@ def _tier(
 
 
 def _tier_of(code: Code) -> Tier:
-    return Tier(code, math.inf if os.environ.get(VARIABLE) == "vm" else 0.1)
+    return Tier(code, math.inf if os.environ.get(VARIABLE) == "vm" else _PATIENCE)
 
 
 class Tier:
@@ -120,24 +140,38 @@ class Tier:
         if self.ready or os.environ.get(VARIABLE) == "vm" or compiler() is None:
             return
         if at_any_cost or self.code.is_cached():
-            _AT_WORK.acquire()
-            self._fetch()
+            taken = _AT_WORK
+            with taken:
+                self._load()
 
     def missed(self, seconds: float) -> None:
         """Add time, s, that the virtual machine spent; from `patience` on, compile in a thread."""
         self._patience -= seconds
-        if self._patience > 0.0 or not _AT_WORK.acquire(blocking=False):
+        taken = _AT_WORK
+        if self._patience > 0.0 or not taken.acquire(blocking=False):
             return
-        self._patience = math.inf
-        if compiler() is None:
-            _AT_WORK.release()
-            return
-        _ = self.code.source  # here, not in the thread: CasADi is not made for two at a time
-        worker = threading.Thread(target=self._fetch, name="pteron-compile", daemon=True)
-        worker.start()
-        atexit.register(_end, worker)
+        worker = threading.Thread(
+            target=self._load_and_release, args=(taken,), name="pteron-compile", daemon=True
+        )
+        try:
+            self._patience = math.inf
+            if compiler() is not None:
+                _ = self.code.source  # not in the thread: CasADi is not made for two at a time
+                _WAITING.add(self)
+                worker.start()
+                atexit.register(_end, worker)
+        except BaseException:  # an interrupt, too: the next call asks again
+            self._patience = _PATIENCE
+            raise
+        finally:
+            if worker.ident is None:  # it will not release it
+                taken.release()
 
-    def _fetch(self) -> None:
+    def ask_again(self) -> None:
+        """Ask for the code after further work: whoever compiled it is gone."""
+        self._patience = _PATIENCE
+
+    def _load(self) -> None:
         try:
             _ = self.code.module
             self.ready = True
@@ -145,8 +179,13 @@ class Tier:
             # A compiler that fails costs speed, not results: the virtual machine goes on.
             # `compile` with target "c" raises the error.
             pass
+
+    def _load_and_release(self, taken: threading.Semaphore) -> None:
+        try:
+            self._load()
         finally:
-            _AT_WORK.release()
+            _WAITING.discard(self)
+            taken.release()
 
 
 def _end(worker: threading.Thread) -> None:

@@ -19,6 +19,17 @@ _RUNNING: set[subprocess.Popen[str]] = set()
 _CHANGES = threading.Lock()
 
 
+def _begin_in_a_fork() -> None:
+    """Let a forked process run compilers: those that run are its parent's."""
+    global _CHANGES
+    _CHANGES = threading.Lock()
+    _RUNNING.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_begin_in_a_fork)
+
+
 def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Run a command to its end, and return its code and what it printed."""
     # Messages may be in any language and encoding; what cannot be read of them does not matter.

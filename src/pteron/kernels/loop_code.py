@@ -213,6 +213,16 @@ class LoopCode:
         name = f"loop-{digest(made_of, *command, compiler_version(command), *FLAGS)}"
         return ctypes.CDLL(str(entry(name, _LIBRARY, self._build)))
 
+    def load(self) -> None:
+        """Load the library, compiled where it is not kept.
+
+        Raises
+        ------
+        ModelError
+            If it could not be compiled.
+        """
+        _ = self._library
+
     def _build(self, folder: Path) -> None:
         advice = "set CC to another compiler, or PTERON_KERNELS=vm"
         flags, sources = [*FLAGS, *LINKED], {"loop.c": self.source}

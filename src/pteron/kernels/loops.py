@@ -98,7 +98,9 @@ class Loop:
         """
         if self.linked is not None and c_compiler() is None:
             raise ModelError("a controller's C needs a C compiler, which is not here; install one")
-        if go is not None or not (self.is_compiled or self.linked):
+        batch = len(arrays["state"])
+        lanes = 1 if batch < _FEW else LANES
+        if go is not None or not (self.linked or self._can_run(lanes)):
             plant = Plant(self.plant, self.kind)
             if go is not None:
                 plant.go = go  # type: ignore[method-assign]
@@ -106,8 +108,7 @@ class Loop:
             given = plant, Evaluated("sensed", self.sensed), law
             run_samples(*given, arrays, samples, times, counts, ask)
             return
-        batch = len(arrays["state"])
-        code = self.code(1 if batch < _FEW else LANES)
+        code = self.code(lanes)
         shares = max(1, min(threads, batch // LANES))
         bounds = [batch * k // shares for k in range(shares + 1)]
 
@@ -143,6 +144,16 @@ class Loop:
             "share": np.ones((1, 1, 1)),
             **machine_numbers(robot, self.plant, "plant"),
         }
+
+    def _can_run(self, lanes: int) -> bool:
+        """Return whether C makes the steps: a compiler that fails costs speed, not results."""
+        if not self.is_compiled:
+            return False
+        try:
+            self.code(lanes).load()
+        except ModelError:
+            return False
+        return True
 
     def code(self, lanes: int) -> LoopCode:
         """Return its C for some machines side by side."""

@@ -10,7 +10,9 @@ import tomlkit
 from pydantic.fields import FieldInfo
 
 from pteron.bodies.tables import PlanarBody, Table
-from pteron.legs import KINDS
+from pteron.errors import ModelError
+from pteron.legs import LegKind
+from pteron.legs.installed import kind_named, kind_names
 from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.tables import MachineTable, platform_table
 
@@ -47,11 +49,22 @@ def written(
     for i, leg in enumerate(document["legs"], start=1):
         kind = leg["type"]
         heading, *rest = _block(
-            "[legs]", leg_table(KINDS[kind]), leg, explained and kind not in told
+            "[legs]", leg_table(_kind_of(kind)), leg, explained and kind not in told
         )
         lines += ["", f"{heading} # {i}", *rest]
         told.add(kind)
     return "\n".join(lines) + "\n"
+
+
+def _kind_of(name: str) -> type[LegKind]:
+    """Return a kind of leg by its name, from an installed package too."""
+    kind = kind_named(name)
+    if kind is None:
+        raise ModelError(
+            f"type: no kind of leg {name!r} is installed as an entry point of the group "
+            f"pteron.legs; those that are: {', '.join(kind_names())}"
+        )
+    return kind
 
 
 def _bodies() -> str:
