@@ -488,6 +488,40 @@ def test_of_several_files_all_are_written_or_none(tmp_path, monkeypatch):
     assert [path.read_text() for path in tmp_path.iterdir()] == ["new", "new"]
 
 
+def test_a_rename_that_fails_brings_back_the_files_renamed_before(tmp_path, monkeypatch):
+    names = ["one.h", "two.h", "three.h"]
+    (tmp_path / "one.h").write_text("old")
+    (tmp_path / "three.h").write_text("old")
+    replace = atomic.Path.replace
+
+    def fail_at_the_third(self, target):
+        if target == tmp_path / "three.h":
+            raise OSError(28, "No space left on device")
+        return replace(self, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(atomic.Path, "replace", fail_at_the_third)
+        with pytest.raises(OutputError, match=r"three\.h: cannot be written"):
+            atomic.write_texts(tmp_path, dict.fromkeys(names, "new"))
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
+        "one.h": "old",
+        "three.h": "old",
+    }
+    (tmp_path / "two.h").mkdir()
+    with pytest.raises(OutputError, match=r"two\.h: is a folder"):
+        atomic.write_texts(tmp_path, dict.fromkeys(names, "new"))
+    assert (tmp_path / "one.h").read_text() == "old"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_a_file_keeps_its_permissions(tmp_path):
+    file = tmp_path / "secret.toml"
+    file.write_text("old")
+    file.chmod(0o600)
+    atomic.write_text(file, "new")
+    assert file.stat().st_mode & 0o777 == 0o600
+
+
 def test_folders_are_made_or_refused(tmp_path):
     folder = tmp_path / "one" / "two"
     assert atomic.make_folder(folder) == folder

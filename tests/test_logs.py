@@ -25,6 +25,7 @@ from pteron.identification.logs import (
     write_description,
     write_log,
 )
+from pteron.identification.logs.names import called
 
 QUADRUPTERON = CATALOG["quadrupteron"]
 TRIPTERON = CATALOG["tripteron"]
@@ -526,6 +527,11 @@ def test_escape_codes_in_a_name_do_not_reach_the_terminal(tmp_path):
     assert message.replace("\n", "").isprintable()
     assert r"mo\x1btion.csv" in message
     assert len(message) < 900
+
+
+def test_a_name_with_thousands_of_digits_is_no_joint():
+    assert called("q12").number == 12
+    assert called("q" + "1" * 5000) is None
 
 
 @pytest.mark.parametrize("name", ["time", "joints", "forces", "pose", "payload"])

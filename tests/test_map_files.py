@@ -128,6 +128,21 @@ def test_an_archive_with_other_values_is_refused(small, tmp_path):
         load_map(path)
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "told"),
+    [
+        ("margin", np.zeros(1 << 16), "margin.npy is larger than its grid"),
+        ("about", np.array("x" * (1 << 23)), "its description is too long"),
+        ("more", np.zeros(1), "its arrays are others than it describes"),
+    ],
+)
+def test_an_archive_larger_than_its_map_is_not_unpacked(small, tmp_path, name, values, told):
+    path = save_map(small, tmp_path / "map.npz")
+    np.savez_compressed(path, **{**np.load(path), name: values})
+    with pytest.raises(DataError, match=told):
+        load_map(path)
+
+
 # Stores.
 
 

@@ -284,6 +284,11 @@ def test_a_quote_that_is_never_closed_is_told_without_reading_on():
         list(CsvFile(content, "file", block=10_000).tables())
 
 
+def test_a_cell_of_a_million_digits_takes_no_longer_than_its_length(given):
+    with pytest.raises(DataError, match=r"row 1 .* column x: '111"):
+        given(b"x,y\n" + b"1" * 1_000_000 + b"x,2\n").numbers(["x", "y"])
+
+
 def test_the_last_row_of_a_long_table_is_found(given):
     content = b"x,y\n" + b"1,2\n" * 20_000 + b"1,\n"
     with pytest.raises(DataError, match=r"row 20001 \(line 20002\), column y"):

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
+from pathlib import Path
 
 import casadi as ca
 import mpmath
@@ -653,6 +654,34 @@ def test_the_sweep_removes_what_a_killed_process_left_and_nothing_else(fresh, tm
     assert_works()
     assert not left.exists()
     assert all((folder / "kernel.c").exists() for folder in others)
+
+
+@CLIENTS
+@needs_compiler
+def test_a_request_to_end_ends_the_compiler_too(fresh, tmp_path):
+    slow, number = tmp_path / "slow", tmp_path / "number"
+    slow.write_text(
+        f'#!/bin/sh\ncase "$*" in --version) exit;; esac\necho $$ >{number}\nexec sleep 60\n'
+    )
+    slow.chmod(0o700)
+    script = (
+        "import pteron\n"
+        "from pteron.cli.interrupts import ended_with_compilers\n"
+        "with ended_with_compilers():\n"
+        "    pteron.compile(pteron.load('tripteron'), 'reach', 'c')([0, 0, 0])\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "CC": str(slow)})
+    while not number.exists() or not number.read_text().strip():
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.terminate()
+    assert process.wait(timeout=20) == -signal.SIGTERM
+    compiler = Path(f"/proc/{number.read_text().strip()}/cmdline")
+    for _ in range(100):
+        if not compiler.exists() or not compiler.read_text():  # or it waits to be reaped
+            return
+        time.sleep(0.05)
+    raise AssertionError("the compiler goes on")
 
 
 @needs_compiler

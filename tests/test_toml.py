@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import Annotated, Literal
 
 import pytest
 from pydantic import BaseModel, Field
 
+import pteron
 from pteron.errors import DataError, ModelError, shown
+from pteron.export import from_klipper
 from pteron.toml import parsed_toml, read_toml, validated
 
 
@@ -25,6 +28,10 @@ from pteron.toml import parsed_toml, read_toml, validated
         (b"a = {" + b".".join([b"a"] * 20_000) + b" = 1}", "has over 16 parts"),
         (b"a = '\x1b[31m'", r"Found invalid character '\x1b'"),
         (b"#" * (17 << 20), "has over 16 MB"),
+        (b"a = 1" + b"0" * 40, "a whole number in it is beyond 64 bits"),
+        (b"<?xml version='1.0'?>\n<robot name='r5'>", "this is URDF, not TOML"),
+        (b"<mujoco model='r5'>", "this is MJCF, not TOML"),
+        (b'{"name": "r5"}', "this is JSON, not TOML"),
     ],
     ids=[
         "encoding",
@@ -37,6 +44,10 @@ from pteron.toml import parsed_toml, read_toml, validated
         "inner",
         "escape",
         "MB",
+        "whole number",
+        "URDF",
+        "MJCF",
+        "JSON",
     ],
 )
 def test_what_is_no_file_of_settings_is_refused_at_once_in_one_line(text: bytes, words: str):
@@ -64,6 +75,16 @@ def test_what_is_no_file_of_settings_is_refused_at_once_in_one_line(text: bytes,
 )
 def test_what_only_looks_strange_is_read(text: bytes):
     assert list(parsed_toml(text, "file.toml", ModelError)) == ["a"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="FIFOs of POSIX")
+def test_a_pipe_without_an_end_is_refused_before_it_is_opened(tmp_path):
+    pipe = tmp_path / "robot.toml"
+    os.mkfifo(pipe)
+    with pytest.raises(ModelError, match="it is a pipe or a device, not a file"):
+        pteron.load(pipe)
+    with pytest.raises(DataError, match="it is a pipe or a device, not a file"):
+        from_klipper(pipe)
 
 
 def test_a_file_that_is_not_there_is_told_in_the_callers_words(tmp_path):

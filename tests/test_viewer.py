@@ -17,6 +17,7 @@ import pytest
 from matplotlib.path import Path
 from measured import built
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated
+from websockets.http11 import Request
 
 import pteron
 from pteron.errors import DataError
@@ -445,6 +446,8 @@ def test_what_was_done_is_undone_and_spans_end_where_the_machine_stops(homes):
         '{"do": "drag", "axis": null, "to": [0, NaN]}',
         '{"do": "mode", "mode": "?"}',
         '{"do": "plane", "plane": "uv"}',
+        '{"do": "assembly", "i": -Infinity}',
+        "[" * 100_000,
     ],
 )
 def test_what_no_page_asks_for_is_refused(sessions, asked):
@@ -534,6 +537,19 @@ def test_names_of_other_machines_and_pages_of_other_servers_are_refused(local, u
         assert answer(local, host, f"http://{host}", upgrade) == 403
     for origin in ("http://evil.example", f"http://localhost:{port + 1}", "null", "file://", ""):
         assert answer(local, f"localhost:{port}", origin, upgrade) == 403
+
+
+def test_other_requests_than_for_a_page_are_refused_and_no_page_frames_it(local):
+    with closing(HTTPConnection("127.0.0.1", local.port, timeout=20)) as connection:
+        connection.request("GET", "/")
+        response = connection.getresponse()
+        assert response.getheader("Content-Security-Policy") == "frame-ancestors 'self'"
+    if not hasattr(Request, "method"):
+        return  # what websockets answered before it told the method is its own
+    for method in ("POST", "TRACE", "DELETE", "HEAD"):
+        with closing(HTTPConnection("127.0.0.1", local.port, timeout=20)) as connection:
+            connection.request(method, "/")
+            assert connection.getresponse().status == 405
 
 
 def test_who_serves_to_the_network_has_names_unknown_here_but_no_foreign_pages():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import stat
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -44,14 +46,18 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
 def write_files(files: Mapping[Path, bytes]) -> list[Path]:
     """Write files, all of them or none, and return their paths.
 
-    Every file is first written under a temporary name in its folder, then all are renamed: a full
-    disk loses nothing.
+    Every file is first written under a temporary name in its folder, and to the disk, then all are
+    renamed: a full disk loses nothing. Former files keep their permissions, and come back if a
+    rename fails.
 
     Raises
     ------
     OutputError
         If one cannot be written.
     """
+    for target in files:
+        if target.is_dir():
+            raise OutputError(f"{target}: is a folder; name another file, or remove it")
     written: dict[Path, Path] = {}
     try:
         for target, data in files.items():
@@ -59,14 +65,52 @@ def write_files(files: Mapping[Path, bytes]) -> list[Path]:
             written[target] = Path(name)
             with os.fdopen(handle, "wb") as file:
                 file.write(data)
-            written[target].chmod(0o666 & ~_umask())
-        for target, temporary in written.items():
-            temporary.replace(target)
+                file.flush()
+                os.fsync(file.fileno())
+            written[target].chmod(_mode_of(target))
+        _replace_all(written)
     except OSError as error:
+        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from None
+    finally:
         for temporary in written.values():
             temporary.unlink(missing_ok=True)
-        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from None
     return list(written)
+
+
+def _mode_of(target: Path) -> int:
+    """Return the permissions of a file that is there, or the usual ones of a new file."""
+    try:
+        return stat.S_IMODE(target.stat().st_mode)
+    except FileNotFoundError:
+        return 0o666 & ~_umask()
+
+
+def _replace_all(written: Mapping[Path, Path]) -> None:
+    """Rename temporary files to their targets; where one fails, former files come back."""
+    former = {target: _copy_beside(target) for target in written if target.exists()}
+    renamed: list[Path] = []
+    try:
+        for target, temporary in written.items():
+            temporary.replace(target)
+            renamed.append(target)
+    except OSError:
+        for target in renamed:
+            if target in former:
+                former[target].replace(target)
+            else:
+                target.unlink()
+        raise
+    finally:
+        for copy in former.values():
+            copy.unlink(missing_ok=True)
+
+
+def _copy_beside(target: Path) -> Path:
+    """Copy a file that is there, and return the path of the copy."""
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    os.close(handle)
+    shutil.copy2(target, name)
+    return Path(name)
 
 
 def checked_file(path: str | Path, example: str = "") -> Path:

@@ -7,9 +7,10 @@ parts) is refused.
 
 from __future__ import annotations
 
+import errno
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -21,6 +22,15 @@ if TYPE_CHECKING:
 
 _Model = TypeVar("_Model")
 _Node = dict[str, Any]
+
+_BEYOND = 1 << 63
+"""TOML has whole numbers of 64 bits; larger ones do not fit into a float either."""
+
+_SNIFFED = 4096
+"""Characters in which another language shows."""
+
+_TAGS = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF", "kdl": "KDL", "COLLADA": "COLLADA"}
+"""Root elements of robot descriptions in XML."""
 
 _LARGEST = 1 << 24
 """Bytes that a file may have: 16 MiB."""
@@ -91,12 +101,54 @@ def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple
     """
     source = shown(str(path), bare=True, longest=1000) or "''"
     try:
+        expect_regular(Path(path))
         with Path(path).open("rb") as file:
             return file.read(_LARGEST + 1), source
     except (FileNotFoundError, ValueError):  # ValueError: a NUL in the name
         raise error(absent, subject=source) from None
     except OSError as reason:
         raise error(f"cannot be read ({reason.strerror or reason})", subject=source) from None
+
+
+def expect_regular(path: Path) -> None:
+    """Refuse a FIFO or a device, which may never end, before it is opened.
+
+    Raises
+    ------
+    OSError
+        If it is one, as if the system had refused to read it.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError(errno.EINVAL, "it is a pipe or a device, not a file")
+
+
+def language_of(text: str) -> str:
+    """Return the name of another language of robot descriptions or data, or nothing.
+
+    Examples
+    --------
+    >>> from pteron.toml import language_of
+    >>> language_of('<?xml version="1.0"?><robot name="r">'), language_of("name = 1")
+    ('URDF', '')
+    """
+    start = text.lstrip("\ufeff \t\r\n")[:_SNIFFED]
+    if start.startswith("<"):
+        found = next((name for tag, name in _TAGS.items() if re.search(rf"<{tag}\b", start)), "")
+        return found or "XML"
+    if start.startswith("{"):
+        return "JSON"
+    return "YAML" if start.startswith(("%YAML", "---\n", "---\r\n")) else ""
+
+
+def _integers(value: Any) -> Iterator[int]:
+    """Yield the whole numbers of a document."""
+    if isinstance(value, bool):
+        return
+    if isinstance(value, int):
+        yield value
+    elif isinstance(value, dict | list):
+        for part in value.values() if isinstance(value, dict) else value:
+            yield from _integers(part)
 
 
 def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:
@@ -123,8 +175,13 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
             f"not a file of settings (the key {start} has over {_PARTS} parts); mend it",
             subject=source,
         )
+    if language := language_of(text):
+        raise error(
+            f"this is {language}, not TOML; pteron new --help says how to begin a file",
+            subject=source,
+        )
     try:
-        return tomllib.loads(text)
+        document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
         reason = shown(str(fault), bare=True, longest=200)
         if comma := _DECIMAL_COMMA.search(text):
@@ -133,6 +190,10 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
         reason = "its brackets are nested too deeply"
     except ValueError:  # of `int`
         reason = "a number in it has thousands of digits"
+    else:
+        if all(abs(number) < _BEYOND for number in _integers(document)):
+            return document
+        reason = "a whole number in it is beyond 64 bits"
     raise error(f"not a TOML file ({reason})", subject=source)
 
 

@@ -84,6 +84,31 @@ def insistent_interrupts() -> Iterator[None]:
         sys.unraisablehook = usual
 
 
+@contextmanager
+def ended_with_compilers() -> Iterator[None]:
+    """End, where the process is asked to (SIGTERM), first the compilers that it started."""
+    ours = (
+        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+        and threading.current_thread() is threading.main_thread()
+    )
+    if ours:
+        signal.signal(signal.SIGTERM, _end)
+    try:
+        yield
+    finally:
+        if ours:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    """End the compilers, then this process as the signal would have ended it."""
+    from pteron.kernels.compilers import end_all
+
+    end_all()
+    signal.signal(number, signal.SIG_DFL)
+    signal.raise_signal(number)
+
+
 def _interrupt() -> None:
     """Interrupt the main thread, and where the system can the wait that it may be in."""
     main = threading.main_thread().ident

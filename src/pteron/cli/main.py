@@ -25,7 +25,7 @@ from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.film import film
 from pteron.cli.identify import identify
-from pteron.cli.interrupts import insistent_interrupts
+from pteron.cli.interrupts import ended_with_compilers, insistent_interrupts
 from pteron.cli.inverse_direct_forces import direct, forces, inverse
 from pteron.cli.machines import catalog, check, new
 from pteron.cli.options import help_of, typed
@@ -64,7 +64,7 @@ class CommandGroup(TyperGroup):
         """Run a subcommand and exit."""
         _open_closed_streams()
         try:
-            with insistent_interrupts(), warnings.catch_warnings():
+            with insistent_interrupts(), ended_with_compilers(), warnings.catch_warnings():
                 warnings.showwarning = _noted
                 warnings.simplefilter("default", UnlikelyValue)
                 status = super().main(*args, **extra | {"standalone_mode": False})
@@ -78,8 +78,8 @@ class CommandGroup(TyperGroup):
             _close_standard_output()
             status = _PIPE_CLOSED
         except OSError as error:
-            where = error.filename or "standard output"
-            complain(f"{where}: {error.strerror or error}")
+            where = error.filename or ("standard output" if _output_fails() else "")
+            complain(f"{where}{': ' * bool(where)}{error.strerror or error}")
             _close_standard_output()
             status = _USER_ERROR
         except MemoryError as error:
@@ -103,6 +103,15 @@ def _noted(message: Warning | str, category: type[Warning], *place: Any, **_: An
         note(f"Note: {message}")
     else:
         sys.stderr.write(warnings.formatwarning(message, category, *place[:2]))
+
+
+def _output_fails() -> bool:
+    """Return whether nothing more can be written to standard output, as on a full disk."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        return True
+    return False
 
 
 def _open_closed_streams() -> None:

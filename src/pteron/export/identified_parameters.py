@@ -30,6 +30,7 @@ from pteron.legs import Drive, LegKind, Stribeck
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import expect_machine
 from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
+from pteron.toml import expect_regular
 
 _NAME = "base_parameters"
 """Name of the base parameters as an input of the code, and as a key of the identified file."""
@@ -106,6 +107,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
 
 def _object(path: str | Path) -> dict[str, Any]:
     try:
+        expect_regular(Path(path))
         data = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(f"{path}: {error.strerror or error}") from None

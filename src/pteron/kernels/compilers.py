@@ -16,13 +16,14 @@ from pteron.errors import ModelError
 _RUNNING: set[subprocess.Popen[str]] = set()
 """Subprocesses that run now; guarded by `_CHANGES`."""
 
-_CHANGES = threading.Lock()
+_CHANGES = threading.RLock()
+"""Reentrant: a signal may come while it is held."""
 
 
 def _begin_in_a_fork() -> None:
     """Let a forked process run compilers: those that run are its parent's."""
     global _CHANGES
-    _CHANGES = threading.Lock()
+    _CHANGES = threading.RLock()
     _RUNNING.clear()
 
 

@@ -94,9 +94,10 @@ def plane_of(d: Expression, a: Expression) -> Expression:
 
 
 @lru_cache(maxsize=256)
-def perpendicular_to(d: Vector) -> tuple[float, ...]:
+def perpendicular_to(d: Vector) -> Vector:
     """Return a unit vector of numbers perpendicular to another."""
-    return tuple(float(x) for x in ca.vertsplit(plane_axis(ca.DM(list(d)), *pole(d))))
+    x, y, z = (float(part) for part in ca.vertsplit(plane_axis(ca.DM(list(d)), *pole(d))))
+    return (x, y, z)
 
 
 def random_vector(length: Fraction, dimension: int, rng: Random) -> list[Fraction]:

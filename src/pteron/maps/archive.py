@@ -19,6 +19,12 @@ from pteron.maps.map import Map
 _ABOUT, _STATUS = "about", "status"
 """Names of two more arrays: grid, machine and units as JSON; whether each pose is in reach."""
 
+_LONGEST_ABOUT = 1 << 24
+"""Bytes of the longest description that is read."""
+
+_HEADER, _WIDEST = 4096, 8
+"""Bytes of an array's header and of its widest element."""
+
 
 def write_archive(given: Map, target: Path) -> Path:
     """Write a map to an .npz file."""
@@ -55,9 +61,27 @@ def read_archive(source: Path) -> Map:
         ) from None
 
 
+def _expect_sizes_of_a_map(archive: ZipFile) -> None:
+    """Refuse an archive whose arrays would unpack to more than its grid has poses."""
+    about = archive.getinfo(f"{_ABOUT}.npy")
+    if about.file_size > _LONGEST_ABOUT:
+        raise ValueError("its description is too long")
+    text = np.lib.format.read_array(io.BytesIO(archive.read(about)), allow_pickle=False)
+    described = json.loads(str(text))
+    grid = Grid.of_plain(described["grid"])
+    names = {*described["units"], _STATUS, *(axis.name for axis in grid.axes)}
+    expected = {about.filename} | {f"{name}.npy" for name in names}
+    if set(archive.namelist()) != expected or len(archive.namelist()) != len(expected):
+        raise ValueError("its arrays are others than it describes")
+    for member in archive.infolist():
+        if member is not about and member.file_size > _HEADER + _WIDEST * grid.size:
+            raise ValueError(f"{member.filename} is larger than its grid")
+
+
 def _arrays(source: Path) -> dict[str, Any]:
     """Return the arrays of an archive, unpacked only after the archive's own checksums."""
     with ZipFile(source) as archive:
+        _expect_sizes_of_a_map(archive)
         members = {name: archive.read(name) for name in archive.namelist()}
     return {
         name.removesuffix(".npy"): np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)

@@ -13,8 +13,9 @@ from pteron.tables.dialect import SEPARATORS, Decimal, Dialect, Separator
 _MOST = 0.5
 """Share of numbers or times among its cells from which a column counts as one of these."""
 
-_NUMBER = r"[+-]?(?:\d+{0}?\d*|{0}\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
-"""Pattern of a number; {0} is the decimal sign."""
+_NUMBER = r"[+-]?(?:\d++(?:{0}\d*+)?|{0}\d++)(?:[eE][+-]?\d++)?|[+-]?(?:nan|inf)"
+"""Pattern of a number; {0} is the decimal sign. It takes its digits once, as a cell of thousands of
+them would else take the square of that time."""
 
 _STAMP = r"(?:\d[\d./-]*[T ] ?)?\d\d?:\d\d:\d\d(?:[.,:]\d+)?(?: ?[AP]M|Z|[+-]\d\d:?\d\d)?"
 """Pattern of a date and time."""

@@ -247,7 +247,10 @@ class CsvFile:
             begins = line + reader.line_num
 
     def _line_of(self, block: bytes, line: int, index: int) -> int:
-        return next(islice(self._records(block, line), index, None))[0]
+        try:
+            return next(islice(self._records(block, line), index, None))[0]
+        except csv.Error:  # a cell longer than `csv` reads, which Polars did: each row is a line
+            return line + index
 
     def _not_text(self) -> DataError:
         message = f"{self.source}: not {self._encoding.upper()} text; save it as CSV in UTF-8"

@@ -133,7 +133,7 @@ class Live:
                 self._push(str(asked.get("drives")))
                 return
             name, act = panel.action(session, message)
-        except (DataError, ValueError) as error:
+        except (DataError, ValueError, RecursionError) as error:
             told = str(error)
             self.do("refused", lambda: self._tell(told))
             return

@@ -157,7 +157,7 @@ def action(session: Session, text: str) -> tuple[str, Callable[[], object]]:
         name = asked["do"]
         found: tuple[str, Callable[[], object]] = _actions(session, asked)[name](asked)
         return found
-    except (ValueError, KeyError, TypeError, IndexError):
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError):
         raise DataError("the page asked for something unknown; load it again") from None
 
 

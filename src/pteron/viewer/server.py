@@ -134,6 +134,11 @@ class Server:
         reason = refusal(self._host, self._here, hosts, origins)
         if reason is not None:
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"Refused: {reason}.\n")
+        if getattr(request, "method", "GET") != "GET":  # old websockets refuses others itself
+            only = "Only GET is answered.\n"
+            found = connection.respond(http.HTTPStatus.METHOD_NOT_ALLOWED, only)
+            found.headers["Allow"] = "GET"
+            return found
         path = request.path.partition("?")[0]
         room = self._rooms.get(path)
         if room is None:
@@ -145,6 +150,7 @@ class Server:
         del found.headers["Content-Type"]
         found.headers["Content-Type"] = "text/html; charset=utf-8"
         found.headers["Cache-Control"] = "no-store"
+        found.headers["Content-Security-Policy"] = "frame-ancestors 'self'"
         return found
 
     def _handle(self, connection: ServerConnection) -> None:

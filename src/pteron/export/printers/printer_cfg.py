@@ -16,6 +16,7 @@ from pteron.bodies.vectors import Vector, vector
 from pteron.errors import DataError, ModelError, shown
 from pteron.legs import Drive, LegKind
 from pteron.manipulator import Manipulator, load
+from pteron.toml import expect_regular
 
 _SAVED = "#*#"
 """Prefix of the lines that SAVE_CONFIG wrote; they override the lines above them."""
@@ -174,6 +175,7 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
     if isinstance(config, Path) or "\n" not in config:
         source = shown(str(config), bare=True, longest=1000)
         try:
+            expect_regular(Path(config))
             text = Path(config).read_text(encoding="utf-8", errors="replace")
         except OSError as error:
             raise DataError(f"{source}: cannot be read ({error.strerror or error})") from None

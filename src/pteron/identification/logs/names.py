@@ -9,6 +9,9 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+_DIGITS = 9
+"""Most digits of the number in a column's name."""
+
 _DRIVE = {"a": "A", "v": "V", "%": "%"}
 """Units of drives, by their spelling in small letters."""
 
@@ -104,6 +107,8 @@ def called(name: str) -> Called | None:
     if number is not None:
         start = match.start("index") if parts["index"] else match.start("number")
         family = f"{name[:start]}#{name[start + len(number) :]}"
+    if number is not None and len(number) > _DIGITS:
+        return None  # no machine has so many joints
     unit = parts["inside"] or parts["behind"] or parts["under"] or ""
     return Called(word, None if number is None else int(number), family, unit.lower())
 
