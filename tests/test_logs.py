@@ -529,6 +529,30 @@ def test_escape_codes_in_a_name_do_not_reach_the_terminal(tmp_path):
     assert len(message) < 900
 
 
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"forces": np.zeros((9, 3))}, r"forces of shape \(9, 3\) given, \(10, n\)"),
+        ({"joints": np.zeros((10, 3))}, r"joints of shape \(10, 3\) and forces of shape \(10, 2\)"),
+        ({"joints": np.zeros(10)}, r"joints of shape \(10,\) given, \(10, n\) expected"),
+        ({"time": np.zeros((10, 1))}, r"time of shape \(10, 1\) given, \(T,\) expected"),
+        ({"time": [0.1 * i for i in range(9)] + [np.nan]}, "row 10, time: a finite number"),
+        ({"time": np.zeros(10)}, "row 2: the time does not rise here"),
+        ({"forces": [[0.0, 0.0]] * 4 + [[0.0, np.nan]] + [[0.0, 0.0]] * 5}, "row 5, forces: a fin"),
+        ({"payload": np.zeros(3, int)}, r"payload of shape \(3,\) given, \(10,\) expected"),
+        ({"joints": "abc"}, "joints: not an array of real numbers"),
+    ],
+)
+def test_arrays_of_a_log_fit_together(changed, told):
+    arrays = {"time": 0.1 * np.arange(10), "joints": np.zeros((10, 2)), "forces": np.zeros((10, 2))}
+    assert len(Log("arrays", **arrays)) == 10
+    as_lists = {name: values.tolist() for name, values in arrays.items()}
+    assert Log("arrays", **as_lists).joints.shape == (10, 2)
+    with pytest.raises(DataError, match=told) as caught:
+        Log("arrays", **arrays | changed)
+    assert str(caught.value).startswith("arrays: ")
+
+
 def test_a_name_with_thousands_of_digits_is_no_joint():
     assert called("q12").number == 12
     assert called("q" + "1" * 5000) is None

@@ -37,6 +37,7 @@ FORMS = {
     "lists": lambda columns: {name: list(values) for name, values in columns.items()},
     "file": lambda columns: Table("a file", pl.DataFrame(columns)),
     "records": lambda columns: pd.DataFrame(columns).to_records(index=False),
+    "labels": lambda columns: pd.DataFrame(columns).to_xarray().to_dataarray("of").T,
 }
 
 
@@ -113,7 +114,19 @@ def test_a_table_without_names_is_an_array():
     poses = motion_of(robot)[0]
     assert (pteron.jacobian(robot, pd.DataFrame(poses)) == pteron.jacobian(robot, poses)).all()
     assert (pteron.jacobian(robot, pd.Series(poses[0])) == pteron.jacobian(robot, poses[0])).all()
-    assert (as_array(pd.DataFrame({"a": [1.0], "b": [2.0]}), "x", (2,)) == [[1.0, 2.0]]).all()
+
+
+def test_a_table_with_names_is_refused_where_their_order_is_not_known():
+    frame = pd.DataFrame({"z": [1.0, 1.0], "y": [2.0, 2.0], "x": [3.0, 3.0]})
+    with pytest.raises(DataError, match="x: a table with names given, an array expected"):
+        as_array(frame, "x", (3,))
+    with pytest.raises(DataError, match=r"motion\.pose: a table with names given"):
+        pteron.motion.Motion([0.0, 1.0], frame, frame, frame)
+    with pytest.raises(DataError, match="log: joints: a table with names given"):
+        pteron.identification.Log("log", [0.0, 1.0], frame, frame)
+    frame.columns = pd.MultiIndex.from_product([["platform"], ["x", "y", "z"]])
+    with pytest.raises(DataError, match="names of two levels"):
+        pteron.inverse_kinematics("delta", frame)
 
 
 def test_a_motion_is_made_of_a_table():

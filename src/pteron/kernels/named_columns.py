@@ -20,10 +20,11 @@ def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
     ----------
     value : array or table
         A DataFrame of pandas or polars, a `pteron.tables.Table`, a mapping from names to numbers or
-        arrays, a row of a DataFrame with its names, or a structured array. Other columns than those
-        asked for do not matter. A table whose columns have no names is an array.
+        arrays, a row of a DataFrame with its names, a structured array, or a DataArray of xarray
+        whose last axis has names. Other columns than those asked for do not matter. A table whose
+        columns have no names is an array.
     columns : sequence of str
-        The names that are asked for; none where a table has no meaning.
+        The names that are asked for; none where no names are known, and a table is refused.
     name : str
         The value's name in messages.
 
@@ -34,11 +35,21 @@ def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
     Raises
     ------
     DataError
-        If columns are missing, or one of them has no numbers or another length.
+        If columns are missing, have names of two levels, or one of them has no numbers or another
+        length; or for a table where no names are known.
     """
-    has = _names(value) if columns else []
+    if _is_labelled(value):
+        value = _by_label(value)
+    has = _names(value)
     if not has:
         return value
+    if not columns:
+        raise DataError(
+            f"{name}: a table with names given, an array expected, its columns in order: "
+            "table[names].to_numpy()"
+        )
+    if any(isinstance(one, tuple) for one in has):
+        raise DataError(f"{name}: the table's columns have names of two levels; keep one")
     if missing := [column for column in columns if column not in has]:
         more = f" and {len(has) - _MANY} more" if len(has) > _MANY else ""
         listed = ", ".join(shown(one, bare=True) for one in has[:_MANY])
@@ -75,7 +86,20 @@ def _names(value: Any) -> list[str]:
         names = list(() if given is None or callable(given) else given)
     except TypeError:
         return []
-    return names if any(isinstance(one, str) for one in names) else []
+    return names if any(isinstance(one, str | tuple) for one in names) else []
+
+
+def _is_labelled(value: Any) -> bool:
+    """Return whether a value is a DataArray of xarray whose last axis has names."""
+    if isinstance(value, np.ndarray) or not getattr(value, "dims", ()):
+        return False
+    labels = getattr(value, "coords", {}).get(value.dims[-1])
+    return labels is not None and all(isinstance(one, str) for one in labels.values.tolist())
+
+
+def _by_label(value: Any) -> dict[str, Any]:
+    axis = value.dims[-1]
+    return {str(one): value.sel({axis: one}).values for one in value.coords[axis].values}
 
 
 def _column(value: Any, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:

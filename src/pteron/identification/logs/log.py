@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.identification.errors import OfLog
 from pteron.identification.logs.description import Description
+from pteron.kernels import as_array
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.legs.reading import Reading
 from pteron.shapes import Int, PerCoordinate, PerJoint, Series
@@ -111,7 +112,8 @@ class Log(OfLog):
     Raises
     ------
     DataError
-        If values of an array are masked.
+        If values of an array are masked, have another shape, or are not finite; or if the time does
+        not rise.
     """
 
     source: str
@@ -139,7 +141,40 @@ class Log(OfLog):
                         f"{self.source}: {count} values of {name} are masked; leave their rows "
                         "out: a gap in time is understood"
                     )
-                object.__setattr__(self, name, np.ma.getdata(values))
+                values = np.ma.getdata(values)
+            if values is not None:
+                object.__setattr__(self, name, self._rows_of_numbers(name, values))
+        if self.joints.shape != self.forces.shape:
+            raise DataError(
+                f"{self.source}: joints of shape {self.joints.shape} and forces of shape "
+                f"{self.forces.shape} given, one of each for each leg expected"
+            )
+        if self.symbols and len(self.symbols) != self.joints.shape[1]:
+            raise DataError(
+                f"{self.source}: {len(self.symbols)} symbols for {self.joints.shape[1]} legs given"
+            )
+        if (late := np.flatnonzero(np.diff(self.time) <= 0.0)).size:
+            raise DataError(f"{self.place(int(late[0]) + 1)}: the time does not rise here")
+
+    def _rows_of_numbers(self, name: str, values: Any) -> Any:
+        """Return an array of the log as numbers, a row for each time."""
+        axes = 2 if name in ("joints", "forces", "pose") else 1
+        whole = name in ("payload", "rows_in_file")
+        found = values if whole else as_array(values, f"{self.source}: {name}", ())
+        found = np.asarray(found)
+        rows = len(found) if name == "time" else len(self.time)
+        if found.ndim != axes or len(found) != rows:
+            expected = ("T" if name == "time" else str(rows)) + (", n" if axes == 2 else ",")
+            raise DataError(
+                f"{self.source}: {name} of shape {found.shape} given, ({expected}) expected"
+            )
+        if not np.isfinite(found).all() and name != "pose":
+            row = int(np.flatnonzero(~np.isfinite(found.reshape(rows, -1)).all(axis=1))[0])
+            raise DataError(
+                f"{self.place(row)}, {name}: a finite number expected; leave the row out, a gap in "
+                "time is understood"
+            )
+        return found
 
     def __len__(self) -> int:
         return len(self.time)
