@@ -26,6 +26,10 @@ _ATTEMPTS = 250
 _MANY = 50
 """Number of wanted poses from which a search that finds few ends after a quarter of its batches."""
 
+_SPARSE = 32
+"""Batches after which a box in which few poses are in reach is left for poses that Newton's method
+leads to joint coordinates. The machines of the catalog take up to 11."""
+
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
 
@@ -55,9 +59,11 @@ def drawn_poses(
     limits: bool = True,
 ) -> Array:
     """Return poses (count, m) in reach, as `random_poses` does, also if all are singular."""
-    low, high = _widest_box(robot)
+    low, high = widest_box(robot)
     wanted = _Wanted(type_i, type_ii, limits)
-    coarse = _led(robot, low, high, rng, wanted)
+    coarse = np.empty((0, robot.freedom))
+    if limits and all(leg.limits for leg in robot.legs):
+        coarse = _led(robot, low, high, rng, wanted)
     free, share = np.ones(robot.freedom, dtype=bool), 0.05
     if len(coarse) < _SCOUTS:
         coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, wanted)
@@ -100,7 +106,7 @@ class _Wanted(NamedTuple):
         return poses
 
 
-def _widest_box(robot: Manipulator) -> tuple[Array, Array]:
+def widest_box(robot: Manipulator) -> tuple[Array, Array]:
     """Return the ends of a box (m,) of poses from which to draw."""
     center, radius = search_ball(robot)
     platform = robot.platform
@@ -125,18 +131,32 @@ def _led(
 ) -> Array:
     """Return usable poses that Newton's method leads from a box to random joint coordinates.
 
-    Short rams leave so little of the box that next to no pose of it keeps their limits. None is led
-    where the platform does not tilt, or a joint has no limits.
+    Short rams and short cranks leave so little of the box that next to no pose of it is in reach.
+    None is led where the platform does not tilt, or a joint has no range (`_joint_ranges`).
     """
-    if not (wanted.limits and robot.platform.tilts and all(leg.limits for leg in robot.legs)):
+    ranges = _joint_ranges(robot, limits=wanted.limits)
+    if ranges is None:
         return np.empty((0, robot.freedom))
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
-    least, most = joint_limits(robot)
-    joints = rng.uniform(least, most, (_BATCH, robot.joint_count))
+    joints = rng.uniform(*ranges, (_BATCH, robot.joint_count))
     for _ in range(_LEADING):
         poses = numeric(robot, "newton_step")(joints, poses)[0]
     poses = poses[((low <= poses) & (poses <= high)).all(axis=-1)]
     return wanted.kept(robot, wanted.reached(robot, poses))
+
+
+def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
+    """Return the ranges (2, n) of joints, m or rad, of a platform that tilts, if all have one.
+
+    A crank has a turn where it has no limits, or where these do not count.
+    """
+    if not robot.platform.tilts:
+        return None
+    low, high = joint_limits(robot).copy()
+    cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+    turning = cranks & (np.isinf(low) if limits else True)
+    low[turning], high[turning] = -np.pi, np.pi
+    return None if np.isinf(low).any() else np.array([low, high])
 
 
 def _drawn(
@@ -161,6 +181,12 @@ def _drawn(
         total += len(found[-1])
         if total >= count:
             return np.concatenate(found)
+        if k >= _SPARSE and total < count * k / attempts:
+            # At this rate the box would not give enough.
+            found.append(_led(robot, low, high, rng, wanted))
+            total += len(found[-1])
+            if total >= count:
+                return np.concatenate(found)
         # A quarter of the attempts tells, where many poses are wanted, that they will not be found.
         if k == attempts // 4 and count >= _MANY and total < count / 16:
             break
@@ -171,9 +197,16 @@ def _drawn(
             f"{_seldom_kept(robot, seen)}; widen these limits",
             subject=robot.name,
         )
+    least = f"measures of at least {wanted.type_i:g} (type I) and {wanted.type_ii:g} (type II)"
+    if total or reached:
+        raise ModelError(
+            f"only {total} of {k * _BATCH} random poses are in reach of all legs, with {least}, "
+            f"where {count} are wanted; give poses of your own, or ask for lower measures",
+            subject=robot.name,
+        )
     raise ModelError(
-        f"only {total} of {k * _BATCH} random poses are in reach of all legs and away from "
-        "singularities; bring the guide points nearer or lengthen the links",
+        f"none of {k * _BATCH} random poses is in reach of all legs with {least}: `pteron check` "
+        "says whether any pose is",
         subject=robot.name,
     )
 

@@ -57,6 +57,8 @@ class Manipulator:
         How thick its bodies are, for `pteron.workspace.clearance`.
     tools : tuple of Tool
         Tools that the platform can carry; `pteron.motion.with_tool` mounts one.
+    home : tuple of float, optional
+        The pose, m and rad, where the machine stands; `pteron.workspace.home_pose` finds one.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class Manipulator:
     gravity: Vector = STANDARD_GRAVITY
     radii: Radii | None = None
     tools: tuple[Tool, ...] = ()
+    home: tuple[float, ...] | None = None
 
     def __hash__(self) -> int:
         """Hash once: the public functions look machines up at every call."""

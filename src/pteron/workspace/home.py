@@ -1,13 +1,13 @@
 """The home pose: where a machine has the best margin to singularities and limits.
 
 The margin counts turning of the platform as a loss. Among poses of nearly equal margin a simple one
-is taken: level, on an axis of symmetry, with little joint travel, in round numbers.
+is taken: on the side of its base where its axis points, level, on an axis of symmetry, with little
+joint travel, in round numbers.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 
@@ -18,36 +18,46 @@ from numpy.typing import NDArray
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
 from pteron.kernels.kept import kept_result
-from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
+from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers
+from pteron.workspace.home_starts import (
+    axis_poses,
+    grid_poses,
+    mid_range_poses,
+    random_box_poses,
+    sides,
+)
 from pteron.workspace.margins import pose_margins
 from pteron.workspace.unreachable import beyond_limits, nowhere
 
-_DRAWN = 200
-"""Random poses that the search starts from."""
+_STARTS = 4
+"""Best poses of each kind, on each side of the base, that are improved by a local search."""
 
-_MEASURES = 0.3, 0.02, 0.0
-"""Least type-I and type-II measures of these poses, tried in turn; 0 where reach is small."""
-
-_STARTS = 12
-"""Random poses, the best ones, that are improved by a local search."""
+_NEAR = 200
+"""Best candidates among which those that differ are chosen, and that the axis is sought with."""
 
 _LEVELLED = 4
 """The best of these, made level, that are improved by another."""
 
-_STEPS = (0.02, 0.2)
-"""Size of a local search's first simplex: m and rad."""
+_STEPS = (0.05, 0.2)
+"""Size of a local search's first simplex: share of the longest leg, and rad."""
 
-_METRES = (0.1, 0.05, 0.01, 0.001)
-"""Round numbers that the pose is rounded to, coarsest first, m."""
+_ROUND = (0.1, 0.05, 0.01, 0.005, 0.001, 0.0001)
+"""Round numbers that the pose is rounded to, coarsest first: shares of the power of ten that the
+longest leg does not exceed."""
 
 _DEGREES = (30.0, 15.0, 5.0, 1.0)
 """The same of angles, degrees."""
 
 _WORTH = 0.99
 """Share of the best margin from which on a simpler pose is preferred."""
+
+_SIDE = 0.7
+"""Share of the best margin from which on the side of the base along the platform's axis is
+preferred. Mirror images have equal margins where both figures are plane, and where they are not,
+other ones. What elbows or cones keep below its base has less than half of its margin above."""
 
 _AXIS = 0.1
 """Share of the best margin from which on a pose on the axis of a machine's symmetry is
@@ -63,13 +73,34 @@ _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine moves every way."""
 
 
+@dataclass(frozen=True)
+class HomePoses:
+    """The home of a machine, and its image on the other side of the base.
+
+    Attributes
+    ----------
+    pose : tuple of float
+        The home pose, m and rad.
+    mirror : tuple of float or None
+        The best pose on the other side of the base, if its margin is at least 70 % of the best.
+    named : bool
+        Whether the machine's file names its home.
+    """
+
+    pose: tuple[float, ...]
+    mirror: tuple[float, ...] | None
+    named: bool = False
+
+
 def home_pose(robot: RobotLike) -> Array:
     """Return the pose with the best margin, rounded where that costs next to nothing.
 
-    The margin is the smallest of the type-I and type-II measures and of the joints' margins
-    (see `PoseMargins`) and, where the platform turns, of what is left of half a turn from 0: a
-    machine seldom works the wrong way round. A random search with a fixed seed finds it, and Nelder
-    and Mead's method refines it. The result is always the same for the same machine.
+    A machine's file may name it (`[home] pose`). Else the margin decides, the smallest of the
+    type-I and type-II measures and of the joints' margins (see `PoseMargins`) and, where the
+    platform turns, of what is left of half a turn from 0: a machine seldom works the wrong way
+    round. The search begins at level poses on the platform's axis and at joints in the middle of
+    their ranges, and Nelder and Mead's method improves the best. The result is always the same for
+    the same machine, and of a machine of another size the same in proportion.
 
     Parameters
     ----------
@@ -79,16 +110,19 @@ def home_pose(robot: RobotLike) -> Array:
     Returns
     -------
     array, shape (m,)
-        m and rad. Its margin is at least 98 % of the best one found. Of equals it is the one whose
-        sliders are nearest to their guide points, and cranks to their zero; or the middle between
-        them, if that has 90 %. A platform that tilts is level, all its angles 0, if the best level
-        pose has 75 %. Of a machine that a turn about the platform's axis leaves as it is, it is on
-        that axis, if the best place there has 10 %.
+        m and rad. Where both sides of the base have poses with at least 70 % of the best margin, it
+        is on the side along the platform's axis, or against gravity of a machine that moves in a
+        plane across it; `home_poses` returns the other too. Its margin is at least 98 % of the best
+        one found there. Of equals it is the one whose sliders are nearest to their guide points,
+        and cranks to their zero; or the middle between them, if that has 90 %. A platform that
+        tilts is level, all its angles 0, if the best level pose has 75 %. Of a machine that a turn
+        about the platform's axis leaves as it is, it is on that axis, if the best place there has
+        10 %.
 
     Raises
     ------
     ModelError
-        If no pose is in reach of all legs and within the joints' limits.
+        If no pose is in reach of all legs and within the joints' limits, or if the file's is not.
     SingularPose
         If the machine is singular at every pose.
 
@@ -99,30 +133,110 @@ def home_pose(robot: RobotLike) -> Array:
     >>> home_pose(pteron.load("quadrupteron"))
     array([0., 0., 0., 0.])
     """
+    return np.array(home_poses(robot).pose)
+
+
+def home_poses(robot: RobotLike) -> HomePoses:
+    """Return the home pose and its image on the other side of the base, if there is one.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+
+    Returns
+    -------
+    HomePoses
+
+    Examples
+    --------
+    >>> from pteron.workspace import home_poses
+    >>> home_poses("stewart").mirror is None
+    True
+    """
     robot = as_manipulator(robot)
+    if robot.home is not None:
+        expect_usable(robot, np.array(robot.home))
+        return HomePoses(robot.home, None, named=True)
     # Neither bodies nor drives matter; a refusal tells the name.
-    return np.array(_stored(replace(bare(robot), name=robot.name)))
+    return HomePoses(*_stored(replace(bare(robot), name=robot.name)))
+
+
+def expect_usable(robot: Manipulator, pose: Array) -> None:
+    """Refuse a home pose (m,) of a file that legs do not reach, or that passes limits."""
+    least = float(_worth(robot, pose[None])[0])
+    if least <= 0.0:
+        margins = pose_margins(robot, pose)
+        legs = np.minimum(margins.type_i, margins.joints)
+        where = f"leg {int(legs.argmin()) + 1} is out of reach or beyond a limit there"
+        if legs.min() > 0.0:
+            where = "the drives do not hold the platform there (type II), or it is turned back"
+        raise ModelError(
+            f"home.pose: {list(pose)}: {where}; give a pose in reach, within limits, or leave "
+            "[home] out",
+            subject=robot.name,
+        )
 
 
 @lru_cache(maxsize=256)
-def _stored(robot: Manipulator) -> tuple[float, ...]:
-    """Return the home pose that was worked out before, in another process too, or a new one."""
-    key, packages = ("home_pose", bare(robot)), ("kinematics", "workspace")
-    return kept_result(key, packages, lambda: tuple(_best(robot).tolist()))
+def _stored(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+    """Return both poses, worked out before, in another process too, or now."""
+    key, packages = ("home_poses", bare(robot)), ("kinematics", "workspace")
+    return kept_result(key, packages, lambda: _both_sides(robot))
 
 
-def _best(robot: Manipulator) -> Array:
+def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+    """Return the home pose, and the best pose on the other side of the base, if it is as good."""
     singular_orientations(robot)  # refuses a machine that is singular everywhere
-    drawn = _random_poses(robot)
-    order = np.argsort(-_worth(robot, drawn), kind="stable")
-    refined = np.array([_refined(robot, drawn[i]) for i in order[:_STARTS]])
+    candidates = _candidates(robot)
+    refined = np.array([_refined(robot, start) for start in _starts(robot, candidates)])
     margins = _worth(robot, refined)
     most = float(margins.max())
     if most <= 0.0:
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
-        raise beyond_limits(robot, np.concatenate([refined[reached], drawn]))
+        raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
+    side, good = sides(robot, refined), margins >= _SIDE * most
+    best = {
+        sign: tuple(_simplest(robot, refined[side != -sign], candidates[sides(robot, candidates) != -sign]).tolist())
+        for sign in (1.0, -1.0)
+        if (good & (side == sign)).any()
+    }
+    if not best:
+        return tuple(_simplest(robot, refined, candidates).tolist()), None
+    pose, *mirror = best.values()
+    return pose, mirror[0] if mirror else None
+
+
+def _candidates(robot: Manipulator) -> Array:
+    """Return poses (K, m) among which the search begins, those of closed forms first."""
+    poses = axis_poses(robot)
+    poses = np.concatenate([poses, mid_range_poses(robot, _best_first(robot, poses))])
+    poses = np.concatenate([poses, grid_poses(robot), random_box_poses(robot)])
+    return _best_first(robot, poses)
+
+
+def _best_first(robot: Manipulator, poses: Array) -> Array:
+    return poses[np.argsort(-_worth(robot, poses), kind="stable")]
+
+
+def _starts(robot: Manipulator, candidates: Array) -> Array:
+    """Return the best candidates on each side of the base, level ones and others, not near others."""
+    side = sides(robot, candidates)
+    level = ~candidates[:, robot.platform.angular].any(axis=-1)
+    starts = []
+    for sign, flat in product((1.0, 0.0, -1.0), (True, False)):
+        alike = candidates[(side == sign) & (level == flat)][:_NEAR]
+        starts.append(_distinct(alike, _steps(robot, *_STEPS))[:_STARTS])
+    return np.concatenate(starts)
+
+
+def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
+    """Return the simplest pose (m,) of nearly the best margin, near local optima and candidates."""
+    margins = _worth(robot, refined)
+    most = float(margins.max())
     level = _level(robot, refined)
     worth = np.asarray(_worth(robot, level))
+    drawn = candidates[:_NEAR]
     if worth.max(initial=0.0) >= _LEVEL * most:
         refined, drawn, margins, most = level, drawn * ~robot.platform.angular, worth, worth.max()
     # Zero says where the joints are meant to be, where nothing else tells.
@@ -139,26 +253,13 @@ def _best(robot: Manipulator) -> Array:
     for k in range(robot.freedom if robot.platform.tilts else 0):
         middle = np.where(np.arange(robot.freedom) == k, 0.0, best)
         best = middle if _worth(robot, middle) >= least else best
-    for metres, degrees in product(_METRES, _DEGREES):
-        step = _steps(robot, metres, np.radians(degrees))
+    decade = 10.0 ** np.ceil(np.log10(longest_leg(robot)))
+    for share, degrees in product(_ROUND, _DEGREES):
+        step = np.where(robot.platform.angular, np.radians(degrees), share * decade)
         rounded: Array = np.round(best / step) * step + 0.0  # -0.0 becomes 0.0
         if _worth(robot, rounded) >= least:
             return rounded
     return best
-
-
-def _random_poses(robot: Manipulator) -> Array:
-    first, *less = _MEASURES
-    with suppress(ModelError):
-        return random_poses(robot, _DRAWN, type_i=first, type_ii=first)
-    try:
-        one = random_poses(robot, 1, type_i=0.0, type_ii=0.0)
-    except ModelError:
-        raise nowhere(robot) from None
-    for least in less:
-        with suppress(ModelError):
-            return random_poses(robot, _DRAWN, type_i=least, type_ii=least)
-    return one
 
 
 def _least_travel(robot: Manipulator, poses: Array) -> Array:
@@ -214,25 +315,32 @@ def _worth(robot: Manipulator, poses: Array) -> Numbers:
     """Return the least margin (...), which is 0 at most where the platform is turned back."""
     least = pose_margins(robot, poses).least
     turned = np.abs(poses[..., robot.platform.angular]) / np.pi
-    return np.asarray(np.minimum(least, 1.0 - turned.max(axis=-1, initial=0.0)))
+    worth = np.minimum(least, 1.0 - turned.max(axis=-1, initial=0.0))
+    return np.asarray(np.where(np.isfinite(worth), worth, -np.inf))
 
 
-def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
-    """Return a step of each of the pose's coordinates."""
-    return np.where(robot.platform.angular, radians, metres)
+def longest_leg(robot: Manipulator) -> float:
+    """Return the length of the longest leg, m, which lengths of a home are in proportion to."""
+    return max(leg.size for leg in robot.legs) or 1.0
+
+
+def _steps(robot: Manipulator, share: float, radians: float) -> Array:
+    """Return a step of each of the pose's coordinates, lengths as a share of the longest leg."""
+    return np.where(robot.platform.angular, radians, share * longest_leg(robot))
 
 
 def _refined(robot: Manipulator, start: Array, moved: NDArray[np.bool_] | None = None) -> Array:
     """Return the pose of a locally best margin, by moving those coordinates that are marked."""
     free = np.ones(len(start), dtype=bool) if moved is None else moved
+    units = _steps(robot, 1.0, 1.0)
 
     def pose(values: Array) -> Array:
         whole = start.copy()
-        whole[free] = values
+        whole[free] = values * units[free]
         return whole
 
-    first = start[free]
-    simplex = np.vstack([first, first + np.diag(_steps(robot, *_STEPS)[free])])
+    first = start[free] / units[free]
+    simplex = np.vstack([first, first + np.diag((_steps(robot, *_STEPS) / units)[free])])
     found = scipy.optimize.minimize(
         lambda values: -float(_worth(robot, pose(values))),
         first,
