@@ -30,9 +30,10 @@ from pteron.workspace.home_starts import (
     sides,
 )
 from pteron.workspace.margins import pose_margins
+from pteron.workspace.simplex_ascent import climb
 from pteron.workspace.unreachable import beyond_limits, nowhere
 
-_STARTS = 4
+_STARTS = 8
 """Best poses of each kind, on each side of the base, that are improved by a local search."""
 
 _NEAR = 200
@@ -58,6 +59,10 @@ _SIDE = 0.7
 """Share of the best margin from which on the side of the base along the platform's axis is
 preferred. Mirror images have equal margins where both figures are plane, and where they are not,
 other ones. What elbows or cones keep below its base has less than half of its margin above."""
+
+_BETWEEN = 101
+"""Poses looked at between one side of the base and the other: mirror images have a singularity, or
+none in reach, between them; elsewhere the platform goes from one to the other."""
 
 _AXIS = 0.1
 """Share of the best margin from which on a pose on the axis of a machine's symmetry is
@@ -189,22 +194,28 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
     """Return the home pose, and the best pose on the other side of the base, if it is as good."""
     singular_orientations(robot)  # refuses a machine that is singular everywhere
     candidates = _candidates(robot)
-    refined = np.array([_refined(robot, start) for start in _starts(robot, candidates)])
+    refined = _refined(robot, _starts(robot, candidates))
     margins = _worth(robot, refined)
     most = float(margins.max())
     if most <= 0.0:
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
         raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
     side, good = sides(robot, refined), margins >= _SIDE * most
-    best = {
-        sign: tuple(_simplest(robot, refined[side != -sign], candidates[sides(robot, candidates) != -sign]).tolist())
-        for sign in (1.0, -1.0)
-        if (good & (side == sign)).any()
-    }
-    if not best:
+    ends = [refined[good & (side == sign)][:1] for sign in (1.0, -1.0)]
+    if not all(map(len, ends)) or _leads(robot, *np.concatenate(ends), _AXIS * most):
         return tuple(_simplest(robot, refined, candidates).tolist()), None
-    pose, *mirror = best.values()
-    return pose, mirror[0] if mirror else None
+    beside = sides(robot, candidates)
+    pose, mirror = (
+        tuple(_simplest(robot, refined[side == sign], candidates[beside == sign]).tolist())
+        for sign in (1.0, -1.0)
+    )
+    return pose, mirror
+
+
+def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
+    """Return whether poses on the straight line between two poses (m,) keep a margin."""
+    line = np.linspace(start, end, _BETWEEN)
+    return bool((_worth(robot, line) > least).all())
 
 
 def _candidates(robot: Manipulator) -> Array:
@@ -277,7 +288,7 @@ def _level(robot: Manipulator, poses: Array) -> Array:
         return poses[:0]
     if moved.any():
         order = np.argsort(-np.asarray(_worth(robot, level)), kind="stable")
-        level = np.array([_refined(robot, level[i], moved) for i in order[:_LEVELLED]])
+        level = _refined(robot, level[order[:_LEVELLED]], moved)
     return level
 
 
@@ -329,22 +340,18 @@ def _steps(robot: Manipulator, share: float, radians: float) -> Array:
     return np.where(robot.platform.angular, radians, share * longest_leg(robot))
 
 
-def _refined(robot: Manipulator, start: Array, moved: NDArray[np.bool_] | None = None) -> Array:
-    """Return the pose of a locally best margin, by moving those coordinates that are marked."""
-    free = np.ones(len(start), dtype=bool) if moved is None else moved
-    units = _steps(robot, 1.0, 1.0)
+def _refined(
+    robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None
+) -> Array:
+    """Return poses (S, m) of locally best margins, by moving those coordinates that are marked."""
+    free = np.ones(robot.freedom, dtype=bool) if moved is None else moved
+    units = _steps(robot, 1.0, 1.0)[free]
 
-    def pose(values: Array) -> Array:
-        whole = start.copy()
-        whole[free] = values * units[free]
+    def poses(values: Array) -> Array:
+        # Simplices (S, ..., k), or points (4, S, k): coordinates that stay are alike, or 0.
+        whole = np.zeros((*values.shape[:-1], robot.freedom))
+        whole[..., free] = values * units
         return whole
 
-    first = start[free] / units[free]
-    simplex = np.vstack([first, first + np.diag((_steps(robot, *_STEPS) / units)[free])])
-    found = scipy.optimize.minimize(
-        lambda values: -float(_worth(robot, pose(values))),
-        first,
-        method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-6, "maxiter": 500},
-    )
-    return pose(found.x)
+    steps = _steps(robot, *_STEPS)[free] / units
+    return poses(climb(lambda values: _worth(robot, poses(values)), starts[:, free] / units, steps))
