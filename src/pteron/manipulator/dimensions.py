@@ -84,7 +84,8 @@ def with_dimensions(
     """Return a machine of the same kind with other dimensions, which hold for all of its legs.
 
     Links of another length keep their section, unless a stock says what they are cut from. Limits
-    of joints, and the platform's mass and inertia, stay unless they are given.
+    of joints, and the platform's mass and inertia, stay unless they are given. A home that the file
+    names is left out where lengths or limits change.
 
     Parameters
     ----------
@@ -123,6 +124,8 @@ def with_dimensions(
     0.1167
     """
     robot = as_manipulator(robot)
+    if any(value is not None for value in (base_radius, platform_radius, crank, rod, limits)):
+        robot = replace(robot, home=None)
     if base_radius is not None:
         robot = _with_base(robot, positive(base_radius, "base_radius", "m"))
     if platform_radius is not None:
