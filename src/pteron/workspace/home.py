@@ -177,7 +177,7 @@ def expect_usable(robot: Manipulator, pose: Array) -> None:
         if legs.min() > 0.0:
             where = "the drives do not hold the platform there (type II), or it is turned back"
         raise ModelError(
-            f"home.pose: {list(pose)}: {where}; give a pose in reach, within limits, or leave "
+            f"home.pose: {pose.tolist()}: {where}; give a pose in reach, within limits, or leave "
             "[home] out",
             subject=robot.name,
         )
@@ -340,9 +340,7 @@ def _steps(robot: Manipulator, share: float, radians: float) -> Array:
     return np.where(robot.platform.angular, radians, share * longest_leg(robot))
 
 
-def _refined(
-    robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None
-) -> Array:
+def _refined(robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None) -> Array:
     """Return poses (S, m) of locally best margins, by moving those coordinates that are marked."""
     free = np.ones(robot.freedom, dtype=bool) if moved is None else moved
     units = _steps(robot, 1.0, 1.0)[free]

@@ -57,7 +57,9 @@ def axis_poses(robot: Manipulator) -> Array:
     middle = np.mean([leg.platform_point for leg in robot.legs], axis=0)
     offsets = middle @ np.nan_to_num(platform.at(poses[:, 0])[1])
     heights = radius * np.linspace(-1.0, 1.0, _HEIGHTS)
-    poses[..., :count] = center - (offsets @ platform.directions.T)[:, None] + np.outer(heights, along)
+    poses[..., :count] = (
+        center - (offsets @ platform.directions.T)[:, None] + np.outer(heights, along)
+    )
     return poses.reshape(-1, robot.freedom)
 
 
@@ -86,7 +88,9 @@ def mid_range_poses(robot: Manipulator, starts: Array) -> Array:
     joints = np.array([np.mean(leg.limits or (0.0, 0.0)) for leg in robot.legs])
     poses = starts[:_LED]
     for _ in range(_NEWTON):
-        poses = numeric(robot, "newton_step")(np.broadcast_to(joints, (len(poses), len(joints))), poses)[0]
+        poses = numeric(robot, "newton_step")(
+            np.broadcast_to(joints, (len(poses), len(joints))), poses
+        )[0]
     return poses[np.isfinite(poses).all(axis=-1)]
 
 

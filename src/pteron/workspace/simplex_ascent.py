@@ -46,9 +46,7 @@ def climb(worth: Callable[[Array], Array], starts: Array, steps: Array) -> Array
     return points[np.arange(len(points)), values.argmax(axis=1)]
 
 
-def _stepped(
-    worth: Callable[[Array], Array], simplex: Array, height: Array
-) -> tuple[Array, Array]:
+def _stepped(worth: Callable[[Array], Array], simplex: Array, height: Array) -> tuple[Array, Array]:
     """Return simplices (S, k + 1, k), best point first, after one step, and their values."""
     rows = np.arange(len(simplex))
     middle, last = simplex[:, :-1].mean(axis=1), simplex[:, -1]
