@@ -102,10 +102,10 @@ class _Body(Table):
                 raise error from None
         center = ", ".join(f"{value / self.mass:.4g}" for value in moment)
         raise ModelError(
-            f"first_moment: {moment} kg m with a mass of {self.mass:g} kg puts the centre of mass at "
-            f"({center}) m, too far out for the inertia of {self.inertia} kg m^2; was mass edited "
-            "alone? Write center_of_mass, which stays, in place of first_moment, and multiply "
-            "inertia by what mass was multiplied by"
+            f"first_moment: {moment} kg m with a mass of {self.mass:g} kg puts the centre of mass "
+            f"at ({center}) m, too far out for the inertia of {self.inertia} kg m^2; was mass "
+            "edited alone? Write center_of_mass, which stays, in place of first_moment, and "
+            "multiply inertia by what mass was multiplied by"
         )
 
 

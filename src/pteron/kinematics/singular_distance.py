@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pteron.equations.variations import Variation, varied_numbers, variations
+from pteron.equations.variations import Variation, variations, varied_numbers
 from pteron.kernels import Array, general_program
 from pteron.kinematics.unit_rows import motion_frame, normalised, unit_rows
 from pteron.manipulator import Manipulator
@@ -51,9 +51,7 @@ def _slopes(robot: Manipulator, poses: Array) -> Array:
     return np.asarray((ahead - behind) / (2.0 * step))
 
 
-def _rows_of(
-    robot: Manipulator, changes: list[Variation], amounts: Array, poses: Array
-) -> Array:
+def _rows_of(robot: Manipulator, changes: list[Variation], amounts: Array, poses: Array) -> Array:
     """Return the twist Jacobians (B, K, n, 6) of machines that differ by amounts (B, changes)."""
     geometry = varied_numbers(robot, changes, amounts)
     function = general_program(robot, "twist_jacobian").function

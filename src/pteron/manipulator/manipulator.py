@@ -219,8 +219,8 @@ def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[s
     names = platform.coordinates
     if len(home) != len(names):
         yield (
-            f"home.pose: {len(home)} values given, {len(names)} expected: {', '.join(names)} (m and "
-            "rad)"
+            f"home.pose: {len(home)} values given, {len(names)} expected: "
+            f"{', '.join(names)} (m and rad)"
         )
     elif not all(map(math.isfinite, home)):
         yield f"home.pose: {list(home)} given, finite numbers expected"

@@ -231,7 +231,7 @@ def _best_first(robot: Manipulator, poses: Array) -> Array:
 
 
 def _starts(robot: Manipulator, candidates: Array) -> Array:
-    """Return the best candidates on each side of the base, level ones and others, not near others."""
+    """Return the best candidates on each side of the base, level and not, each far from others."""
     side = sides(robot, candidates)
     level = ~candidates[:, robot.platform.angular].any(axis=-1)
     starts = []
