@@ -25,7 +25,9 @@ def machine_text(sort: str, seed: int, digits: int = 4) -> str:
         lines.append("[[legs]]")
         for key, value in leg.items():
             unit = "direction" in key
-            rounded = np.round(value, 12 if unit else digits) if not isinstance(value, str) else value
+            rounded = (
+                np.round(value, 12 if unit else digits) if not isinstance(value, str) else value
+            )
             text = f'"{value}"' if isinstance(value, str) else str(rounded.tolist())
             lines.append(f"{key} = {value if isinstance(value, dict) else text}")
         lines += _bodies(leg)
@@ -53,7 +55,7 @@ def least_singular_value(robot, pose) -> float:
 
 
 def _elbow(leg, tip):
-    """Return the crank's end that is a rod's length from the platform point, on the elbow's side."""
+    """Return the crank's end a rod's length from the platform point, on the elbow's side."""
     guide, axis = np.array(leg.guide_point), np.array(leg.direction)
     way = tip - guide
     flat = way - (way @ axis) * axis
@@ -95,10 +97,16 @@ def _rotary(rng):
         zero = inwards * s * np.array([-np.sin(angle), np.cos(angle), 0.0])
         legs.append(
             {
-                **{"type": "RSS", "guide_point": a, "platform_point": b},
+                "type": "RSS",
+                "guide_point": a,
+                "platform_point": b,
                 "direction": np.cross(zero, [0.0, 0.0, 1.0]),
-                **{"zero_direction": zero, "upper_length": crank, "lower_length": rod},
-                **{"elbow": np.array(-1), "rods": np.array(1), "limits": np.array([-1.5, 1.5])},
+                "zero_direction": zero,
+                "upper_length": crank,
+                "lower_length": rod,
+                "elbow": np.array(-1),
+                "rods": np.array(1),
+                "limits": np.array([-1.5, 1.5]),
             }
         )
     return legs, "3T3R"
@@ -122,7 +130,7 @@ def _tripod(rng):
     angles = 2.0 * np.pi / 3.0 * np.arange(3)
     radius = rng.uniform(0.05, 0.4)
     base, top = _circle(radius, angles), _circle(radius * rng.uniform(0.4, 1.3), angles)
-    rams = rng.random() < 0.5
+    rams, stroke, size = rng.random() < 0.5, rng.uniform(0.1, 0.6), rng.uniform(0.3, 0.8)
     height = radius * rng.uniform(1.2, 2.5)
     legs = []
     for a, b, angle in zip(base, top, angles, strict=True):
@@ -130,10 +138,9 @@ def _tripod(rng):
         leg = {"type": "RPS", "guide_point": a, "platform_point": b, "direction": across}
         if rams:
             middle = np.linalg.norm(a - b - [0.0, 0.0, height])
-            stroke = rng.uniform(0.1, 0.6) if not legs else stroke
             leg["limits"] = middle / (1.0 + stroke / 2.0) * np.array([1.0, 1.0 + stroke])
         else:
-            crank = radius * rng.uniform(0.3, 0.8) if not legs else crank
+            crank = radius * size
             outward = np.array([np.cos(angle), np.sin(angle), 0.0])
             leg |= {"type": "RRS", "direction": -across, "zero_direction": outward}
             rod = np.linalg.norm(a + crank * outward - b - [0.0, 0.0, height])
@@ -153,7 +160,6 @@ def _bodies(leg):
     lines = []
     for key, length, sign, size in zip(("upper", "lower"), lengths, (0.5, -0.5), flat, strict=True):
         center = [sign * length, 0.0][:size]
-        lines.append(
-            f"{key} = {{ mass = 0.1, center_of_mass = {center}, inertia = {0.1 * length**2 / 3.0} }}"
-        )
+        inertia = 0.1 * length**2 / 3.0
+        lines.append(f"{key} = {{ mass = 0.1, center_of_mass = {center}, inertia = {inertia} }}")
     return lines

@@ -96,8 +96,9 @@ class _Body(Table):
             return self.kind(self.mass, self.first_moment, self.inertia)
         except ModelError as error:
             moment = list(self.first_moment)
+            nothing: Any = (0.0,) * len(moment)
             try:
-                self.kind(self.mass, (0.0,) * len(moment), self.inertia)
+                self.kind(self.mass, nothing, self.inertia)
             except ModelError:
                 raise error from None
         center = ", ".join(f"{value / self.mass:.4g}" for value in moment)

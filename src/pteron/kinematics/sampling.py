@@ -138,7 +138,7 @@ def _led(
     if ranges is None:
         return np.empty((0, robot.freedom))
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
-    joints = rng.uniform(*ranges, (_BATCH, robot.joint_count))
+    joints = rng.uniform(ranges[0], ranges[1], (_BATCH, robot.joint_count))
     for _ in range(_LEADING):
         poses = numeric(robot, "newton_step")(joints, poses)[0]
     poses = poses[((low <= poses) & (poses <= high)).all(axis=-1)]

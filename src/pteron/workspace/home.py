@@ -21,7 +21,6 @@ from pteron.kernels.kept import kept_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.shapes import Numbers
 from pteron.workspace.home_starts import (
     axis_poses,
     grid_poses,
@@ -63,6 +62,9 @@ other ones. What elbows or cones keep below its base has less than half of its m
 _BETWEEN = 101
 """Poses looked at between one side of the base and the other: mirror images have a singularity, or
 none in reach, between them; elsewhere the platform goes from one to the other."""
+
+_ENDS = 4
+"""Poses on each side from which such a way is sought."""
 
 _AXIS = 0.1
 """Share of the best margin from which on a pose on the axis of a machine's symmetry is
@@ -201,8 +203,9 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
         raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
     side, good = sides(robot, refined), margins >= _SIDE * most
-    ends = [refined[good & (side == sign)][:1] for sign in (1.0, -1.0)]
-    if not all(map(len, ends)) or _leads(robot, *np.concatenate(ends), _AXIS * most):
+    above, below = (refined[good & (side == sign)] for sign in (1.0, -1.0))
+    pairs = list(product(above[:_ENDS], below[:_ENDS]))
+    if not pairs or any(_leads(robot, start, end, _AXIS * most) for start, end in pairs):
         return tuple(_simplest(robot, refined, candidates).tolist()), None
     beside = sides(robot, candidates)
     pose, mirror = (
@@ -219,15 +222,14 @@ def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
 
 
 def _candidates(robot: Manipulator) -> Array:
-    """Return poses (K, m) among which the search begins, those of closed forms first."""
-    poses = axis_poses(robot)
-    poses = np.concatenate([poses, mid_range_poses(robot, _best_first(robot, poses))])
-    poses = np.concatenate([poses, grid_poses(robot), random_box_poses(robot)])
-    return _best_first(robot, poses)
-
-
-def _best_first(robot: Manipulator, poses: Array) -> Array:
-    return poses[np.argsort(-_worth(robot, poses), kind="stable")]
+    """Return poses (K, m) among which the search begins, best first, closed forms before others."""
+    on_axis = axis_poses(robot)
+    worth = _worth(robot, on_axis)
+    led = mid_range_poses(robot, on_axis[np.argsort(-worth, kind="stable")])
+    others = np.concatenate([led, grid_poses(robot), random_box_poses(robot)])
+    poses, worth = np.concatenate([on_axis, others]), np.append(worth, _worth(robot, others))
+    candidates: Array = poses[np.argsort(-worth, kind="stable")]
+    return candidates
 
 
 def _starts(robot: Manipulator, candidates: Array) -> Array:
@@ -246,10 +248,11 @@ def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
     margins = _worth(robot, refined)
     most = float(margins.max())
     level = _level(robot, refined)
-    worth = np.asarray(_worth(robot, level))
+    worth = _worth(robot, level)
     drawn = candidates[:_NEAR]
     if worth.max(initial=0.0) >= _LEVEL * most:
-        refined, drawn, margins, most = level, drawn * ~robot.platform.angular, worth, worth.max()
+        refined, drawn = level, drawn * ~robot.platform.angular
+        margins, most = worth, float(worth.max())
     # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[margins >= _WORTH * most]
     best = _least_travel(robot, equals)
@@ -257,7 +260,7 @@ def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
     if _worth(robot, middle) >= _MIDDLE * most:
         best = middle
     on_axis = _on_axis(robot, np.concatenate([refined, drawn]))
-    worth = np.asarray(_worth(robot, on_axis))
+    worth = _worth(robot, on_axis)
     if worth.max(initial=0.0) >= _AXIS * most:
         best = _least_travel(robot, on_axis[worth >= _WORTH * worth.max()])
     least = _WORTH * float(_worth(robot, best))
@@ -287,7 +290,7 @@ def _level(robot: Manipulator, poses: Array) -> Array:
     if not robot.platform.tilts:
         return poses[:0]
     if moved.any():
-        order = np.argsort(-np.asarray(_worth(robot, level)), kind="stable")
+        order = np.argsort(-_worth(robot, level), kind="stable")
         level = _refined(robot, level[order[:_LEVELLED]], moved)
     return level
 
@@ -322,7 +325,7 @@ def _distinct(poses: Array, apart: Array) -> Array:
     return poses[[not near[i, :i].any() for i in range(len(poses))]]
 
 
-def _worth(robot: Manipulator, poses: Array) -> Numbers:
+def _worth(robot: Manipulator, poses: Array) -> Array:
     """Return the least margin (...), which is 0 at most where the platform is turned back."""
     least = pose_margins(robot, poses).least
     turned = np.abs(poses[..., robot.platform.angular]) / np.pi

@@ -17,7 +17,6 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.shapes import Numbers, PerJoint, PoseLike
 
-
 _ROUNDING = 1e-9
 """Difference of shares that is rounding."""
 

@@ -43,7 +43,8 @@ def climb(worth: Callable[[Array], Array], starts: Array, steps: Array) -> Array
         if not len(moving):
             break
         points[moving], values[moving] = _stepped(worth, simplex, height)
-    return points[np.arange(len(points)), values.argmax(axis=1)]
+    best: Array = points[np.arange(len(points)), values.argmax(axis=1)]
+    return best
 
 
 def _stepped(worth: Callable[[Array], Array], simplex: Array, height: Array) -> tuple[Array, Array]:
