@@ -187,6 +187,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     import numpy as np
 
     from pteron.kinematics import architecture, inverse_kinematics, singular_orientations
+    from pteron.manipulator.template_masses import template_masses
     from pteron.workspace import home_poses, limited_joints, pose_margins
     from pteron.workspace.holding import holding, holding_warnings, singular_within_rounding
     from pteron.workspace.leg_layout import layout_warnings
@@ -225,6 +226,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": layout.holds,
         "self_motions": list(layout.self_motions),
+        "template_masses": template_masses(robot),
         "doubts": [
             *(*unlikely, *loose, *layout_warnings(robot, home), *holding_warnings(held)),
             *(*elbow_warnings(modes), *load_warnings(robot, home), *screw_warnings(robot)),
@@ -281,6 +283,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         *_modes(found["working_modes"]),
         *_passive(found["limited_joints"]),
         *tool,
+        *([f"Note: {text}"] if (text := found["template_masses"]) else []),
         *(f"The platform can move with its rams held {text}" for text in found["self_motions"]),
         work,
     )

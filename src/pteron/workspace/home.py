@@ -63,6 +63,10 @@ _BETWEEN = 101
 """Poses looked at between one side of the base and the other: mirror images have a singularity, or
 none in reach, between them; elsewhere the platform goes from one to the other."""
 
+_ALIKE = 0.5
+"""Greatest difference of angles, rad, of poses that may be mirror images: those of level ones have
+none, and of others what a local search leaves."""
+
 _ENDS = 4
 """Poses on each side from which such a way is sought."""
 
@@ -204,7 +208,12 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
         raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
     side, good = sides(robot, refined), margins >= _SIDE * most
     above, below = (refined[good & (side == sign)] for sign in (1.0, -1.0))
-    pairs = list(product(above[:_ENDS], below[:_ENDS]))
+    angular = robot.platform.angular
+    pairs = [
+        (start, end)
+        for start, end in product(above[:_ENDS], below[:_ENDS])
+        if (np.abs(start - end)[angular] <= _ALIKE).all()
+    ]
     if not pairs or any(_leads(robot, start, end, _AXIS * most) for start, end in pairs):
         return tuple(_simplest(robot, refined, candidates).tolist()), None
     beside = sides(robot, candidates)
