@@ -259,6 +259,12 @@ def scaled(robot, factor):
     def body(inertia):
         if isinstance(inertia, float):
             return inertia
+        if isinstance(inertia.inertia, tuple):
+            return replace(
+                inertia,
+                first_moment=times(inertia.first_moment),
+                inertia=times(inertia.inertia, 2),
+            )
         return replace(
             inertia,
             first_moment=times(inertia.first_moment),

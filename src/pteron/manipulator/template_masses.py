@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isclose
 from typing import Any
 
@@ -36,9 +37,10 @@ def template_masses(robot: Manipulator) -> str:
     return ""
 
 
-def _links(robot: Manipulator, template: Manipulator) -> Any:
+def _links(robot: Manipulator, template: Manipulator) -> Iterator[str]:
     """Yield the first leg's links whose mass or section is that of the template."""
-    own, other = robot.legs[0], template.legs[0]
+    own: Any = robot.legs[0]
+    other: Any = template.legs[0]
     for letter, (key, low, high, _) in own.extents.items():
         if letter not in other.extents:
             continue

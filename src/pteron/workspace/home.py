@@ -20,6 +20,7 @@ from pteron.kernels import Array, bare
 from pteron.kernels.kept import kept_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace.home_starts import (
     axis_poses,
@@ -54,10 +55,14 @@ _DEGREES = (30.0, 15.0, 5.0, 1.0)
 _WORTH = 0.99
 """Share of the best margin from which on a simpler pose is preferred."""
 
-_SIDE = 0.7
+_SIDE = 0.5
 """Share of the best margin from which on the side of the base along the platform's axis is
-preferred. Mirror images have equal margins where both figures are plane, and where they are not,
-other ones. What elbows or cones keep below its base has less than half of its margin above."""
+preferred, where no leg has an elbow whose side would tell: images of plane figures have equal
+margins, and of others a little less or more."""
+
+_ELBOWED_SIDE = 0.95
+"""The same where elbows tell: what stands on their other side by design has less than half of its
+margin there, and images that differ by less, as those of sliders on level guides, none at all."""
 
 _BETWEEN = 101
 """Poses looked at between one side of the base and the other: mirror images have a singularity, or
@@ -93,7 +98,8 @@ class HomePoses:
     pose : tuple of float
         The home pose, m and rad.
     mirror : tuple of float or None
-        The best pose on the other side of the base, if its margin is at least 70 % of the best.
+        The best pose on the other side of the base, if its margin is at least half of the best, or
+        95 % where elbows tell the side.
     named : bool
         Whether the machine's file names its home.
     """
@@ -121,9 +127,10 @@ def home_pose(robot: RobotLike) -> Array:
     Returns
     -------
     array, shape (m,)
-        m and rad. Where both sides of the base have poses with at least 70 % of the best margin, it
-        is on the side along the platform's axis, or against gravity of a machine that moves in a
-        plane across it; `home_poses` returns the other too. Its margin is at least 98 % of the best
+        m and rad. Where both sides of the base have poses with at least half of the best margin, or
+        95 % of it where legs have elbows, and no straight way leads from one to the other, it is on
+        the side along the platform's axis, or against gravity of a machine that moves in a plane
+        across it; `home_poses` returns the other too. Its margin is at least 98 % of the best
         one found there. Of equals it is the one whose sliders are nearest to their guide points,
         and cranks to their zero; or the middle between them, if that has 90 %. A platform that
         tilts is level, all its angles 0, if the best level pose has 75 %. Of a machine that a turn
@@ -199,6 +206,10 @@ def _stored(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | 
 def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
     """Return the home pose, and the best pose on the other side of the base, if it is as good."""
     singular_orientations(robot)  # refuses a machine that is singular everywhere
+    try:
+        best_type_ii(robot)
+    except ModelError:
+        raise nowhere(robot) from None
     candidates = _candidates(robot)
     refined = _refined(robot, _starts(robot, candidates))
     margins = _worth(robot, refined)
@@ -206,7 +217,9 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
     if most <= 0.0:
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
         raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
-    side, good = sides(robot, refined), margins >= _SIDE * most
+    elbowed = any(len(leg.branches) > 1 for leg in robot.legs)
+    share = _ELBOWED_SIDE if elbowed else _SIDE
+    side, good = sides(robot, refined), margins >= share * most
     above, below = (refined[good & (side == sign)] for sign in (1.0, -1.0))
     angular = robot.platform.angular
     pairs = [
