@@ -1,4 +1,4 @@
-"""Random machines as people build them, in tenths of a millimetre, and their rows by NumPy alone."""
+"""Random machines as people build them, in tenths of a millimetre; their rows by NumPy alone."""
 
 from __future__ import annotations
 
@@ -34,17 +34,18 @@ def machine_text(sort: str, seed: int, digits: int = 4) -> str:
     return "\n".join(lines) + "\n"
 
 
-def least_singular_value(robot, pose) -> float:
+def least_singular_value(robot, pose, drawn=None) -> float:
     """Return the least singular value of the Pluecker rows of six legs that end in ball joints.
 
     Forces are of 1 N and moments over the greatest radius of the platform points; far ends of rods
-    come from an own circle and sphere.
+    come from an own circle and sphere. Middle and radius are those of the drawn machine.
     """
     x, y, z, roll, pitch, yaw = pose
     place, turn = np.array([x, y, z]), _rotation(roll, pitch, yaw)
     points = np.array([leg.platform_point for leg in robot.legs])
-    middle = points.mean(axis=0)
-    length = np.linalg.norm(points - middle, axis=1).max()
+    figure = np.array([leg.platform_point for leg in (drawn or robot).legs])
+    middle = figure.mean(axis=0)
+    length = np.linalg.norm(figure - middle, axis=1).max()
     rows = []
     for leg, point in zip(robot.legs, points, strict=True):
         tip = place + turn @ point
