@@ -461,11 +461,11 @@ BAD_FILES = {
     "wrong number of legs": ('"3T1R"', '"3T"', "legs: 4 given, but a 3T platform has 3 freedoms"),
     "empty name": ('"quadrupteron"', '" "', "name: ' ' is not a text with at least one letter"),
     "legs that are none": ("[platform]", "legs = 3\n[platform]", "not a TOML file"),
-    "not TOML": ("mass = 0.8", "mass = = 0.8", "not a TOML file (Invalid value (at line 11"),
+    "not TOML": ("mass = 0.8", "mass = = 0.8", "not a TOML file (Invalid value (at line 13"),
     "a decimal comma": (
         "mass = 0.8",
         "mass = 0,8",
-        "not a TOML file (Expected newline or end of document after a statement (at line 11, "
+        "not a TOML file (Expected newline or end of document after a statement (at line 13, "
         "column 9); 0,8 has a decimal comma, write a point)",
     ),
     "a key twice": ("mass = 0.8", "mass = 0.8\nmass = 0.8", "not a TOML file (Cannot overwrite"),
