@@ -211,23 +211,15 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
     except ModelError:
         raise nowhere(robot) from None
     candidates = _candidates(robot)
-    refined = _refined(robot, _starts(robot, candidates))
+    starts = _starts(robot, candidates)
+    refined = np.concatenate([_levelled(robot, starts), _refined(robot, starts)])
     margins = _worth(robot, refined)
     most = float(margins.max())
     if most <= 0.0:
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
         raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
-    elbowed = any(len(leg.branches) > 1 for leg in robot.legs)
-    share = _ELBOWED_SIDE if elbowed else _SIDE
-    side, good = sides(robot, refined), margins >= share * most
-    above, below = (refined[good & (side == sign)] for sign in (1.0, -1.0))
-    angular = robot.platform.angular
-    pairs = [
-        (start, end)
-        for start, end in product(above[:_ENDS], below[:_ENDS])
-        if (np.abs(start - end)[angular] <= _ALIKE).all()
-    ]
-    if not pairs or any(_leads(robot, start, end, _AXIS * most) for start, end in pairs):
+    side = sides(robot, refined)
+    if not _are_mirrored(robot, refined, margins, side):
         return tuple(_simplest(robot, refined, candidates).tolist()), None
     beside = sides(robot, candidates)
     pose, mirror = (
@@ -235,6 +227,23 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
         for sign in (1.0, -1.0)
     )
     return pose, mirror
+
+
+def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array) -> bool:
+    """Return whether poses (K, m) on both sides of the base are good, and none leads across."""
+    elbowed = any(len(leg.branches) > 1 for leg in robot.legs)
+    most = margins.max()
+    good = margins >= (_ELBOWED_SIDE if elbowed else _SIDE) * most
+    above, below = (poses[good & (side == sign)] for sign in (1.0, -1.0))
+    angular = robot.platform.angular
+    pairs = [
+        (start, end)
+        for start, end in product(above[:_ENDS], below[:_ENDS])
+        if (np.abs(start - end)[angular] <= _ALIKE).all()
+    ]
+    if any(_leads(robot, start, end, _AXIS * most) for start, end in pairs):
+        return False
+    return bool(pairs) or (not elbowed and len(above) > 0 and len(below) > 0)
 
 
 def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
@@ -263,6 +272,18 @@ def _starts(robot: Manipulator, candidates: Array) -> Array:
         alike = candidates[(side == sign) & (level == flat)][:_NEAR]
         starts.append(_distinct(alike, _steps(robot, *_STEPS))[:_STARTS])
     return np.concatenate(starts)
+
+
+def _levelled(robot: Manipulator, starts: Array) -> Array:
+    """Return level poses of locally best margins, from those starts (S, m) that are level.
+
+    There are none of a platform that does not tilt: all its starts are improved as they are.
+    """
+    moved = ~robot.platform.angular
+    level = starts[~starts[:, robot.platform.angular].any(axis=-1)]
+    if not robot.platform.tilts or not moved.any():
+        return starts[:0]
+    return _refined(robot, level, moved)
 
 
 def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
