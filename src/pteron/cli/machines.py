@@ -150,11 +150,12 @@ def check(file: str, *, elbows: str | None = None) -> Result:
 
     It fails if the file is not valid, telling all its faults, if the machine is singular at every
     pose, or within what files are rounded to of one that is, or if no pose is in reach of all its
-    legs. It says where the platform is in each working
-    mode, above its base, below or inside, which is the file's and which is likely meant; of more
-    than eight modes the file's, its opposite, and those with all elbows alike. What is possible
-    but unlikely, such as a length in millimetres or a centre of mass beyond its link, is told as a
-    warning. The exit code is 2 where it fails, and 0 where not, warnings or none.
+    legs. It says where the platform is in each working mode, above its base, below or inside, which
+    is the file's and which is likely meant; of more than eight modes the file's, its opposite, and
+    those with all elbows alike. What is possible but unlikely, such as a length in millimetres, a
+    centre of mass beyond its link, or legs that look swapped, is told as a warning. How well drives
+    hold the platform at home is measured in absolute terms: docs/verdicts.md has the measures and
+    their thresholds. The exit code is 2 where it fails, and 0 where not, warnings or none.
 
     Arguments
     ---------
