@@ -19,6 +19,17 @@ from pteron.kinematics.singular_distance import coordinate_distances
 from pteron.manipulator import with_dimensions
 from pteron.manipulator.explained import explained
 from pteron.manipulator.template_masses import template_masses
+from pteron.thresholds import (
+    CROSSING,
+    HOLDING_FORCE,
+    HOLDING_FORCE_NEAR,
+    INACCURATE,
+    LEAST_SINGULAR_VALUE,
+    ROUNDING_OF_FILES,
+    SAME_PLACE,
+    SMALL_MACHINES,
+    STOUT_LINK,
+)
 from pteron.workspace import home_pose, home_poses, pose_margins
 from pteron.workspace.holding import holding, holding_warnings
 from pteron.workspace.leg_layout import layout_warnings
@@ -345,3 +356,57 @@ def test_links_of_144_kg_a_leg_under_40_kg_are_doubted(tmp_path):
     path = tmp_path / "robot.toml"
     path.write_text(text, "utf-8")
     assert "92.1107 kg on 0.7 m, more than the platform's 40 kg: solid steel" in check(path)[1]
+
+
+@pytest.mark.parametrize("seed", gated(range(6), {0}, CLIENTS))
+def test_rams_between_figures_that_are_not_plane_stand_above_their_base(seed):
+    """Both sides have poses, whose margins are no longer equal."""
+    path = Path("robot.toml")
+    path.write_text(machine_text("rams", seed), "utf-8")
+    robot = pteron.load(path)
+    radius = float(np.linalg.norm(robot.legs[0].platform_point))
+    legs = []
+    for i, leg in enumerate(robot.legs):
+        down, up = -0.15 * radius * (1.0 + 0.5 * (i % 2)), 0.1 * radius * (i // 2)
+        legs.append(
+            replace(
+                leg,
+                platform_point=np.round(np.add(leg.platform_point, (0.0, 0.0, down)), 4),
+                guide_point=np.round(np.add(leg.guide_point, (0.0, 0.0, up)), 4),
+            )
+        )
+    both = home_poses(replace(robot, legs=tuple(legs)))
+    assert both.mirror is not None
+    assert both.mirror[2] < 0.0 < both.pose[2]
+
+
+def test_no_message_suggests_other_dimensions_where_poses_are_in_reach():
+    robot = pteron.load(BUILT / "short-cranks.toml")
+    with pytest.raises(pteron.ModelError) as caught:
+        pteron.random_poses(robot, 5, type_ii=0.99)
+    assert "give poses of your own, or ask for lower measures" in str(caught.value)
+    assert not re.search("lengthen|nearer|widen", str(caught.value))
+
+
+def test_the_page_of_verdicts_has_the_thresholds_as_they_are():
+    """A threshold that changes is to change on the page, beside the sentence that explains it."""
+    page = (Path(__file__).parents[1] / "docs" / "verdicts.md").read_text("utf-8")
+    table = page[page.index("| words | measure") :].split("\n\n")[0]
+    rows = {row.split("|")[1].strip(): row.split("|")[3].strip() for row in table.splitlines()[2:]}
+    shown = {
+        "singular everywhere within": (
+            "0.1 mm, or L/1000",
+            (ROUNDING_OF_FILES, SMALL_MACHINES) == (1e-4, 1e-3),
+        ),
+        "coordinates that differ by ... make the machine": ("ten times that", INACCURATE == 10.0),
+        "least singular value": ("0.02", LEAST_SINGULAR_VALUE == 0.02),
+        "to hold the weight": ("10", HOLDING_FORCE == 10.0),
+        "near it a leg": ("100", HOLDING_FORCE_NEAR == 100.0),
+        "their links cross": ("2 %", CROSSING == 0.02),
+        "out of place": ("0.5 %", SAME_PLACE == 0.005),
+        "more than the platform's": ("0.15", STOUT_LINK == 0.15),
+    }
+    for words, (value, same) in shown.items():
+        (threshold,) = (text for key, text in rows.items() if key.startswith(words))
+        assert threshold.startswith(value)
+        assert same
