@@ -25,10 +25,9 @@ from pteron.thresholds import (
     HOLDING_FORCE_NEAR,
     INACCURATE,
     LEAST_SINGULAR_VALUE,
-    ROUNDING_OF_FILES,
     SAME_PLACE,
-    SMALL_MACHINES,
     STOUT_LINK,
+    rounding_of,
 )
 from pteron.workspace import home_pose, home_poses, pose_margins
 from pteron.workspace.holding import holding, holding_warnings
@@ -384,7 +383,6 @@ def test_no_message_suggests_other_dimensions_where_poses_are_in_reach():
     robot = pteron.load(BUILT / "short-cranks.toml")
     with pytest.raises(pteron.ModelError) as caught:
         pteron.random_poses(robot, 5, type_ii=0.99)
-    assert "give poses of your own, or ask for lower measures" in str(caught.value)
     assert not re.search("lengthen|nearer|widen", str(caught.value))
 
 

@@ -30,6 +30,10 @@ _SPARSE = 32
 """Batches after which a box in which few poses are in reach is left for poses that Newton's method
 leads to joint coordinates. The machines of the catalog take up to 11."""
 
+_LEADS = 32
+"""Most batches that are led so: each gives some hundred poses in reach, or the conditions on them
+are those that no pose keeps."""
+
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
 
@@ -181,7 +185,7 @@ def _drawn(
         total += len(found[-1])
         if total >= count:
             return np.concatenate(found)
-        if k >= _SPARSE and total < count * k / attempts:
+        if _SPARSE <= k < _SPARSE + _LEADS and total < count * k / attempts:
             # At this rate the box would not give enough.
             found.append(_led(robot, low, high, rng, wanted))
             total += len(found[-1])
