@@ -30,9 +30,9 @@ _SPARSE = 32
 """Batches after which a box in which few poses are in reach is left for poses that Newton's method
 leads to joint coordinates. The machines of the catalog take up to 11."""
 
-_LEADS = 32
-"""Most batches that are led so: each gives some hundred poses in reach, or the conditions on them
-are those that no pose keeps."""
+_BARREN = 8
+"""Batches that are led so in turn and give no pose, after which none is: each gives some hundred
+poses in reach, or the conditions on them are ones that hardly any pose keeps."""
 
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
@@ -173,7 +173,7 @@ def _drawn(
 ) -> Array:
     """Return at least `count` usable poses drawn from a box."""
     found: list[Array] = []
-    total = reached = 0
+    total = reached = barren = 0
     seen = np.empty((0, robot.freedom))
     attempts = _ATTEMPTS + count // 16
     for k in range(1, attempts + 1):
@@ -185,10 +185,11 @@ def _drawn(
         total += len(found[-1])
         if total >= count:
             return np.concatenate(found)
-        if _SPARSE <= k < _SPARSE + _LEADS and total < count * k / attempts:
+        if k >= _SPARSE and barren < _BARREN and total < count * k / attempts:
             # At this rate the box would not give enough.
             found.append(_led(robot, low, high, rng, wanted))
             total += len(found[-1])
+            barren = 0 if len(found[-1]) else barren + 1
             if total >= count:
                 return np.concatenate(found)
         # A quarter of the attempts tells, where many poses are wanted, that they will not be found.
