@@ -60,7 +60,7 @@ _SIDE = 0.5
 preferred, where no leg has an elbow whose side would tell: images of plane figures have equal
 margins, and of others a little less or more."""
 
-_ELBOWED_SIDE = 0.95
+_BRANCHED_SIDE = 0.95
 """The same where elbows tell: what stands on their other side by design has less than half of its
 margin there, and images that differ by less, as those of sliders on level guides, none at all."""
 
@@ -231,9 +231,9 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
 
 def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array) -> bool:
     """Return whether poses (K, m) on both sides of the base are good, and none leads across."""
-    elbowed = any(len(leg.branches) > 1 for leg in robot.legs)
+    branched = any(len(leg.branches) > 1 for leg in robot.legs)
     most = margins.max()
-    good = margins >= (_ELBOWED_SIDE if elbowed else _SIDE) * most
+    good = margins >= (_BRANCHED_SIDE if branched else _SIDE) * most
     above, below = (poses[good & (side == sign)] for sign in (1.0, -1.0))
     angular = robot.platform.angular
     pairs = [
@@ -243,7 +243,7 @@ def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array)
     ]
     if any(_leads(robot, start, end, _AXIS * most) for start, end in pairs):
         return False
-    return bool(pairs) or (not elbowed and len(above) > 0 and len(below) > 0)
+    return bool(pairs) or (not branched and len(above) > 0 and len(below) > 0)
 
 
 def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
