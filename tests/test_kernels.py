@@ -508,7 +508,7 @@ def test_a_rename_that_fails_brings_back_the_files_renamed_before(tmp_path, monk
         "three.h": "old",
     }
     (tmp_path / "two.h").mkdir()
-    with pytest.raises(OutputError, match=r"two\.h: is a folder"):
+    with pytest.raises(OutputError, match=r"two\.h: cannot be written .it is a folder"):
         atomic.write_texts(tmp_path, dict.fromkeys(names, "new"))
     assert (tmp_path / "one.h").read_text() == "old"
 

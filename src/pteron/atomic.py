@@ -57,7 +57,7 @@ def write_files(files: Mapping[Path, bytes]) -> list[Path]:
     """
     for target in files:
         if target.is_dir():
-            raise OutputError(f"{target}: is a folder; name another file, or remove it")
+            raise OutputError(f"{target}: cannot be written (it is a folder); name another file")
     written: dict[Path, Path] = {}
     try:
         for target, data in files.items():

@@ -85,10 +85,29 @@ class _Body(Table):
                     f"center_of_mass: {given} it and first_moment given; give one of the two"
                 )
             if self.first_moment is not None:
-                return self.kind(self.mass, self.first_moment, self.inertia)
+                return self._of_first_moment()
             return self.kind.of_body(self.mass, self.center_of_mass, self.inertia)
         except ModelError as error:
             raise ModelError(f"{key}.{error}" if key else str(error)) from None
+
+    def _of_first_moment(self) -> Any:
+        """Build the inertia from the first moment, and say if this alone makes it impossible."""
+        try:
+            return self.kind(self.mass, self.first_moment, self.inertia)
+        except ModelError as error:
+            moment = list(self.first_moment)
+            nothing: Any = (0.0,) * len(moment)
+            try:
+                self.kind(self.mass, nothing, self.inertia)
+            except ModelError:
+                raise error from None
+        center = ", ".join(f"{value / self.mass:.4g}" for value in moment)
+        raise ModelError(
+            f"first_moment: {moment} kg m with a mass of {self.mass:g} kg puts the centre of mass "
+            f"at ({center}) m, too far out for the inertia of {self.inertia} kg m^2; was mass "
+            "edited alone? Write center_of_mass, which stays, in place of first_moment, and "
+            "multiply inertia by what mass was multiplied by"
+        )
 
 
 _CENTER = "in the body's frame, m"

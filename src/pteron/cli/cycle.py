@@ -181,8 +181,11 @@ def _result(
 ) -> Result:
     import numpy as np
 
+    from pteron.manipulator.template_masses import template_masses
     from pteron.motion import peaks
 
+    if text := template_masses(machine):
+        note(f"Note: {text}")
     count = _DENSE * (len(motion.time) - 1) + 1
     fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
     found = peaks(machine, *motion.at(fine), limits)

@@ -149,11 +149,13 @@ def check(file: str, *, elbows: str | None = None) -> Result:
     """Check a machine's file and say what the machine is.
 
     It fails if the file is not valid, telling all its faults, if the machine is singular at every
-    pose, or if no pose is in reach of all its legs. It says where the platform is in each working
-    mode, above its base, below or inside, which is the file's and which is likely meant; of more
-    than eight modes the file's, its opposite, and those with all elbows alike. What is possible
-    but unlikely, such as a length in millimetres or a centre of mass beyond its link, is told as a
-    warning. The exit code is 2 where it fails, and 0 where not, warnings or none.
+    pose, or within what files are rounded to of one that is, or if no pose is in reach of all its
+    legs. It says where the platform is in each working mode, above its base, below or inside, which
+    is the file's and which is likely meant; of more than eight modes the file's, its opposite, and
+    those with all elbows alike. What is possible but unlikely, such as a length in millimetres, a
+    centre of mass beyond its link, or legs that look swapped, is told as a warning. How well drives
+    hold the platform at home is measured in absolute terms: docs/verdicts.md has the measures and
+    their thresholds. The exit code is 2 where it fails, and 0 where not, warnings or none.
 
     Arguments
     ---------
@@ -183,14 +185,23 @@ def check(file: str, *, elbows: str | None = None) -> Result:
 
 
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
+    import numpy as np
+
     from pteron.kinematics import architecture, inverse_kinematics, singular_orientations
-    from pteron.workspace import home_pose, limited_joints, pose_margins
+    from pteron.manipulator.template_masses import template_masses
+    from pteron.workspace import home_poses, limited_joints, pose_margins
+    from pteron.workspace.holding import holding, holding_warnings, singular_within_rounding
+    from pteron.workspace.leg_layout import layout_warnings
     from pteron.workspace.load_warnings import load_warnings
     from pteron.workspace.mode_places import elbow_warnings, mode_places
     from pteron.workspace.screw_lengths import screw_warnings
 
     # Refuses a singular layout, and one without a common reach with by how much legs miss it
-    home = home_pose(robot)
+    both = home_poses(robot)
+    home = np.array(both.pose)
+    held = holding(robot, home)
+    if reason := singular_within_rounding(robot, held):
+        raise ModelError(reason)
     layout = architecture(robot)
     loose = () if layout.holds is not False else (_LOOSE,)
     position = home[: len(robot.platform.lengths)]
@@ -207,15 +218,19 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "tool": list(robot.platform.tool),
         "home_pose": home.tolist(),
         "home_reserve": float(pose_margins(robot, home).least),
+        "home_named": both.named,
+        "mirror_pose": None if both.mirror is None else list(both.mirror),
+        "holding": asdict(held),
         "working_modes": [
             picked(mode, "elbows=signs place depth pose margin named likely") for mode in modes
         ],
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": layout.holds,
         "self_motions": list(layout.self_motions),
+        "template_masses": template_masses(robot),
         "doubts": [
-            *(*unlikely, *loose, *elbow_warnings(modes)),
-            *(*load_warnings(robot, home), *screw_warnings(robot)),
+            *(*unlikely, *loose, *layout_warnings(robot, home), *holding_warnings(held)),
+            *(*elbow_warnings(modes), *load_warnings(robot, home), *screw_warnings(robot)),
         ],
     }
 
@@ -265,13 +280,43 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         *([f"At 0 cranks point {zero}."] if (zero := pointing(robot)) else []),
         *_drives(robot),
         *singular,
-        f"Home pose: {_vector(found['home_pose'])}, margin {found['home_reserve']:.2f} of 1",
+        *_home_lines(robot, found),
         *_modes(found["working_modes"]),
         *_passive(found["limited_joints"]),
         *tool,
+        *([f"Note: {text}"] if (text := found["template_masses"]) else []),
         *(f"The platform can move with its rams held {text}" for text in found["self_motions"]),
         work,
     )
+
+
+def _home_lines(robot: Manipulator, found: dict[str, Any]) -> list[str]:
+    """Return lines on the home pose, its mirror image, and how the drives hold the platform."""
+    import numpy as np
+
+    from pteron.workspace.margins import least_margin_text
+
+    margin = least_margin_text(robot, np.array(found["home_pose"]))
+    source = ", from the file" if found["home_named"] else ""
+    lines = [f"Home pose: {_vector(found['home_pose'])}{source}; least margin {margin}"]
+    if found["mirror_pose"] is not None:
+        lines.append(
+            f"Its mirror image on the other side of the base: {_vector(found['mirror_pose'])}; "
+            "home is the one along the platform's axis. \\[home] pose in the file names another"
+        )
+    held = found["holding"]
+    distance = "none" if held["distance"] == math.inf else f"{1e3 * held['distance']:.3g} mm"
+    moments = f" (moments over {held['length']:.3g} m)" if robot.platform.angles else ""
+    lines.append(
+        f"At home: least singular value {held['least_singular_value']:.2g} of unit rows{moments}; "
+        f"coordinates off by {distance} make it singular"
+    )
+    if held["weight"] > 0.0:
+        lines.append(
+            f"Weight of all bodies: {held['weight']:.3g} N; a leg holds at most "
+            f"{held['force']:.2g} times as much at home, {held['force_near']:.2g} about it"
+        )
+    return lines
 
 
 def _drives(robot: Manipulator) -> list[Table]:
@@ -294,7 +339,7 @@ def _modes(modes: list[dict[str, Any]]) -> list[Table]:
             at = f"({' '.join(f'{value:.3g}' for value in mode['pose'])})"
             where = (f"{mode['place']} the base", at, f"{mode['margin']:.2f}")
         rows.append((mode["elbows"], *where, ", ".join(said)))
-    headings = ("elbows", "platform", "e.g. at", "margin", "which")
+    headings = ("elbows", "platform", "pose", "least margin", "which")
     return [table(*headings, rows=rows, numbers=headings[:4])] if rows else []
 
 

@@ -124,7 +124,7 @@ def moved(
         given = {key: tuple(parts) if len(parts) > 1 else parts[0] for key, parts in fields.items()}
         other = replace(leg, **given)
         legs[i - 1] = with_stretched_bodies(leg, other) if stretch else other
-    return replace(robot, legs=tuple(legs))
+    return replace(robot, legs=tuple(legs), home=None)
 
 
 def geometry_slopes(

@@ -23,14 +23,15 @@ _SHARE = 0.5
 def start_pose(robot: Manipulator) -> Array:
     """Return a pose (m,) to start from: zero if it is a good one, else amid the good ones.
 
-    Of a platform that tilts it is the home pose, which is level where that can be.
+    Of a platform that tilts it is the home pose, which is level where that can be; so it is where
+    the machine's file names its home.
 
     Raises
     ------
     ModelError
         If the machine has no such pose.
     """
-    if robot.platform.tilts:
+    if robot.platform.tilts or robot.home is not None:
         return home_pose(robot)
     poses = good_poses(robot)
     if len(poses) == 0:

@@ -181,7 +181,7 @@ def _bare(robot: Manipulator) -> Manipulator:
         for leg in robot.legs
     )
     platform = robot.platform.with_joined(plain(robot.platform.joined))
-    return replace(robot, name="any", legs=legs, platform=platform, radii=None, tools=())
+    return replace(robot, name="any", legs=legs, platform=platform, radii=None, tools=(), home=None)
 
 
 class _Form(NamedTuple):

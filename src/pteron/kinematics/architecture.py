@@ -127,7 +127,7 @@ def _architecture(robot: Manipulator) -> Architecture:
         if not len(poses):
             raise ModelError(
                 "no pose was found that all legs reach, so that none shows whether the layout is "
-                "singular; bring the guide points nearer or lengthen the links",
+                "singular; `pteron check` says by how much legs miss the nearest one",
                 subject=robot.name,
             )
         moving = self_motions_of_rams(robot)

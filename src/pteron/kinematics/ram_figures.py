@@ -60,6 +60,26 @@ def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
     return (base, top) if base.any() and top.any() else None
 
 
+def similarity(robot: Manipulator) -> tuple[float, float] | None:
+    """Return a hexapod's platform figure over its base figure, and how far it is from similar, m.
+
+    None where the machine is no hexapod of rams. The distance is the greatest of a platform point
+    from its image.
+    """
+    figures = ram_figures(robot)
+    if figures is None:
+        return None
+    turned, factor = _similar(*figures)
+    return factor, float(np.linalg.norm(figures[1] - factor * turned, axis=1).max())
+
+
+def _similar(base: Array, top: Array) -> tuple[Array, float]:
+    """Return the base's figure turned to the platform's, and the best factor between them."""
+    left, _, right = np.linalg.svd(base.T @ top)
+    turned = base @ left @ right
+    return turned, float((turned * top).sum() / (turned * turned).sum())
+
+
 def _vanishes(rows: Array, rank: int) -> bool:
     values = np.linalg.svd(rows, compute_uv=False)
     return bool(values[rank] <= ROUNDING * values[0])
@@ -71,9 +91,7 @@ def _with_one(figure: Array) -> Array:
 
 def _alike(base: Array, top: Array) -> str:
     """Say how large the platform's figure is beside the base's, if they are similar."""
-    left, _, right = np.linalg.svd(base.T @ top)
-    turned = base @ left @ right
-    factor = float((turned * top).sum() / (turned * turned).sum())
+    turned, factor = _similar(base, top)
     if np.linalg.norm(top - factor * turned) > ROUNDING * np.linalg.norm(top):
         return ""
     where = " on a conic" if _on_conics(base) else ""

@@ -29,6 +29,14 @@ _ATTEMPTS = 250
 _MANY = 50
 """Number of wanted poses from which a search that finds few ends after a quarter of its batches."""
 
+_SPARSE = 32
+"""Batches after which a box in which few poses are in reach is left for poses that Newton's method
+leads to joint coordinates. The machines of the catalog take up to 11."""
+
+_BARREN = 8
+"""Batches that are led so in turn and give no pose, after which none is: each gives some hundred
+poses in reach, or the conditions on them are ones that hardly any pose keeps."""
+
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
 
@@ -97,11 +105,12 @@ def sampled_poses(
 
 def _search(robot: Manipulator, count: int, rng: np.random.Generator, wanted: _Wanted) -> _Sample:
     """Return a sample of at least `count` usable poses, or of as many as are found."""
-    widest = _widest_box(robot)
+    widest = widest_box(robot)
     every = np.ones(robot.freedom, dtype=bool)
-    led = _led(robot, *widest, rng, wanted)
-    if len(led) >= _SCOUTS:
-        return _drawn(robot, *_box_about(led, 0.05, every, widest), count, rng, wanted)
+    if wanted.limits and all(leg.limits for leg in robot.legs):
+        led = _led(robot, *widest, rng, wanted)
+        if len(led) >= _SCOUTS:
+            return _drawn(robot, *_box_about(led, 0.05, every, widest), count, rng, wanted)
     scouts = min(count, _SCOUTS)
     sample = _drawn(robot, *widest, scouts, rng, wanted)
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
@@ -188,7 +197,7 @@ class _Sample:
     """Some poses with the measures."""
 
 
-def _widest_box(robot: Manipulator) -> tuple[Array, Array]:
+def widest_box(robot: Manipulator) -> tuple[Array, Array]:
     """Return the ends of a box (m,) of poses from which to draw."""
     center, radius = search_ball(robot)
     platform = robot.platform
@@ -213,18 +222,32 @@ def _led(
 ) -> Array:
     """Return usable poses that Newton's method leads from a box to random joint coordinates.
 
-    Short rams leave so little of the box that next to no pose of it keeps their limits. None is led
-    where the platform does not tilt, or a joint has no limits.
+    Short rams and short cranks leave so little of the box that next to no pose of it is in reach.
+    None is led where the platform does not tilt, or a joint has no range (`_joint_ranges`).
     """
-    if not (wanted.limits and robot.platform.tilts and all(leg.limits for leg in robot.legs)):
+    ranges = _joint_ranges(robot, limits=wanted.limits)
+    if ranges is None:
         return np.empty((0, robot.freedom))
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
-    least, most = joint_limits(robot)
-    joints = rng.uniform(least, most, (_BATCH, robot.joint_count))
+    joints = rng.uniform(ranges[0], ranges[1], (_BATCH, robot.joint_count))
     for _ in range(_LEADING):
         poses = numeric(robot, "newton_step")(joints, poses)[0]
     poses = poses[((low <= poses) & (poses <= high)).all(axis=-1)]
     return wanted.kept(robot, wanted.reached(robot, poses))
+
+
+def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
+    """Return the ranges (2, n) of joints, m or rad, of a platform that tilts, if all have one.
+
+    A crank has a turn where it has no limits, or where these do not count.
+    """
+    if not robot.platform.tilts:
+        return None
+    low, high = joint_limits(robot).copy()
+    cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+    turning = cranks & (np.isinf(low) if limits else True)
+    low[turning], high[turning] = -np.pi, np.pi
+    return None if np.isinf(low).any() else np.array([low, high])
 
 
 def _drawn(
@@ -238,7 +261,8 @@ def _drawn(
     """Return at least `count` usable poses drawn from a box, or as many as are found."""
     usable = [np.empty((0, robot.freedom))]
     sample = _Sample(usable[0], seen=usable[0])
-    total, attempts = 0, _ATTEMPTS + count // 16
+    total = barren = 0
+    attempts = _ATTEMPTS + count // 16
     for k in range(1, attempts + 1):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
         poses = 0.5 * (low + high) + 0.5 * (high - low) * poses
@@ -249,6 +273,11 @@ def _drawn(
             sample.seen = np.concatenate([sample.seen, poses])
         usable.append(wanted.kept(robot, poses))
         total += len(usable[-1])
+        if k >= _SPARSE and barren < _BARREN and total < count * k / attempts:
+            # At this rate the box would not give enough.
+            usable.append(_led(robot, low, high, rng, wanted))
+            total += len(usable[-1])
+            barren = 0 if len(usable[-1]) else barren + 1
         # A quarter of the attempts tells, where many poses are wanted, that they will not be found.
         few = k == attempts // 4 and count >= _MANY and total < count / 16
         if total >= count or few:
@@ -311,15 +340,15 @@ def _too_few(robot: Manipulator, count: int, sample: _Sample, wanted: _Wanted) -
             f"{'joints' if robot.platform.tilts else 'passive joints'}: "
             f"{_seldom_kept(robot, sample.seen)}; widen these limits"
         )
-    elif not sample.reached:
+    elif not (sample.reached or total):
         text = (
-            f"only 0 of {sample.tried} random poses are in reach of all legs; bring the guide "
-            "points nearer or lengthen the links"
+            f"none of {sample.tried} random poses is in reach of all legs: `pteron check` says "
+            "whether any pose is"
         )
     elif sample.reached < count:
         text = (
-            f"only {sample.reached} of {sample.tried} random poses are in reach of all legs, and "
-            f"{count} are wanted; ask for fewer"
+            f"only {max(sample.reached, total)} of {sample.tried} random poses are in reach of all "
+            f"legs, and {count} are wanted; ask for fewer"
         )
     else:
         text = _below_floors(robot, sample, wanted)

@@ -83,8 +83,10 @@ def with_dimensions(
 ) -> Manipulator:
     """Return a machine of the same kind with other dimensions, which hold for all of its legs.
 
-    Links of another length keep their section, unless a stock says what they are cut from. Limits
-    of joints, and the platform's mass and inertia, stay unless they are given.
+    Links of another length keep their section, unless a stock says what they are cut from; so do
+    a ram's cylinder and piston, which are as long as its shortest length. Limits
+    of joints, and the platform's mass and inertia, stay unless they are given. A home that the file
+    names is left out where lengths or limits change.
 
     Parameters
     ----------
@@ -123,6 +125,8 @@ def with_dimensions(
     0.1167
     """
     robot = as_manipulator(robot)
+    if any(value is not None for value in (base_radius, platform_radius, crank, rod, limits)):
+        robot = replace(robot, home=None)
     if base_radius is not None:
         robot = _with_base(robot, positive(base_radius, "base_radius", "m"))
     if platform_radius is not None:
@@ -132,12 +136,18 @@ def with_dimensions(
             robot = _with_length(robot, name, body, positive(value, name, "m"))
     if limits is not None:
         held = interval(limits, "limits")
-        robot = _of_legs(robot, (replace(leg, limits=held) for leg in robot.legs))
+        robot = _of_legs(robot, (_with_limits(leg, held) for leg in robot.legs))
     for key, given in (stock or {}).items():
         robot = _cut(robot, key, Stock.of(given) if isinstance(given, str) else given)
     if platform_mass is not None:
         robot = _with_mass(robot, positive(platform_mass, "platform_mass", "kg"))
     return robot
+
+
+def _with_limits(leg: LegKind, limits: tuple[float, float]) -> LegKind:
+    """Return a leg with limits; a ram's cylinder and piston are as long as its shortest length."""
+    changed = replace(leg, limits=limits)
+    return changed if changed.extents == leg.extents else with_stretched_bodies(leg, changed)
 
 
 def _with_mass(robot: Manipulator, mass: float) -> Manipulator:

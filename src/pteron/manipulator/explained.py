@@ -54,9 +54,28 @@ def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = N
         about += [_FOLLOWS[key].format(_told(value)) for key, value in dimensions.items()]
         about += kept(robot, dimensions)
     legs = [{"type": DEFAULT_KIND, **leg} for leg in given["legs"]]
-    return written(
-        {**given, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}, explained=True, about=about
-    )
+    document_ = {**given, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}
+    return written(_with_centers(document_), explained=True, about=about)
+
+
+def _with_centers(table: Any) -> Any:
+    """Return a file's tables with each body's centre of mass in place of its first moment.
+
+    So an edit of the mass alone leaves the centre of mass where it is. A body without mass keeps
+    its first moment.
+    """
+    if isinstance(table, list | tuple):
+        return [_with_centers(value) for value in table]
+    if not isinstance(table, Mapping):
+        return table
+    mass, made = table.get("mass"), {}
+    for key, value in table.items():
+        if key == "first_moment" and mass:
+            center = [float(f"{moment / mass:.12g}") + 0.0 for moment in value]
+            made["center_of_mass"] = center
+        else:
+            made[key] = _with_centers(value)
+    return made
 
 
 def kept(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:

@@ -92,10 +92,20 @@ def load(name_or_path: str | Path) -> Manipulator:
 @lru_cache(maxsize=64)
 def read_machine(data: bytes, source: str, given: str) -> tuple[Manipulator, tuple[str, ...]]:
     """Return the machine of a file's contents, and warnings; what was read once is kept."""
-    robot = _machine(parsed_toml(data, source, ModelError), given)
+    document = parsed_toml(data, source, ModelError)
+    robot = _machine(document, given)
     # Pteron writes first moments, persons centres of mass: what identification finds for a body
     # alone is one of many equivalent values, and need not be likely.
-    return robot, machine_warnings(robot, bodies=b"first_moment" not in data)
+    return robot, machine_warnings(robot, bodies=not _has_first_moments(document))
+
+
+def _has_first_moments(table: Any) -> bool:
+    """Return whether a body of a file has a first moment."""
+    if isinstance(table, list):
+        return any(map(_has_first_moments, table))
+    if not isinstance(table, dict):
+        return False
+    return "first_moment" in table or any(map(_has_first_moments, table.values()))
 
 
 def document(name_or_path: str | Path) -> dict[str, Any]:
@@ -152,9 +162,12 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
         # What was told already is not told again.
         name = "?" if machine.name is None else machine.name
         known = built if machine.legs is not None else [None] * len(platform.coordinates)
-        reading.faults += faults_of(name, platform, known, tools)
+        home = None if machine.home is None else tuple(machine.home.pose or ())
+        reading.faults += faults_of(name, platform, known, tools, home)
         if not reading.faults:
-            return Manipulator(name, platform, tuple(built), machine.gravity, radii, tuple(tools))
+            return Manipulator(
+                name, platform, tuple(built), machine.gravity, radii, tuple(tools), home
+            )
     subject = shown(source, bare=True, longest=1000)
     raise ModelError(told(reading.faults), subject=subject, faults=reading.faults)
 

@@ -14,6 +14,7 @@ from pteron.legs import LegKind
 from pteron.legs.drive_warnings import drive_warnings
 from pteron.manipulator.manipulator import Manipulator, told_legs
 from pteron.platforms import Platform
+from pteron.thresholds import STOUT_LINK
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
@@ -24,6 +25,9 @@ ends have 3."""
 
 _DENSE = 300.0
 """Mass of a link over its length, kg/m, beyond which grams are likelier: steel 0.2 m thick."""
+
+_STEEL = 7850.0
+"""Density, kg/m^3."""
 
 _HEAVY = 100.0
 """Mass of a platform over that of its legs, beyond which grams are likelier."""
@@ -172,8 +176,16 @@ def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[st
         body: Any = leg.bodies[letter]
         if text := leg.beyond_ends(letter, body.center_of_mass[0]):
             yield f"{key}: center_of_mass: {text}"
-        if body.mass > _DENSE * (high - low):
-            yield f"{key}: mass: {body.mass:g} kg on {high - low:g} m: is it in grams?"
+        length = high - low
+        thick = sqrt(4.0 * body.mass / (pi * _STEEL * length))
+        if body.mass > _DENSE * length:
+            yield f"{key}: mass: {body.mass:g} kg on {length:g} m: is it in grams?"
+        elif thick > STOUT_LINK * length and body.mass > platform.joined.mass:
+            yield (
+                f"{key}: mass: {body.mass:g} kg on {length:g} m, more than the platform's "
+                f"{platform.joined.mass:g} kg: solid steel {1e3 * thick:.0f} mm thick: is it this "
+                "machine's?"
+            )
         yield from (f"{key}: {text}" for text in _unlike_a_bar(body, high - low))
 
 

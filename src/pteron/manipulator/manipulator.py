@@ -57,6 +57,8 @@ class Manipulator:
         How thick its bodies are, for `pteron.workspace.clearance`.
     tools : tuple of Tool
         Tools that the platform can carry; `pteron.motion.with_tool` mounts one.
+    home : tuple of float, optional
+        The pose, m and rad, where the machine stands; `pteron.workspace.home_pose` finds one.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class Manipulator:
     gravity: Vector = STANDARD_GRAVITY
     radii: Radii | None = None
     tools: tuple[Tool, ...] = ()
+    home: tuple[float, ...] | None = None
 
     def __hash__(self) -> int:
         """Hash once: the public functions look machines up at every call."""
@@ -86,10 +89,12 @@ class Manipulator:
 
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
-        refuse(faults_of(self.name, self.platform, legs, self.tools))
+        refuse(faults_of(self.name, self.platform, legs, self.tools, self.home))
         legs = tuple(leg.under(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))
+        if self.home is not None:
+            object.__setattr__(self, "home", tuple(float(value) for value in self.home))
         object.__setattr__(self, "platform", _held(self.platform, legs))
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
@@ -189,9 +194,10 @@ def faults_of(
     platform: Platform,
     legs: Sequence[LegKind | None],
     tools: Sequence[Tool] = (),
+    home: Sequence[float] | None = None,
 ) -> list[str]:
     """Return all that is wrong with a machine, a line each; a leg that is None is wrong itself."""
-    found = [*name_faults(name), *tool_faults(platform, tools)]
+    found = [*name_faults(name), *tool_faults(platform, tools), *_home_faults(platform, home)]
     freedom = len(platform.coordinates)
     if len(legs) != freedom:
         found.append(
@@ -204,6 +210,20 @@ def faults_of(
         return found
     under = [leg.under(platform.frame) for leg in given.values()]
     return (_slack if platform.tilts else _loose)(platform, under)
+
+
+def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[str]:
+    """Yield why a home cannot be a pose of the platform."""
+    if home is None:
+        return
+    names = platform.coordinates
+    if len(home) != len(names):
+        yield (
+            f"home.pose: {len(home)} values given, {len(names)} expected: "
+            f"{', '.join(names)} (m and rad)"
+        )
+    elif not all(map(math.isfinite, home)):
+        yield f"home.pose: {list(home)} given, finite numbers expected"
 
 
 def _misfits(platform: Platform, leg: object) -> Iterator[str]:

@@ -62,6 +62,8 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
         machine["tools"] = [
             {k: v for k, v in asdict(tool).items() if v is not None} for tool in robot.tools
         ]
+    if robot.home is not None:
+        machine["home"] = {"pose": robot.home}
     machine |= {"platform": platform, "legs": legs}
     found: dict[str, Any] = _plain(machine)
     return found

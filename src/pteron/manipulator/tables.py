@@ -156,6 +156,12 @@ class ToolTable(Table):
     )
 
 
+class HomeTable(Table):
+    """`[home]`: where the machine stands before it moves."""
+
+    pose: list[Number] = key("the pose's coordinates in their order, m and rad")
+
+
 class MachineTable(Table):
     """The whole file; each of `legs` is read by its own kind."""
 
@@ -170,6 +176,9 @@ class MachineTable(Table):
         "tools that the platform can carry, beside what it is",
         [],
         [{"name": "gripper", "point": [0.0, 0.0, -0.08], "mass": 0.3}],
+    )
+    home: HomeTable | None = key(
+        "where the machine stands; left out, it is found: see home_pose", None
     )
     platform: PlatformTable = key("what the legs carry")
     legs: list[Any] = key("one table for each freedom of the platform")

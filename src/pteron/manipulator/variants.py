@@ -44,9 +44,12 @@ def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
 
 
 def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
-    """Return the machine in the working mode that has these elbows, +1 or -1 for each leg."""
-    legs = zip(robot.legs, signs, strict=True)
-    return replace(robot, legs=tuple(replace(leg, elbow=sign) for leg, sign in legs))
+    """Return the machine in the working mode that has these elbows, +1 or -1 for each leg.
+
+    The home that its file names is that of the file's working mode alone.
+    """
+    legs = tuple(replace(leg, elbow=sign) for leg, sign in zip(robot.legs, signs, strict=True))
+    return replace(robot, legs=legs, home=robot.home if legs == robot.legs else None)
 
 
 def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Manipulator:
@@ -85,10 +88,16 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
     # A 2R platform's frame is the base frame at angles zero.
     on_platform = robot.platform.second_axis is not None
     legs = tuple(leg.turned(turn, platform=on_platform) for leg in robot.legs)
+    platform, home = robot.platform.turned(turn), robot.home
+    if home is not None:
+        count = len(platform.lengths)
+        place = matrix @ (np.array(home[:count]) @ robot.platform.directions)
+        home = (*(platform.directions @ place).tolist(), *home[count:])
     return replace(
         robot,
-        platform=robot.platform.turned(turn),
+        platform=platform,
         legs=legs,
         tools=tuple(tool.turned(turn) for tool in robot.tools) if on_platform else robot.tools,
+        home=home,
         gravity=turn(robot.gravity) if gravity else robot.gravity,
     )

@@ -14,7 +14,7 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.installed import kind_named, kind_names
 from pteron.manipulator.leg_tables import leg_table
-from pteron.manipulator.tables import MachineTable, platform_table
+from pteron.manipulator.tables import HomeTable, MachineTable, platform_table
 
 _WIDTH = 110
 """Width of comments that have lines of their own."""
@@ -40,8 +40,10 @@ def written(
     """
     head = [*about, *([*_CONVENTIONS, _bodies()] if explained else [f"For Pteron. {_UNITS}"])]
     lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]
-    own = {key: value for key, value in document.items() if key not in ("platform", "legs")}
+    own = {k: value for k, value in document.items() if k not in ("home", "platform", "legs")}
     lines += ["", *_block("", MachineTable, own, explained)]
+    if "home" in document:
+        lines += ["", *_block("home", HomeTable, document["home"], explained)]
     carried = document["platform"]
     model = platform_table(carried["motion"])
     lines += ["", *_block("platform", model, carried, explained)]

@@ -18,6 +18,7 @@ from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_warnings import machine_warnings
+from pteron.manipulator.template_masses import template_masses
 from pteron.motion import (
     Motion,
     PickAndPlace,
@@ -185,6 +186,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         robot=robot,
         doubts=(
             *(machine_warnings(robot) + load_warnings(robot, home) + screw_warnings(robot)),
+            *([masses] if (masses := template_masses(robot)) else []),
             *(() if motion is None else force_doubts(robot, motion)),
         ),
         home=home,

@@ -25,7 +25,11 @@ if TYPE_CHECKING:
         FreeRegion as FreeRegion,
         free_of_singularities as free_of_singularities,
     )
-    from pteron.workspace.home import home_pose as home_pose
+    from pteron.workspace.home import (
+        HomePoses as HomePoses,
+        home_pose as home_pose,
+        home_poses as home_poses,
+    )
     from pteron.workspace.inscribed import (
         Inscribed as Inscribed,
         largest_cube as largest_cube,

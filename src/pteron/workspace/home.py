@@ -1,13 +1,13 @@
 """The home pose: where a machine has the best margin to singularities and limits.
 
 The margin counts turning of the platform as a loss. Among poses of nearly equal margin a simple one
-is taken: level, on an axis of symmetry, with little joint travel, in round numbers.
+is taken: on the side of its base where its axis points, level, on an axis of symmetry, with little
+joint travel, in round numbers.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 
@@ -18,36 +18,62 @@ from numpy.typing import NDArray
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
 from pteron.kernels.kept import kept_result
-from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
+from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.shapes import Numbers
+from pteron.workspace.home_starts import (
+    axis_poses,
+    grid_poses,
+    mid_range_poses,
+    random_box_poses,
+    sides,
+)
 from pteron.workspace.margins import pose_margins
+from pteron.workspace.simplex_ascent import climb
 from pteron.workspace.unreachable import beyond_limits, nowhere
 
-_DRAWN = 200
-"""Random poses that the search starts from."""
+_STARTS = 8
+"""Best poses of each kind, on each side of the base, that are improved by a local search."""
 
-_MEASURES = 0.3, 0.02, 0.0
-"""Least type-I and type-II measures of these poses, tried in turn; 0 where reach is small."""
-
-_STARTS = 12
-"""Random poses, the best ones, that are improved by a local search."""
+_NEAR = 200
+"""Best candidates among which those that differ are chosen, and that the axis is sought with."""
 
 _LEVELLED = 4
 """The best of these, made level, that are improved by another."""
 
-_STEPS = (0.02, 0.2)
-"""Size of a local search's first simplex: m and rad."""
+_STEPS = (0.05, 0.2)
+"""Size of a local search's first simplex: share of the longest leg, and rad."""
 
-_METRES = (0.1, 0.05, 0.01, 0.001)
-"""Round numbers that the pose is rounded to, coarsest first, m."""
+_ROUND = (0.1, 0.05, 0.01, 0.005, 0.001, 0.0001)
+"""Round numbers that the pose is rounded to, coarsest first: shares of the power of ten that the
+longest leg does not exceed."""
 
 _DEGREES = (30.0, 15.0, 5.0, 1.0)
 """The same of angles, degrees."""
 
 _WORTH = 0.99
 """Share of the best margin from which on a simpler pose is preferred."""
+
+_SIDE = 0.5
+"""Share of the best margin from which on the side of the base along the platform's axis is
+preferred, where no leg has an elbow whose side would tell: images of plane figures have equal
+margins, and of others a little less or more."""
+
+_BRANCHED_SIDE = 0.95
+"""The same where elbows tell: what stands on their other side by design has less than half of its
+margin there, and images that differ by less, as those of sliders on level guides, none at all."""
+
+_BETWEEN = 101
+"""Poses looked at between one side of the base and the other: mirror images have a singularity, or
+none in reach, between them; elsewhere the platform goes from one to the other."""
+
+_ALIKE = 0.5
+"""Greatest difference of angles, rad, of poses that may be mirror images: those of level ones have
+none, and of others what a local search leaves."""
+
+_ENDS = 4
+"""Poses on each side from which such a way is sought."""
 
 _AXIS = 0.1
 """Share of the best margin from which on a pose on the axis of a machine's symmetry is
@@ -63,13 +89,35 @@ _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine moves every way."""
 
 
+@dataclass(frozen=True)
+class HomePoses:
+    """The home of a machine, and its image on the other side of the base.
+
+    Attributes
+    ----------
+    pose : tuple of float
+        The home pose, m and rad.
+    mirror : tuple of float or None
+        The best pose on the other side of the base, if its margin is at least half of the best, or
+        95 % where elbows tell the side.
+    named : bool
+        Whether the machine's file names its home.
+    """
+
+    pose: tuple[float, ...]
+    mirror: tuple[float, ...] | None
+    named: bool = False
+
+
 def home_pose(robot: RobotLike) -> Array:
     """Return the pose with the best margin, rounded where that costs next to nothing.
 
-    The margin is the smallest of the type-I and type-II measures and of the joints' margins
-    (see `PoseMargins`) and, where the platform turns, of what is left of half a turn from 0: a
-    machine seldom works the wrong way round. A random search with a fixed seed finds it, and Nelder
-    and Mead's method refines it. The result is always the same for the same machine.
+    A machine's file may name it (`[home] pose`). Else the margin decides, the smallest of the
+    type-I and type-II measures and of the joints' margins (see `PoseMargins`) and, where the
+    platform turns, of what is left of half a turn from 0: a machine seldom works the wrong way
+    round. The search begins at level poses on the platform's axis and at joints in the middle of
+    their ranges, and Nelder and Mead's method improves the best. The result is always the same for
+    the same machine, and of a machine of another size the same in proportion.
 
     Parameters
     ----------
@@ -79,16 +127,20 @@ def home_pose(robot: RobotLike) -> Array:
     Returns
     -------
     array, shape (m,)
-        m and rad. Its margin is at least 98 % of the best one found. Of equals it is the one whose
-        sliders are nearest to their guide points, and cranks to their zero; or the middle between
-        them, if that has 90 %. A platform that tilts is level, all its angles 0, if the best level
-        pose has 75 %. Of a machine that a turn about the platform's axis leaves as it is, it is on
-        that axis, if the best place there has 10 %.
+        m and rad. Where both sides of the base have poses with at least half of the best margin, or
+        95 % of it where legs have elbows, and no straight way leads from one to the other, it is on
+        the side along the platform's axis, or against gravity of a machine that moves in a plane
+        across it; `home_poses` returns the other too. Its margin is at least 98 % of the best
+        one found there. Of equals it is the one whose sliders are nearest to their guide points,
+        and cranks to their zero; or the middle between them, if that has 90 %. A platform that
+        tilts is level, all its angles 0, if the best level pose has 75 %. Of a machine that a turn
+        about the platform's axis leaves as it is, it is on that axis, if the best place there has
+        10 %.
 
     Raises
     ------
     ModelError
-        If no pose is in reach of all legs and within the joints' limits.
+        If no pose is in reach of all legs and within the joints' limits, or if the file's is not.
     SingularPose
         If the machine is singular at every pose.
 
@@ -99,32 +151,151 @@ def home_pose(robot: RobotLike) -> Array:
     >>> home_pose(pteron.load("quadrupteron"))
     array([0., 0., 0., 0.])
     """
+    return np.array(home_poses(robot).pose)
+
+
+def home_poses(robot: RobotLike) -> HomePoses:
+    """Return the home pose and its image on the other side of the base, if there is one.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+
+    Returns
+    -------
+    HomePoses
+
+    Examples
+    --------
+    >>> from pteron.workspace import home_poses
+    >>> home_poses("stewart").mirror is None
+    True
+    """
     robot = as_manipulator(robot)
+    if robot.home is not None:
+        expect_usable(robot, np.array(robot.home))
+        return HomePoses(robot.home, None, named=True)
     # Neither bodies nor drives matter; a refusal tells the name.
-    return np.array(_stored(replace(bare(robot), name=robot.name)))
+    return HomePoses(*_stored(replace(bare(robot), name=robot.name)))
+
+
+def expect_usable(robot: Manipulator, pose: Array) -> None:
+    """Refuse a home pose (m,) of a file that legs do not reach, or that passes limits."""
+    least = float(_worth(robot, pose[None])[0])
+    if least <= 0.0:
+        margins = pose_margins(robot, pose)
+        legs = np.minimum(margins.type_i, margins.joints)
+        where = f"leg {int(legs.argmin()) + 1} is out of reach or beyond a limit there"
+        if legs.min() > 0.0:
+            where = "the drives do not hold the platform there (type II), or it is turned back"
+        raise ModelError(
+            f"home.pose: {pose.tolist()}: {where}; give a pose in reach, within limits, or leave "
+            "[home] out",
+            subject=robot.name,
+        )
 
 
 @lru_cache(maxsize=256)
-def _stored(robot: Manipulator) -> tuple[float, ...]:
-    """Return the home pose that was worked out before, in another process too, or a new one."""
-    key, packages = ("home_pose", bare(robot)), ("kinematics", "workspace")
-    return kept_result(key, packages, lambda: tuple(_best(robot).tolist()))
+def _stored(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+    """Return both poses, worked out before, in another process too, or now."""
+    key, packages = ("home_poses", bare(robot)), ("kinematics", "workspace")
+    return kept_result(key, packages, lambda: _both_sides(robot))
 
 
-def _best(robot: Manipulator) -> Array:
+def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+    """Return the home pose, and the best pose on the other side of the base, if it is as good."""
     singular_orientations(robot)  # refuses a machine that is singular everywhere
-    drawn = _random_poses(robot)
-    order = np.argsort(-_worth(robot, drawn), kind="stable")
-    refined = np.array([_refined(robot, drawn[i]) for i in order[:_STARTS]])
+    try:
+        best_type_ii(robot)
+    except ModelError:
+        raise nowhere(robot) from None
+    candidates = _candidates(robot)
+    starts = _starts(robot, candidates)
+    refined = np.concatenate([_levelled(robot, starts), _refined(robot, starts)])
     margins = _worth(robot, refined)
     most = float(margins.max())
     if most <= 0.0:
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
-        raise beyond_limits(robot, np.concatenate([refined[reached], drawn]))
+        raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
+    side = sides(robot, refined)
+    if not _are_mirrored(robot, refined, margins, side):
+        return tuple(_simplest(robot, refined, candidates).tolist()), None
+    beside = sides(robot, candidates)
+    pose, mirror = (
+        tuple(_simplest(robot, refined[side == sign], candidates[beside == sign]).tolist())
+        for sign in (1.0, -1.0)
+    )
+    return pose, mirror
+
+
+def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array) -> bool:
+    """Return whether poses (K, m) on both sides of the base are good, and none leads across."""
+    branched = any(len(leg.branches) > 1 for leg in robot.legs)
+    most = margins.max()
+    good = margins >= (_BRANCHED_SIDE if branched else _SIDE) * most
+    above, below = (poses[good & (side == sign)] for sign in (1.0, -1.0))
+    angular = robot.platform.angular
+    pairs = [
+        (start, end)
+        for start, end in product(above[:_ENDS], below[:_ENDS])
+        if (np.abs(start - end)[angular] <= _ALIKE).all()
+    ]
+    if any(_leads(robot, start, end, _AXIS * most) for start, end in pairs):
+        return False
+    return bool(pairs) or (not branched and len(above) > 0 and len(below) > 0)
+
+
+def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
+    """Return whether poses on the straight line between two poses (m,) keep a margin."""
+    line = np.linspace(start, end, _BETWEEN)
+    return bool((_worth(robot, line) > least).all())
+
+
+def _candidates(robot: Manipulator) -> Array:
+    """Return poses (K, m) among which the search begins, best first, closed forms before others."""
+    on_axis = axis_poses(robot)
+    worth = _worth(robot, on_axis)
+    led = mid_range_poses(robot, on_axis[np.argsort(-worth, kind="stable")])
+    others = np.concatenate([led, grid_poses(robot), random_box_poses(robot)])
+    poses, worth = np.concatenate([on_axis, others]), np.append(worth, _worth(robot, others))
+    candidates: Array = poses[np.argsort(-worth, kind="stable")]
+    return candidates
+
+
+def _starts(robot: Manipulator, candidates: Array) -> Array:
+    """Return the best candidates on each side of the base, level and not, each far from others."""
+    side = sides(robot, candidates)
+    level = ~candidates[:, robot.platform.angular].any(axis=-1)
+    starts = []
+    for sign, flat in product((1.0, 0.0, -1.0), (True, False)):
+        alike = candidates[(side == sign) & (level == flat)][:_NEAR]
+        starts.append(_distinct(alike, _steps(robot, *_STEPS))[:_STARTS])
+    return np.concatenate(starts)
+
+
+def _levelled(robot: Manipulator, starts: Array) -> Array:
+    """Return level poses of locally best margins, from those starts (S, m) that are level.
+
+    There are none of a platform that does not tilt: all its starts are improved as they are.
+    """
+    moved = ~robot.platform.angular
+    level = starts[~starts[:, robot.platform.angular].any(axis=-1)]
+    if not robot.platform.tilts or not moved.any():
+        return starts[:0]
+    return _refined(robot, level, moved)
+
+
+def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
+    """Return the simplest pose (m,) of nearly the best margin, near local optima and candidates."""
+    margins = _worth(robot, refined)
+    most = float(margins.max())
     level = _level(robot, refined)
-    worth = np.asarray(_worth(robot, level))
+    worth = _worth(robot, level)
+    drawn = candidates[:_NEAR]
     if worth.max(initial=0.0) >= _LEVEL * most:
-        refined, drawn, margins, most = level, drawn * ~robot.platform.angular, worth, worth.max()
+        refined, drawn = level, drawn * ~robot.platform.angular
+        margins, most = worth, float(worth.max())
     # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[margins >= _WORTH * most]
     best = _least_travel(robot, equals)
@@ -132,33 +303,20 @@ def _best(robot: Manipulator) -> Array:
     if _worth(robot, middle) >= _MIDDLE * most:
         best = middle
     on_axis = _on_axis(robot, np.concatenate([refined, drawn]))
-    worth = np.asarray(_worth(robot, on_axis))
+    worth = _worth(robot, on_axis)
     if worth.max(initial=0.0) >= _AXIS * most:
         best = _least_travel(robot, on_axis[worth >= _WORTH * worth.max()])
     least = _WORTH * float(_worth(robot, best))
     for k in range(robot.freedom if robot.platform.tilts else 0):
         middle = np.where(np.arange(robot.freedom) == k, 0.0, best)
         best = middle if _worth(robot, middle) >= least else best
-    for metres, degrees in product(_METRES, _DEGREES):
-        step = _steps(robot, metres, np.radians(degrees))
+    decade = 10.0 ** np.ceil(np.log10(longest_leg(robot)))
+    for share, degrees in product(_ROUND, _DEGREES):
+        step = np.where(robot.platform.angular, np.radians(degrees), share * decade)
         rounded: Array = np.round(best / step) * step + 0.0  # -0.0 becomes 0.0
         if _worth(robot, rounded) >= least:
             return rounded
     return best
-
-
-def _random_poses(robot: Manipulator) -> Array:
-    first, *less = _MEASURES
-    with suppress(ModelError):
-        return random_poses(robot, _DRAWN, type_i=first, type_ii=first)
-    try:
-        one = random_poses(robot, 1, type_i=0.0, type_ii=0.0)
-    except ModelError:
-        raise nowhere(robot) from None
-    for least in less:
-        with suppress(ModelError):
-            return random_poses(robot, _DRAWN, type_i=least, type_ii=least)
-    return one
 
 
 def _least_travel(robot: Manipulator, poses: Array) -> Array:
@@ -175,8 +333,8 @@ def _level(robot: Manipulator, poses: Array) -> Array:
     if not robot.platform.tilts:
         return poses[:0]
     if moved.any():
-        order = np.argsort(-np.asarray(_worth(robot, level)), kind="stable")
-        level = np.array([_refined(robot, level[i], moved) for i in order[:_LEVELLED]])
+        order = np.argsort(-_worth(robot, level), kind="stable")
+        level = _refined(robot, level[order[:_LEVELLED]], moved)
     return level
 
 
@@ -210,33 +368,34 @@ def _distinct(poses: Array, apart: Array) -> Array:
     return poses[[not near[i, :i].any() for i in range(len(poses))]]
 
 
-def _worth(robot: Manipulator, poses: Array) -> Numbers:
+def _worth(robot: Manipulator, poses: Array) -> Array:
     """Return the least margin (...), which is 0 at most where the platform is turned back."""
     least = pose_margins(robot, poses).least
     turned = np.abs(poses[..., robot.platform.angular]) / np.pi
-    return np.asarray(np.minimum(least, 1.0 - turned.max(axis=-1, initial=0.0)))
+    worth = np.minimum(least, 1.0 - turned.max(axis=-1, initial=0.0))
+    return np.asarray(np.where(np.isfinite(worth), worth, -np.inf))
 
 
-def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
-    """Return a step of each of the pose's coordinates."""
-    return np.where(robot.platform.angular, radians, metres)
+def longest_leg(robot: Manipulator) -> float:
+    """Return the length of the longest leg, m, which lengths of a home are in proportion to."""
+    return max(leg.size for leg in robot.legs) or 1.0
 
 
-def _refined(robot: Manipulator, start: Array, moved: NDArray[np.bool_] | None = None) -> Array:
-    """Return the pose of a locally best margin, by moving those coordinates that are marked."""
-    free = np.ones(len(start), dtype=bool) if moved is None else moved
+def _steps(robot: Manipulator, share: float, radians: float) -> Array:
+    """Return a step of each of the pose's coordinates, lengths as a share of the longest leg."""
+    return np.where(robot.platform.angular, radians, share * longest_leg(robot))
 
-    def pose(values: Array) -> Array:
-        whole = start.copy()
-        whole[free] = values
+
+def _refined(robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None) -> Array:
+    """Return poses (S, m) of locally best margins, by moving those coordinates that are marked."""
+    free = np.ones(robot.freedom, dtype=bool) if moved is None else moved
+    units = _steps(robot, 1.0, 1.0)[free]
+
+    def poses(values: Array) -> Array:
+        # Simplices (S, ..., k), or points (4, S, k): coordinates that stay are alike, or 0.
+        whole = np.zeros((*values.shape[:-1], robot.freedom))
+        whole[..., free] = values * units
         return whole
 
-    first = start[free]
-    simplex = np.vstack([first, first + np.diag(_steps(robot, *_STEPS)[free])])
-    found = scipy.optimize.minimize(
-        lambda values: -float(_worth(robot, pose(values))),
-        first,
-        method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-6, "maxiter": 500},
-    )
-    return pose(found.x)
+    steps = _steps(robot, *_STEPS)[free] / units
+    return poses(climb(lambda values: _worth(robot, poses(values)), starts[:, free] / units, steps))

@@ -17,6 +17,9 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.shapes import Numbers, PerJoint, PoseLike
 
+_ROUNDING = 1e-9
+"""Difference of shares that is rounding."""
+
 
 @dataclass(frozen=True)
 class PoseMargins:
@@ -80,6 +83,26 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
     shares = np.fmin(shares, numeric(robot, "passive_room")(pose)[0])
     least = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
     return PoseMargins(type_i, type_ii, shares, least)
+
+
+def least_margin_text(robot: Manipulator, pose: Array) -> str:
+    """Return what the least margin of a pose (m,) is of, in words: "0.59 of the type-II ..."."""
+    margins = pose_margins(robot, pose)
+    least = float(margins.least)
+    if float(margins.type_ii) <= least:
+        what = "of the greatest type-II measure of this layout, 0 where drives hold nothing"
+    elif float(margins.type_i.min()) <= least:
+        leg = _first_least(margins.type_i)
+        what = f"of leg {leg}'s type-I measure, 0 where it is stretched or folded"
+    else:
+        leg = _first_least(margins.joints)
+        what = f"of half the range of leg {leg}'s joint that is nearest to a limit"
+    return f"{least:.2f} {what}"
+
+
+def _first_least(values: Array) -> int:
+    """Return the first leg, from 1, with the least of values (n,): those of equal legs round."""
+    return int((values <= values.min() + _ROUNDING).argmax()) + 1
 
 
 @lru_cache(maxsize=64)

@@ -20,7 +20,7 @@ _STARTS = 5
 """Random poses, the best ones, that are improved by an optimiser."""
 
 _TOUCH = 1e-6
-"""Depth of a pose in all legs' reach, m, up to which it counts as out of reach."""
+"""Depth of a pose in all legs' reach, over the longest leg, up to which it is out of reach."""
 
 
 def nowhere(robot: Manipulator) -> ModelError:
@@ -33,12 +33,13 @@ def nowhere(robot: Manipulator) -> ModelError:
         )
     pose, drawn = _deepest(robot)
     margin = numeric(robot, "reach")(pose)[0]
-    if float(margin.min()) > _TOUCH:
-        reached = drawn[(numeric(robot, "reach")(drawn)[0] > _TOUCH).all(axis=-1)]
+    touch = _TOUCH * max(leg.size for leg in robot.legs)
+    if float(margin.min()) > touch:
+        reached = drawn[(numeric(robot, "reach")(drawn)[0] > touch).all(axis=-1)]
         return beyond_limits(robot, np.array([pose, *reached]))
     missed: dict[str, list[int]] = {}
     for i, m in enumerate(margin, start=1):
-        if m < _TOUCH:
+        if m < touch:
             missed.setdefault(f"{max(-m, 0.0):.3g} m", []).append(i)
     return ModelError(
         "no pose is in reach of all legs: at the best one they miss by "

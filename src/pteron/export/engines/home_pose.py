@@ -29,7 +29,8 @@ _ALIKE = 1e-9
 def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     """Return the pose given, checked, or one chosen by the joints' ranges.
 
-    Of a platform that tilts it is the home pose, which is level where that can be.
+    Of a platform that tilts it is the home pose, which is level where that can be; so it is where
+    the machine's file names its home.
 
     Raises
     ------
@@ -39,7 +40,8 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
         If the machine is singular at every pose.
     """
     if home is None:
-        return home_pose(robot) if robot.platform.tilts else np.array(_middle(robot))
+        named = robot.platform.tilts or robot.home is not None
+        return home_pose(robot) if named else np.array(_middle(robot))
     pose = checked_one(robot, home, "home")
     inverse_kinematics(robot, pose)
     return pose.copy()

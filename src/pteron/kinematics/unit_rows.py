@@ -1,0 +1,85 @@
+"""The legs' rows in one unit: how well drives hold the platform, whatever the machine's best.
+
+Row i is the wrench of a unit force (N) that leg i puts on the platform, with its moment about the
+middle of the platform points over a length L, m. Its least singular value is the least total of
+leg forces (root sum of squares) that any load of unit size leaves: its inverse is how many times
+greater leg forces are than the load, and errors of the platform than errors along the legs.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.kernels import Array, numeric
+from pteron.manipulator import Manipulator
+
+_INDEPENDENT = 1e-9
+"""Singular values over the largest from which on directions of a motion are independent."""
+
+
+class UnitRows(NamedTuple):
+    """The rows of the legs at poses, in one unit."""
+
+    rows: Array
+    """Of unit forces against the platform's motion, lengths and angles times L, (K, n, m); NaN
+    where a leg does not reach."""
+    sizes: Array
+    """Joint rates over the unit rows' rates (K, n): force of the joint = force of the row / size,
+    1/m for a crank and 1 for a ram or a slider along its row."""
+    motion: Array
+    """Orthonormal directions of the platform's motion (K, 6, m) in (v, L omega)."""
+    length: float
+    """L, m: the greatest distance of a platform point from the middle of them all, or from the
+    centre that a platform turns about."""
+
+
+def unit_rows(robot: Manipulator, poses: Array) -> UnitRows:
+    """Return the unit rows of the legs at poses (K, m)."""
+    twists: Array = numeric(robot, "twist_jacobian")(poses)[0]
+    motion, arm, length = motion_frame(robot, poses)
+    rows, sizes = normalised(twists, arm, length)
+    return UnitRows(rows @ motion, sizes, motion, length)
+
+
+def motion_frame(robot: Manipulator, poses: Array) -> tuple[Array, Array, float]:
+    """Return directions of motion (K, 6, m), the way from P to their reference (K, 3), and L."""
+    points = np.array([leg.platform_point for leg in robot.legs])
+    middle = np.zeros(3) if robot.platform.center else points.mean(axis=0)
+    length = float(np.linalg.norm(points - middle, axis=1).max())
+    length = length if length > 0.0 else max(leg.size for leg in robot.legs)
+    arm = middle @ np.nan_to_num(robot.platform.at(poses)[1])
+    steps = np.eye(robot.freedom)
+    twists = [
+        numeric(robot, "twist")(poses, np.broadcast_to(step, poses.shape))[0] for step in steps
+    ]
+    moved = np.stack(twists, axis=-1)
+    moved = np.nan_to_num(moved)
+    moved[:, :3] += np.cross(moved[:, 3:], arm[:, :, None], axis=1)
+    moved[:, 3:] *= length
+    # A step of an angle counts as one of its own length, so that none is lost to rounding.
+    moved /= np.maximum(np.linalg.norm(moved, axis=1, keepdims=True), np.finfo(float).tiny)
+    directions = np.linalg.svd(moved, full_matrices=False)[0]
+    return directions, arm, length
+
+
+def normalised(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:
+    """Return rows (K, n, 6) of unit forces against (v, L omega), and what they were divided by.
+
+    A leg that turns the platform alone has a unit couple, force times L.
+    """
+    forces, moments = twists[..., :3], twists[..., 3:]
+    moments = (moments - np.cross(arm[:, None, :], forces)) / length
+    sizes = np.maximum(np.linalg.norm(forces, axis=-1), np.linalg.norm(moments, axis=-1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.concatenate([forces, moments], axis=-1) / sizes[..., None], sizes
+
+
+def least_singular_values(robot: Manipulator, poses: Array) -> Array:
+    """Return the least singular value (K,) of the unit rows at poses; NaN out of reach."""
+    rows = unit_rows(robot, poses).rows
+    values = np.full(len(rows), np.nan)
+    good = np.isfinite(rows).all(axis=(1, 2))
+    values[good] = np.linalg.svd(rows[good], compute_uv=False)[:, -1]
+    return values

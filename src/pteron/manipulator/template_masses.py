@@ -1,0 +1,52 @@
+"""Masses that a machine still has of the catalog's machine that its file was made after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isclose
+from typing import Any
+
+from pteron.manipulator.files import catalog, contents, load
+from pteron.manipulator.manipulator import Manipulator
+
+_SAME = 1e-6
+"""Relative difference of masses that count as one, and as edited beyond: files have more digits."""
+
+
+def template_masses(robot: Manipulator) -> str:
+    """Return a sentence on masses that are those of a machine of the catalog, "" where none is.
+
+    All links of the first leg have its masses or its sections (kg/m), and perhaps the platform.
+    The catalog's machines themselves, with their own legs, have none.
+    """
+    kinds = [leg.type for leg in robot.legs]
+    motion = f'motion = "{robot.platform.motion}"'.encode()
+    templates = [load(name) for name in catalog() if motion in contents(name)[0]]
+    if any(template.legs == robot.legs for template in templates):
+        return ""
+    for template in templates:
+        name, links = template.name, list(_links(robot, template))
+        if [leg.type for leg in template.legs] != kinds or not links:
+            continue
+        if len(links) < len(robot.legs[0].extents):
+            continue  # one link alone may have the same round number by chance
+        mass = robot.platform.inertia.mass
+        if isclose(mass, template.platform.inertia.mass, rel_tol=_SAME):
+            links.append(f"the platform's {mass:.4g} kg")
+        return f"masses are still those of {name}: {', '.join(links)}: are they this machine's?"
+    return ""
+
+
+def _links(robot: Manipulator, template: Manipulator) -> Iterator[str]:
+    """Yield the first leg's links whose mass or section is that of the template."""
+    own: Any = robot.legs[0]
+    other: Any = template.legs[0]
+    for letter, (key, low, high, _) in own.extents.items():
+        if letter not in other.extents:
+            continue
+        _, least, most, _ = other.extents[letter]
+        mass, former = own.bodies[letter].mass, other.bodies[letter].mass
+        if isclose(mass, former, rel_tol=_SAME):
+            yield f"{key} {mass:.4g} kg"
+        elif isclose(mass / (high - low), former / (most - least), rel_tol=_SAME):
+            yield f"{key} {mass:.4g} kg (its section)"

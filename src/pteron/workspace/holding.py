@@ -1,0 +1,166 @@
+"""How well a machine's drives hold its platform at home: in absolute terms, not of its own best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pteron.dynamics import inverse_dynamics
+from pteron.kernels import Array, bare
+from pteron.kinematics.ram_figures import similarity
+from pteron.kinematics.sampling import drawn_poses
+from pteron.kinematics.singular_distance import coordinate_distances
+from pteron.kinematics.unit_rows import least_singular_values, unit_rows
+from pteron.manipulator import Manipulator
+from pteron.thresholds import (
+    HOLDING_FORCE,
+    HOLDING_FORCE_NEAR,
+    INACCURATE,
+    LEAST_SINGULAR_VALUE,
+    NEARBY,
+    rounding_of,
+)
+from pteron.workspace.margins import pose_margins
+
+_POSES = 64
+"""Random poses in reach at which the distance to singular coordinates is sought."""
+
+_NEAR = 512
+"""Random poses about home at which the weight is held."""
+
+
+@dataclass(frozen=True)
+class Holding:
+    """How the drives hold the platform, in units and numbers that do not depend on the machine.
+
+    Attributes
+    ----------
+    length : float
+        L, m, which moments of the unit rows are divided by.
+    least_singular_value : float
+        Of the unit rows at home: a load takes leg forces up to its inverse times as great.
+    distance : float
+        Change of every point's coordinates and every length, m, that makes home singular.
+    everywhere : float
+        The greatest such change of many poses, m: no pose is farther from singular coordinates.
+    rounding : float
+        Rounding of coordinates, m, that these are compared with.
+    weight : float
+        Of all moving bodies, N.
+    force : float
+        Greatest force along a leg, referred to its platform point, that holds the weight at home,
+        over the weight; NaN without gravity.
+    force_near : float
+        The greatest of the poses about home that are in reach, within limits.
+    """
+
+    length: float
+    least_singular_value: float
+    distance: float
+    everywhere: float
+    rounding: float
+    weight: float
+    force: float
+    force_near: float
+
+
+def holding(robot: Manipulator, home: Array) -> Holding:
+    """Return how the drives hold the platform at home (m,) and about it."""
+    poses = home[None]
+    length = unit_rows(robot, poses).length
+    drawn = drawn_poses(bare(robot), _POSES, np.random.default_rng(0), limits=False)
+    distances = coordinate_distances(robot, np.vstack([poses, drawn]))
+    near = _about(robot, home)
+    weight = _weight(robot)
+    forces = (
+        _forces(robot, np.vstack([poses, near])) / weight if weight > 0.0 else np.array([np.nan])
+    )
+    return Holding(
+        length,
+        float(least_singular_values(robot, poses)[0]),
+        float(distances[0]),
+        float(np.nanmax(distances)),
+        rounding_of(length),
+        weight,
+        float(forces[0]),
+        float(np.nanmax(forces)) if weight > 0.0 else np.nan,
+    )
+
+
+def _about(robot: Manipulator, home: Array) -> Array:
+    """Return random poses (K, m) about home that are in reach, within limits."""
+    share, radians = NEARBY
+    size = share * max(leg.size for leg in robot.legs)
+    widths = np.where(robot.platform.angular, radians, size)
+    poses = home + widths * np.random.default_rng(0).uniform(-1.0, 1.0, (_NEAR, robot.freedom))
+    return poses[pose_margins(robot, poses).least > 0.0]
+
+
+def _weight(robot: Manipulator) -> float:
+    masses = [getattr(body, "mass", 0.0) for leg in robot.legs for body in leg.bodies.values()]
+    mass = robot.platform.joined.mass + sum(masses)
+    return float(mass * np.linalg.norm(robot.gravity))
+
+
+def _forces(robot: Manipulator, poses: Array) -> Array:
+    """Return the greatest force (K,) of a leg at its platform point that holds the weight, N."""
+    rest = np.zeros_like(poses)
+    forces = inverse_dynamics(robot, poses, rest, rest, on_failure="nan")
+    return np.asarray(np.abs(forces * unit_rows(robot, poses).sizes).max(axis=-1))
+
+
+def singular_within_rounding(robot: Manipulator, of: Holding) -> str:
+    """Return why a machine counts as singular everywhere: rounding of its file decides; else ""."""
+    if of.everywhere > of.rounding:
+        return ""
+    similar = similarity(robot)
+    figures = ""
+    if similar is not None and similar[1] <= of.rounding:
+        figures = (
+            f"guide points and platform points are similar figures within {_length(similar[1])}, "
+            f"the latter {similar[0]:.4g} times the former; "
+        )
+    return (
+        f"singular everywhere within {_length(of.everywhere)} of these coordinates (type II), less "
+        f"than the {_length(of.rounding)} that files are rounded to: {figures}a load takes leg "
+        f"forces up to {1.0 / of.least_singular_value:.2g} times as great at the best pose found; "
+        "change the figure of the platform points or that of the guide points"
+    )
+
+
+def holding_warnings(of: Holding) -> tuple[str, ...]:
+    """Return warnings of a platform that is held badly at home, or singular within a tolerance."""
+    found = []
+    if of.everywhere <= INACCURATE * of.rounding:
+        found.append(
+            f"legs: coordinates that differ by {_length(of.everywhere)} make the machine singular "
+            "(type II), in whichever pose: parts of ordinary accuracy may not hold the platform"
+        )
+    elif of.distance <= INACCURATE * of.rounding:
+        found.append(
+            f"home: coordinates that differ by {_length(of.distance)} make this pose singular "
+            "(type II)"
+        )
+    if of.least_singular_value < LEAST_SINGULAR_VALUE:
+        found.append(
+            f"home: least singular value {of.least_singular_value:.2g} of the unit rows (1 of "
+            "three perpendicular legs): a load takes leg forces up to "
+            f"{1.0 / of.least_singular_value:.2g} times as great, and errors of legs grow as much"
+        )
+    if of.force > HOLDING_FORCE:
+        found.append(
+            f"home: to hold the weight, {of.weight:.3g} N, a leg has to push or pull with "
+            f"{of.force:.3g} times as much"
+        )
+    elif of.force_near > HOLDING_FORCE_NEAR:
+        found.append(
+            f"home: near it a leg has to push or pull with {of.force_near:.3g} times the weight, "
+            f"{of.weight:.3g} N, to hold it: a singularity is near"
+        )
+    return tuple(found)
+
+
+def _length(metres: float) -> str:
+    """Return a length in words, in um below a tenth of a millimetre."""
+    return f"{1e6 * metres:.2g} um" if metres < 1e-4 else f"{1e3 * metres:.2g} mm"
