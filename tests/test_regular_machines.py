@@ -331,3 +331,34 @@ def test_table_1_says_that_gravity_is_along_leg_1():
     d = np.array([0.01, 0.0, 1.0]) / np.hypot(0.01, 1.0)
     tilted = replace(robot, legs=(replace(robot.legs[0], direction=d), *robot.legs[1:]))
     assert pteron.base_parameters(tilted).rank == 28
+
+
+def test_numbers_of_table_1_that_check_what_the_others_fix():
+    """28 numbers fix 16 lengths and coordinates; 17 of rows without restored cells fix 11."""
+    robot = pteron.load("quadrupteron")
+
+    def numbers(machine):
+        return {
+            (row, name): float(value)
+            for row, text in enumerate(pteron.base_parameters(machine).expressions(digits=12), 1)
+            for name, value in table1.terms(text).items()
+        }
+
+    values, change = numbers(robot), 1e-4
+    keys = [key for key, value in values.items() if abs(abs(value) - 1.0) > 1e-9]
+    rates = []
+    for i, leg in enumerate(robot.legs):
+        x, y, z = leg.platform_point
+        for changed in (
+            replace(leg, upper_length=leg.upper_length + change),
+            replace(leg, lower_length=leg.lower_length + change),
+            replace(leg, platform_point=(x + change, y, z)),
+            replace(leg, platform_point=(x, y + change, z)),
+        ):
+            legs = (*robot.legs[:i], changed, *robot.legs[i + 1 :])
+            moved = numbers(replace(robot, legs=legs))
+            rates.append([(moved[key] - values[key]) / change for key in keys])
+    by_number = np.array(rates).T / np.linalg.norm(rates, axis=1)
+    whole = [key[0] not in table1.RESTORED for key in keys]
+    assert (len(keys), np.linalg.matrix_rank(by_number, tol=1e-3)) == (28, 16)
+    assert (sum(whole), np.linalg.matrix_rank(by_number[whole], tol=1e-3)) == (17, 11)

@@ -75,15 +75,15 @@ def rows(robot: RobotLike = "quadrupteron") -> tuple[Row, ...]:
 
 def agree(printed: str, computed: str) -> bool:
     """Say whether two sums agree, as `Row` has it."""
-    given, found = _terms(printed), _terms(computed)
+    given, found = terms(printed), terms(computed)
     return given.keys() == found.keys() and all(
         round(float(found[name]), len(text.partition(".")[2])) == float(text)
         for name, text in given.items()
     )
 
 
-def _terms(text: str) -> dict[str, str]:
-    """Return the coefficient of each term as text, so that its printed digits are known."""
+def terms(text: str) -> dict[str, str]:
+    """Return the coefficient of each term of a row as text, which shows its printed digits."""
     return {
         name: ("-" if sign == "-" else "") + (size or "1")
         for sign, size, name in _TERM.findall(text)
