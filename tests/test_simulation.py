@@ -9,6 +9,7 @@ from mechanisms import CLIENTS
 
 import pteron
 from pteron.controllers import FeedForwardPD
+from pteron.errors import DataError
 from pteron.kernels import numeric
 from pteron.motion import (
     Motion,
@@ -407,3 +408,46 @@ def test_a_motion_of_lists_and_of_wrong_shapes():
             Motion(*wrong)
     with pytest.raises(pteron.DataError, match="times expected that ascend"):
         check_motion(pteron.load("tripteron"), alone)
+
+
+class Returning:
+    """A controller that returns what it was given."""
+
+    period = 1e-3
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def law(self, model):
+        return self
+
+    def memory(self, pose, velocity):
+        return np.empty(0)
+
+    def __call__(self, *sample):
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        ((np.zeros(4), ()), r"controller: forces: shape \(4,\) given, \(\.\.\., 3\) expected"),
+        ((0.0, ()), r"controller: forces: shape \(\) given"),
+        ((np.zeros((2, 3)), ()), r"controller: forces: shape \(2, 3\) given, \(3,\) expected"),
+        ((np.zeros(3, complex), ()), "controller: forces: not an array of real numbers"),
+        (np.zeros(3), r"controller: .* returned, forces \(n,\) and the next memory expected"),
+        (None, "controller: None returned"),
+    ],
+)
+def test_what_a_controller_returns_wrongly_is_told(answer, told):
+    rest = np.zeros(3)
+    with pytest.raises(DataError, match=told):
+        simulate("tripteron", None, Returning(answer), start=(rest, rest), duration=0.01)
+
+
+def test_forces_that_are_not_finite_end_a_simulation_and_are_named():
+    rest = np.zeros(3)
+    for value in (np.nan, np.inf):
+        controller = Returning((np.full(3, value), ()))
+        result = simulate("tripteron", None, controller, start=(rest, rest), duration=0.01)
+        assert "the controller asks for forces that are not finite numbers" in result.stopped

@@ -1,6 +1,7 @@
 """Structured Text against CasADi, on a strict controller; syntax as blark reads it."""
 
 import math
+import re
 from functools import cache
 from itertools import product
 from types import SimpleNamespace
@@ -417,6 +418,20 @@ def test_a_payload_is_set_while_the_blocks_run(tmp_path, name):
     expected = pteron.inverse_dynamics(carrying, *state)
     atol = 1e-12 * np.abs(expected).max()
     np.testing.assert_allclose(list(found["forces"].values()), expected, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("specialised", [None, False])
+def test_beside_a_payload_only_what_it_changes_is_an_input(tmp_path, specialised):
+    robot = stiff(CATALOG["five-bar"])
+    names = ["set_payload", "feed_forward", "computed_torque", "inverse_dynamics"]
+    files = pteron.export_st(robot, names, tmp_path, specialised=specialised)
+    texts = [file.read_text() for file in files]
+    assert len(texts) == len(names)
+    for text in texts:
+        assert "table" not in text
+        declared = re.findall(r"^ +(\w+) : ARRAY", text.partition("END_VAR")[0], re.MULTILINE)
+        assert not {"gains", "drives"} & set(declared), declared
+    assert all("SetPayload" in text or "set_payload returns them" in text for text in texts)
 
 
 def test_text_can_be_read():

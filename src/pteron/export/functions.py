@@ -153,8 +153,8 @@ def chosen(
 ) -> tuple[Exported, ...]:
     """Return the functions to export: the `usual` unless a choice is given.
 
-    `tables` says whether the code can have tables of the machine's own values, which `set_payload`
-    starts from; where not, they are folded into that.
+    `tables` says whether the code can have tables of the machine's own values. Where not, they are
+    folded in, all but the inertial parameters that `set_payload` returns.
 
     Without a closed form for every pose that joints have, there is the step from the last one.
 
@@ -216,6 +216,7 @@ def chosen(
             name,
             identified,
             specialised or (not tables and what == _PAYLOAD),
+            tables,
             wrench,
             output,
             controllers.get(what),
@@ -231,6 +232,7 @@ def _exported(
     name: str,
     identified: Identified | None,
     specialised: bool,
+    tabled: bool,
     wrench: bool,
     output: Output,
     controller: Controller | Custom | None,
@@ -263,6 +265,10 @@ def _exported(
     fixed = {name: table.values for name, table in zip(shared, tables, strict=True)}
     if specialised:
         given, tables = with_values(given, fixed), ()
+    elif not tabled:
+        kept = {port.name for port in given.inputs} & {"parameters", "base_parameters"}
+        given = with_values(given, {key: fixed[key] for key in shared if key not in kept})
+        tables = ()
     elif what == _PAYLOAD:
         tables += tuple(NumberTable(*table) for table in tool_tables(robot))
     graph = graph_of(given.function, given.inputs)
@@ -292,6 +298,12 @@ def _exported(
         summary = f"{what}, a control law of one's own."
         known = {port: meaning(robot, Port(port, (1,)), output) for port in TEXTS["law"]}
         meanings = {**known, **meanings} | {one: f"see the table {what}_{one}" for one in shared}
+    if not tabled:
+        told = {"parameters": _PAYLOAD, "base_parameters": _PAYLOAD + _BASE}
+        meanings |= {
+            key: f"{TEXTS['carried'][key]}; {told[key]} returns them"
+            for key in told.keys() & meanings
+        }
     if controller:
         meanings |= law_meanings(controller.what, meanings)
     elif {"pose", "joints"} <= taken:

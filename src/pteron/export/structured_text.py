@@ -67,8 +67,9 @@ def export_st(
     folder : path
         Where; made if it is missing.
     specialised : bool, optional
-        Whether the machine's inertial parameters are folded in, instead of being an input; by
-        default they are, unless `"set_payload"` is asked for.
+        Whether the machine's inertial parameters are folded in, instead of being an input that
+        `set_payload` returns; by default they are, unless `"set_payload"` is asked for. All other
+        numbers, such as gains and those of drives, are folded in always.
     wrench : bool
         Whether inverse and forward dynamics take a wrench on the platform too.
     output : {"force", "torque", "percent"}

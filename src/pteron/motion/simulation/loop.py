@@ -11,8 +11,8 @@ import numpy as np
 
 from pteron.dynamics import drive_accelerations
 from pteron.equations.transmissions import DriveKind
-from pteron.errors import DataError
-from pteron.kernels import Array, Program
+from pteron.errors import DataError, shown
+from pteron.kernels import Array, Program, as_array
 from pteron.kernels.loops import Loop, loop, machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion, told_pose
@@ -187,7 +187,9 @@ def run(
         robot, columns["forces"], columns["motor_rates"], parts.get("current")
     )
     why = None
-    if fault == _ASKED:
+    if fault == _ASKED and ask is not None:
+        why = "the controller asks for forces that are not finite numbers"
+    elif fault == _ASKED:
         why = (
             f"no forces are asked for at the joints {told_pose(columns['joints'][-1])}: they have "
             "no pose near the last one, or the wanted pose is out of the controller's reach"
@@ -207,9 +209,9 @@ def run(
     stopped = None if why is None else f"at {min(clock, time[end - 1]):.4g} s: {why}"
     if timing.method == "dop853":
         columns["acceleration"] = _accelerations(loads, pose, velocity, columns["forces"])
-    shown = {name: values[:end] for name, values in columns.items()}
+    columns = {name: values[:end] for name, values in columns.items()}
     if ask is not None:
-        shown["memory"] = np.array(memories[1 : end + 1])
+        columns["memory"] = np.array(memories[1 : end + 1])
     return Simulation(
         robot,
         time[:end],
@@ -217,7 +219,7 @@ def run(
         payload=loads.masses[:end],
         step=min(timing.step, period) if timing.method == "rk4" else float("nan"),
         stopped=stopped,
-        **shown,
+        **columns,
     )
 
 
@@ -259,7 +261,16 @@ def _callback(
         parts = reference.pose, reference.velocity, reference.acceleration
         pose, velocity, acceleration = (part[sample] for part in parts)
         told = measured[:joints], measured[joints:]
-        forces, memory = law(pose, velocity, acceleration, *told, memories[-1])
+        answer: Any = law(pose, velocity, acceleration, *told, memories[-1])
+        try:
+            returned, memory = answer
+        except (TypeError, ValueError):
+            raise DataError(
+                f"controller: {shown(answer)} returned, forces (n,) and the next memory expected"
+            ) from None
+        forces = as_array(returned, "controller: forces", (joints,))
+        if forces.ndim > 1:
+            raise DataError(f"controller: forces: shape {forces.shape} given, ({joints},) expected")
         memories.append(memory)
         return forces
 
