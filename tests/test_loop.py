@@ -1,5 +1,8 @@
 """The control loop's readings, and controllers of one's own: expressions and Structured Text."""
 
+import os
+import signal
+import threading
 from dataclasses import replace
 
 import casadi as ca
@@ -10,8 +13,9 @@ from structured_text import Block, read
 
 import pteron
 from pteron.controllers import ComputedTorque, Custom
+from pteron.kernels.c import c_compiler
 from pteron.legs import Elastic
-from pteron.motion import Sensors, machines_about, pick_and_place, simulate, simulate_many
+from pteron.motion import Sensors, advance, machines_about, pick_and_place, simulate, simulate_many
 from pteron.workspace import home_pose
 
 N = 3
@@ -229,3 +233,24 @@ def test_structured_text_closes_the_loop(tmp_path):
     assert text.velocity.any()
     np.testing.assert_allclose(text.pose, own.pose, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(text.asked, own.asked, rtol=1e-8, atol=1e-8)
+
+
+@CLIENTS
+@pytest.mark.skipif(c_compiler() is None, reason="no C compiler")
+@pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
+@pytest.mark.parametrize("what", ["simulate", "advance"])
+def test_an_interrupt_ends_a_loop_that_would_run_for_minutes_or_years(what, monkeypatch):
+    monkeypatch.delenv("PTERON_KERNELS", raising=False)
+    robot = driven("tripteron")
+    advance(robot, REST, REST, REST, 1e-6, 10)  # compiles
+    main = threading.main_thread().ident
+    timer = threading.Timer(1.0, signal.pthread_kill, (main, signal.SIGINT))
+    timer.start()
+    still = {"start": (REST, REST), "duration": 0.5, "step": 1e-8}
+    run = {
+        "advance": lambda: advance(robot, REST, REST, REST, 1e-15, 10**12),
+        "simulate": lambda: simulate(robot, None, ComputedTorque(period=1e-4), **still),
+    }
+    with pytest.raises(KeyboardInterrupt):
+        run[what]()
+    timer.cancel()

@@ -264,8 +264,8 @@ def test_an_fmu_ends_where_a_leg_does_not_reach(name, kind):
         ({"payload.inertia": -1.0}, "payload.inertia must be 0 or more; -1 was given"),
         ({"drive2.coulomb": -1.0}, "drive2.coulomb must be 0 or more; -1 was given"),
         ({"drive3.rest_speed": 0.0}, "drive3.rest_speed must be 1e-12 or more; 0 was given"),
-        ({"force1": np.nan}, "a number is expected"),
-        ({"payload.mass": 1e308}, "no finite acceleration"),
+        ({"force1": np.nan}, "a number of at most 1e+12 is expected"),
+        ({"payload.mass": 1e300}, "a number of at most 1e+12 is expected; 1e+300 was given"),
     ],
 )
 def test_an_fmu_refuses_what_it_cannot_start_from(values, words):
@@ -277,6 +277,45 @@ def test_an_fmu_refuses_what_it_cannot_start_from(values, words):
             logger=lambda *message: said.append(message[-1].decode()),
         )
     assert words in said[0]
+
+
+@CLIENTS
+def test_an_fmu_refuses_calls_in_the_wrong_mode():
+    path, said = fmu_of("delta"), []
+    description = fmpy.read_model_description(path)
+    folder = fmpy.extract(path)
+    unit = fmpy.fmi3.FMU3Slave(
+        guid=description.guid,
+        unzipDirectory=folder,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
+    unit.instantiate(logMessage=lambda *message: said.append(message[-1].decode()))
+
+    def refused(call, words):
+        said.clear()
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            call()
+        assert words in said[0]
+
+    def step(time=0.0, size=0.01):
+        return unit.doStep(currentCommunicationPoint=time, communicationStepSize=size)
+
+    refused(step, "fmi3DoStep cannot be called before initialization")
+    refused(unit.exitInitializationMode, "fmi3ExitInitializationMode cannot be called before")
+    unit.enterInitializationMode()
+    refused(unit.enterInitializationMode, "cannot be called in initialization mode")
+    refused(step, "fmi3DoStep cannot be called in initialization mode")
+    unit.exitInitializationMode()
+    step()
+    for time, size in ((np.nan, 0.01), (0.01, np.inf), (0.01, np.nan), (0.01, 0.0)):
+        refused(lambda time=time, size=size: step(time, size), "steps forward only")
+    unit.terminate()
+    refused(lambda: step(0.01), "fmi3DoStep cannot be called after the end")
+    reference = [description.modelVariables[-1].valueReference]
+    refused(lambda: unit.setFloat64(reference, [1.0]), "cannot be called after the end")
+    unit.reset()
+    refused(step, "before initialization")
+    unit.freeInstance()
 
 
 @CLIENTS

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from threading import Event
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from pteron.kernels.c import c_compiler
 from pteron.kernels.choice import VARIABLE
 from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array
-from pteron.kernels.loop_code import LinkedLaw, LoopCode
+from pteron.kernels.loop_code import PARTS, LinkedLaw, LoopCode
 from pteron.kernels.programs import bare, general_program, motion_program, program
 from pteron.kernels.samples import Ask, Evaluated, Plant, run_samples
 from pteron.kernels.targets import FIXED
@@ -27,9 +28,30 @@ LANES = 16
 _FEW = 4
 """Machines that go one by one."""
 
+_PIECE = 200_000
+"""Steps that one call of C takes, of all its machines: some 0.5 s, after which Ctrl-C is seen."""
+
 
 Arrays = dict[str, Array]
 """Arrays of a run by name."""
+
+
+def _pieces(
+    arrays: Mapping[str, Array], samples: int, counts: Sequence[int], machines: int
+) -> Iterator[tuple[Mapping[str, Array], int, Sequence[int]]]:
+    """Yield a run in pieces, each with its number of samples and its `counts`."""
+    *fixed, first, end = counts
+    size = max(1, _PIECE // (max(1, machines) * max(1, sum(counts[:PARTS]))))
+    if size >= samples:
+        yield arrays, samples, counts
+        return
+    for start in range(0, samples, size):
+        stop = min(start + size, samples)
+        piece = {
+            name: array[:, start:stop] if array.shape[1] == samples else array
+            for name, array in arrays.items()
+        }
+        yield piece, stop - start, [*fixed, first + start, int(end and stop == samples)]
 
 
 class Loop:
@@ -112,15 +134,23 @@ class Loop:
         shares = max(1, min(threads, batch // LANES))
         bounds = [batch * k // shares for k in range(shares + 1)]
 
+        ended = Event()
+
         def part(start: int, stop: int) -> None:
             cut = {n: a[start:stop] if len(a) == batch else a for n, a in arrays.items()}
-            code.run(cut, samples, times, counts, ask)
+            for piece, size, numbers in _pieces(cut, samples, counts, stop - start):
+                if ended.is_set():
+                    return
+                code.run(piece, size, times, numbers, ask)
 
         if shares == 1:
             part(0, batch)
             return
         with ThreadPoolExecutor(shares) as pool:
-            list(pool.map(part, bounds[:-1], bounds[1:]))
+            try:
+                list(pool.map(part, bounds[:-1], bounds[1:]))
+            finally:
+                ended.set()
 
     def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
         """Return what `run` takes of machines in states (B, 1, Y): no loads, limits or encoders.

@@ -132,9 +132,11 @@ def advance(
                 f"{robot.name} expected, one for each state"
             )
         arrays |= machines.numbers
-    if batch:
-        times = [step, 0.0, 0.0, step * count]
-        made.run(arrays, 1, times, [int(count), 0, 0, 0, 0, 0, 0, 0, 0])
+    done, piece = 0, max(1, _PIECE // max(1, batch))
+    while batch and done < count:  # in pieces, between which Ctrl-C is seen
+        steps = min(piece, int(count) - done)
+        made.run(arrays, 1, [step, 0.0, 0.0, step * steps], [steps, 0, 0, 0, 0, 0, 0, 0, 0])
+        done += steps
     m = robot.freedom
     state = arrays["state"].reshape(*lead, 2 * m + count_drives)
     served = (arrays["fault"] == 0.0).reshape(lead)
@@ -167,6 +169,9 @@ def motor_states(
     found["bristle"] = np.sign(rates) * np.array(slid)
     return {name: found[name] for name, _ in kind.more}
 
+
+_PIECE = 200_000
+"""Steps, of all machines, that one call of C takes: some 0.5 s."""
 
 _FINEST = 100.0 * float(np.finfo(float).eps)
 """The smallest relative error of a step that SciPy serves."""
