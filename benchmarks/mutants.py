@@ -3,7 +3,8 @@
 No robot's file, log, map, store, search or checkpoint that was damaged by chance (bytes, lines,
 numbers, keys, files of a folder) may end in anything but an error of Pteron. What carries a
 checksum gives what was written, or is refused, or computed again; what carries none is read as it
-stands: its numbers are those in the file, finite, and as they would be written again.
+stands: its numbers are those in the file, finite, and as they would be written again. None may take
+2 s of a processor, or 500 MB: digits, nesting and archives that unpack to more are among them.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from resource import RUSAGE_SELF, getrusage
 from time import process_time
 from typing import Any
 
@@ -43,6 +45,9 @@ _AS_WRITTEN, _AGAIN, _AS_IT_STANDS, _REFUSED = (
     "refused",
 )
 _OUTCOMES = (_AS_WRITTEN, _AGAIN, _AS_IT_STANDS, _REFUSED)
+_SLOW, _LARGE = 2.0, 500.0
+"""Seconds of a mutant, and megabytes of them all, that are too many."""
+
 _LONGEST = 6000
 """Characters of a message: twenty faults of a file, a line each."""
 
@@ -221,6 +226,7 @@ ratio = [10, 10.0]
 
 def expect_in_file(log: Log, file: Path) -> None:
     """Compare a log with its file, read by Python's own module: its forces are in it, in order."""
+    csv.field_size_limit(1 << 30)
     text = file.read_bytes().decode("utf-8-sig", errors="replace")
     cells = {cell.strip() for row in csv.reader(io.StringIO(text)) for cell in row}
     known = {float(cell) for cell in cells if _is_number(cell)}
@@ -266,7 +272,12 @@ def maps(work: Path) -> list[Kind]:
         if chance.random() < 0.7:
             file.write_bytes(damaged_bytes(data[".npz"], chance))
         else:
-            arrays = dict(np.load(work / "map.npz"))
+            arrays: dict[str, Any] = dict(np.load(work / "map.npz"))
+            if chance.random() < 0.1:
+                name = ("margin", "other")[int(chance.integers(2))]
+                more = {name: np.zeros(int(2 ** chance.uniform(10, 24)))}
+                np.savez_compressed(file, **(arrays | more))
+                return file
             key = sorted(arrays)[int(chance.integers(len(arrays)))]
             np.savez_compressed(file, **repacked(arrays, key, chance))
         return file
@@ -342,6 +353,7 @@ def repacked(arrays: dict[str, Any], key: str, chance: Chance) -> dict[str, Any]
 
 def expect_rows(found: Map, file: Path) -> None:
     """Compare a map with its table, read by Python's own module."""
+    csv.field_size_limit(1 << 30)
     text = file.read_bytes().decode("utf-8-sig", errors="replace")
     rows = list(csv.reader(io.StringIO(text.replace("\r\n", "\n").replace("\r", "\n"))))
     header, *cells = [[cell.strip() for cell in row] for row in rows if any(map(str.strip, row))]
@@ -436,22 +448,32 @@ def main() -> None:
     warnings.simplefilter("ignore", UnlikelyValue)  # damaged numbers are, and are read
     raw: list[str] = []
     total: Counter[str] = Counter()
-    begin = process_time()
+    begin, longest = process_time(), 0.0
     print(f"{'':<16}{'mutants':>8}" + "".join(f"{name:>19}" for name in _OUTCOMES) + f"{'raw':>6}")
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         kinds = [robots(work), searches(work), logs(work), *maps(work), checkpoints(work)]
         kinds.append(identifications(work))
+        least = getrusage(RUSAGE_SELF).ru_maxrss
         for k, kind in enumerate(kinds):
             if not kind.name.startswith(given.kind):
                 continue
             own = max(1, round(count * kind.share / 20_000))
             found = Counter[str]()
             for number in range(own):
+                started = process_time()
                 found[outcome(kind, work, [given.seed, k, number], raw)] += 1
+                seconds = process_time() - started
+                longest = max(longest, seconds)
+                if seconds > _SLOW and number:  # the first one loads what reads the others
+                    raw.append(f"{kind.name}: {seconds:.1f} s, {[given.seed, k, number]}")
             total.update(found)
             line(kind.name, found)
     line("all", total)
+    grown = (getrusage(RUSAGE_SELF).ru_maxrss - least) / 1024
+    print(f"The slowest takes {longest:.2f} s; memory grows by at most {grown:.0f} MB.")
+    if grown > _LARGE:
+        raw.append(f"memory grows by {grown:.0f} MB")
     print(f"{process_time() - begin:.0f} s of this processor", file=sys.stderr)
     if raw:
         sys.exit("\n".join(f"{times} x {what}" for what, times in Counter(raw).most_common()))

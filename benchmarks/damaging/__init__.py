@@ -23,6 +23,9 @@ _OTHERS = (
 )
 """Texts that take the place of a number."""
 
+_LONG = (b"1", b"0", b"a", b"[", b"{a = ", b"a.", b"(", b",", b"\n", b" ")
+"""Texts that are repeated very often."""
+
 _ODD = (
     *(b"\x00", b"\x01", b"\x07", b"\x1b[31m", b"\x7f", b"\r", b"\t", b"\xff", b"\xef\xbb\xbf"),
     *("\u202e".encode(), "\u2028".encode(), "\u0661".encode(), b'"', b"'", b"[", b"}", b"#", b"\\"),
@@ -161,8 +164,16 @@ def _odd(data: bytes, chance: Chance) -> bytes:
     return data[:at] + _ODD[int(chance.integers(len(_ODD)))] + data[at:]
 
 
+def _grown(data: bytes, chance: Chance) -> bytes:
+    """Insert up to a megabyte of one digit or letter, or brackets that are never closed."""
+    at, size = _place(data, chance), int(2 ** chance.uniform(6, 20))
+    if chance.random() < 0.5 and (numbers := list(_NUMBER.finditer(data))):
+        at = numbers[int(chance.integers(len(numbers)))].start()
+    return data[:at] + _LONG[int(chance.integers(len(_LONG)))] * size + data[at:]
+
+
 _BYTES = (_flipped, _flipped, _cut_short, _without, _twice, _zeroed, _longer, _emptied)
 _TEXT = (
     *(_number_replaced, _number_replaced, _number_replaced, _key_changed, _lines_changed, _odd),
-    *(_flipped, _cut_short, _without, _twice, _emptied),
+    *(_flipped, _cut_short, _without, _twice, _emptied, _grown),
 )

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -57,7 +58,9 @@ def pythons() -> dict[str, Path]:
     folders += sorted(Path.home().glob(".pyenv/versions/*/bin"))
     found: dict[str, Path] = {}
     for folder in folders:
-        for path in [*folder.glob("python3"), *folder.glob("python3.[0-9]*")]:
+        for path in sorted(folder.glob("python3*")):
+            if not re.fullmatch(r"python3(\.\d+)?", path.name):  # python3-config, python3.11-gdb.py
+                continue
             code = "import sys, venv, ensurepip; print(*sys.version_info[:3], sep='.')"
             run = subprocess.run(
                 [str(path), "-c", code], capture_output=True, text=True, check=False
