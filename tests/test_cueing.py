@@ -58,6 +58,27 @@ def test_no_pose_leaves_the_box_whatever_the_vehicle_does():
     assert ((low <= joints) & (joints <= high)).all()
 
 
+@pytest.mark.parametrize(
+    "time",
+    [
+        np.round(np.arange(0.0, 6.0, 1 / 60), 3),
+        np.arange(0.0, 60.0, 0.5),
+        np.arange(0.0, 60.0, 1.0),
+        np.cumsum(np.random.default_rng(5).uniform(0.001, 0.2, 200)),
+    ],
+    ids=["60 Hz in ms", "0.5 s", "1 s", "uneven"],
+)
+def test_the_curve_between_samples_stays_in_the_box(time):
+    rng = np.random.default_rng(0)
+    vehicle = {name: 10.0 * rng.normal(size=len(time)) for name in NONE}
+    found = cue(ROBOT, {"t": time, **vehicle}, pose=HOME)
+    assert found.duration == pytest.approx(time[-1] - time[0])
+    assert np.ptp(np.diff(found.time)) < 1e-9
+    assert found.time[1] <= 0.01 + 1e-9
+    fine = found.at(np.linspace(0.0, found.duration, 20 * len(found.time)))[0]
+    assert found.region.holds(fine).all()
+
+
 @CLIENTS
 def test_what_cannot_be_shown_is_told():
     with pytest.raises(ModelError, match="3T platform shows no vehicle's motion"):

@@ -45,6 +45,21 @@ _ROOM = 3.0
 _SAMPLES, _HALVINGS = 2048, 8
 """Number of random poses of the box, and of bisections, for its size before the proof."""
 
+_STEP = 0.01
+"""Longest step, s, of the motion: a third of the shortest time constant, 1/30 s, of the filters."""
+
+_EVEN = 1e-6
+"""Deviation of steps, as a share of them, from which on a table is interpolated to even steps."""
+
+_MANY = 5_000_000
+"""Most samples of a motion."""
+
+_WITHIN = 0.999
+"""Share of the box to which samples are compressed, so that the curve between them has room."""
+
+_REFINED = 6
+"""Times that steps are halved where the curve between them would leave the box."""
+
 _TRIES = 30
 """Sizes for which a proof is tried, each nine tenths of the one before; if none is proved, the cue
 is refused."""
@@ -131,14 +146,16 @@ def cue(
     Returns
     -------
     Cue
-        The motion, at the times of the table.
+        The motion, at the times of the table where these have even steps of at most 0.01 s; else
+        at even steps, finer where it would leave the box between samples.
 
     Raises
     ------
     ModelError
         If the platform does not move freely, or no box about the middle is proved.
     DataError
-        If a column is missing, or times do not ascend.
+        If a column is missing, or times do not ascend; if the motion is too long, or so rough that
+        no steps keep it in the box.
     """
     robot = as_manipulator(robot)
     if robot.platform.motion != "3T3R":
@@ -152,14 +169,56 @@ def cue(
     time, *columns = rows.numbers(COLUMNS).T
     if len(time) < 2 or not (np.diff(time) > 0.0).all():
         raise DataError(f"{rows.source}: t: two or more times expected that ascend, in seconds")
-    demand = _filtered(time - time[0], np.array(columns).T, washout or Washout())
+    given = np.array(columns).T
+    even = _even_times(time - time[0], rows.source)
+    demand = _filtered(even, _interpolated(even, time - time[0], given), washout or Washout())
     region, proof = _box(robot, middle, np.abs(demand[0]).max(axis=0), type_ii)
     half = 0.5 * np.ptp(region.box, axis=0)
-    parts = _pressed(demand, half)
+    parts = _pressed(demand, _WITHIN * half)
+    for _ in range(_REFINED):
+        if (_control_points(even, parts) <= half).all():
+            break
+        even = np.linspace(0.0, even[-1], 2 * len(even) - 1)
+        demand = _filtered(even, _interpolated(even, time - time[0], given), washout or Washout())
+        parts = _pressed(demand, _WITHIN * half)
+    else:
+        raise DataError(
+            f"{rows.source}: accelerations so rough that the motion leaves its box between samples "
+            f"of {even[1]:.2g} s; smooth them, or lower the scale"
+        )
     took = 1.0 - np.abs(parts[0]).max(axis=0) / np.maximum(np.abs(demand[0]).max(axis=0), 1e-12)
     moved = np.abs(demand[0]).max(axis=0) > 1e-9
     pressed = float(np.max(took[moved], initial=0.0))
-    return Cue(time - time[0], middle + parts[0], parts[1], parts[2], region, proof, pressed)
+    return Cue(even, middle + parts[0], parts[1], parts[2], region, proof, pressed)
+
+
+def _even_times(time: Array, source: str) -> Array:
+    """Return times with even steps, at most `_STEP`, from 0 to the last of those given, s."""
+    steps = np.diff(time)
+    count = len(time)
+    if np.ptp(steps) > _EVEN * steps.mean() or steps.mean() > _STEP:
+        count = int(np.ceil(time[-1] / min(float(np.median(steps)), _STEP))) + 1
+    if count > _MANY:
+        raise DataError(f"{source}: {time[-1]:.4g} s make {count} samples, at most {_MANY} serve")
+    return np.linspace(0.0, time[-1], count)
+
+
+def _interpolated(even: Array, time: Array, given: Array) -> Array:
+    """Return columns (T, 6) at even times, linear between the times given."""
+    return np.stack([np.interp(even, time, column) for column in given.T], axis=-1)
+
+
+def _control_points(time: Array, parts: Array) -> Array:
+    """Return the absolute Bernstein coefficients (6, T - 1, 6) of `Motion.at` between samples.
+
+    The curve between two samples lies in the hull of its six coefficients.
+    """
+    step = np.diff(time)[:, None]
+    (a, va, aa), (b, vb, ab) = parts[:, :-1], parts[:, 1:]
+    first, last = step * va / 5.0, step * vb / 5.0
+    bends = step**2 * aa / 20.0, step**2 * ab / 20.0
+    points = a, a + first, a + 2.0 * first + bends[0], b - 2.0 * last + bends[1], b - last, b
+    return np.abs(points)
 
 
 def _filtered(time: Array, given: Array, washout: Washout) -> Array:
