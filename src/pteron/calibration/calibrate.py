@@ -14,10 +14,12 @@ from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import raw_fault
 from pteron.calibration.residual_faults import residual_faults
-from pteron.calibration.result import Calibration, HeldOut, calibrated, values_of
+from pteron.calibration.result import Calibration, HeldOut, calibrated, open_errors, values_of
+from pteron.calibration.set_aside import rows_set_aside
 from pteron.calibration.start import placed, starting_poses
+from pteron.calibration.thresholds import FEW_LEFT_OUT
 from pteron.calibration.unknowns import blocks_of
-from pteron.calibration.verdict import EVERY, rows_for_check, verdict_of
+from pteron.calibration.verdict import EVERY, Evidence, rows_for_check, verdict_of
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike, as_manipulator
 
@@ -99,22 +101,28 @@ def calibrate(
         raise DataError(fault)
     poses = starting_poses(start, measurements)
     start = placed(start, measurements, poses)
+    aside = rows_set_aside(start, measurements, blocks, poses)
     kept = np.ones(len(measurements), dtype=bool)
     checked = rows_for_check(measurements, blocks)
     if held_out is None and len(measurements) >= checked:
         kept[EVERY // 2 :: EVERY] = False
-    judged = partial = None
+    partial = None
     if held_out is not None or not kept.all():
         fitted = np.zeros_like(kept)
         fitted[np.flatnonzero(kept)[:: -(-int(kept.sum()) // _TRIED_ROWS)]] = True
         rows = measurements.rows(fitted)
-        partial = Fitter(rows, blocks, start, starting_poses(start, rows)).run()
-        other = held_out if held_out is not None else measurements.rows(~kept)
-        judged = _held_out(start, partial, blocks, other)
-    fitter = Fitter(measurements, blocks, start, poses)
+        part = rows_set_aside(start, rows, blocks, own := starting_poses(start, rows))
+        partial = Fitter(rows, blocks, start, own, part.aside, part.barred).run()
+    fitter = Fitter(measurements, blocks, start, poses, aside.aside, aside.barred)
     fit = fitter.run(partial)
+    judged = None
+    if partial is not None:
+        other = held_out if held_out is not None else _fitting(measurements, fit, ~kept)
+        judged = _held_out(start, partial, blocks, other)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
-    findings = residual_faults(fitter, fit)
+    findings = residual_faults(fitter, fit, aside.reasons)
+    possible = open_errors(measurements, fit, blocks)
+    evidence = Evidence(measurements, fit, blocks, shown, judged, findings, possible, checked)
     return Calibration(
         robot,
         calibrated(fit.guess),
@@ -123,12 +131,20 @@ def calibrate(
         shown,
         judged,
         findings,
-        verdict_of(fit, blocks, shown, judged, findings, checked),
+        verdict_of(evidence),
         measurements,
         fit,
         blocks,
         start,
+        possible,
     )
+
+
+def _fitting(given: Measurements, fit: Fit, chosen: NDArray[np.bool_]) -> Measurements:
+    """Return chosen rows, but for the few that a fit of all rows leaves out and findings name."""
+    few = (~fit.kept).sum() <= FEW_LEFT_OUT * len(fit.kept)
+    some = chosen & fit.kept if few else chosen
+    return given.rows(some if some.any() else chosen)
 
 
 def _check(joints: int, given: Measurements) -> None:
@@ -152,7 +168,7 @@ def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurem
     new = before.slopes.rows(fit.guess, other, moved, chosen)
     spread = np.einsum("nkp,pq,nkq->nk", new.slopes, fit.covariance, new.slopes, optimize=True)
     noise = np.array([fit.noise[kind] for kind in other.kind_of])
-    seen = new.measured & np.isfinite(spread)
+    seen = new.measured & np.isfinite(spread) & np.isfinite(old.residuals + new.residuals)
     kinds = {kind: seen & (other.kind_of == kind) for kind in fit.noise}
 
     def rms(squares: Array) -> dict[str, float]:

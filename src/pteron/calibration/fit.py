@@ -136,16 +136,33 @@ class Fitter:
     guess : Guess
         Where to begin.
     poses : array, shape (N, m)
-        Near the rows' poses.
+        Near the rows' poses; NaN for a row that is first left out, as its readings lead to none.
+    aside : array of bool, shape (N,), optional
+        Rows that are left out of the first fit, and are back where they then fit.
+    barred : array of bool, shape (N,), optional
+        Rows that stay left out.
     """
 
     def __init__(
-        self, given: Measurements, blocks: tuple[Block, ...], guess: Guess, poses: Array
+        self,
+        given: Measurements,
+        blocks: tuple[Block, ...],
+        guess: Guess,
+        poses: Array,
+        aside: NDArray[np.bool_] | None = None,
+        barred: NDArray[np.bool_] | None = None,
     ) -> None:
         self.given, self.blocks, self.begin = given, blocks, guess
         self.slopes = MachineSlopes(guess.robot, blocks)
         self.prior = 1.0 / tolerances_of(blocks) ** 2
+        none = np.zeros(len(given), dtype=bool)
+        self.barred = none if barred is None else barred
+        lost = np.isnan(poses).any(axis=1)
+        self.aside = lost | self.barred | (none if aside is None else aside)
+        # Newton's steps to the pose of a lost row, should there be one later, begin in the middle.
         self.begin_poses = poses
+        if lost.any() and not lost.all():
+            self.begin_poses = np.where(lost[:, None], np.median(poses[~lost], axis=0), poses)
         self.kind_of = given.kind_of
         self.readings_noise = given.setup.noise.get("readings", 0.0)
 
@@ -163,7 +180,7 @@ class Fitter:
         noise = {kind: max(setup.get(kind, _START), FLOOR) for kind in KINDS}
         if before is not None:
             guess, total, noise = before.guess, before.total, before.noise
-        kept, none = np.ones(len(self.given), dtype=bool), np.empty(0)
+        kept, none = ~self.aside, np.empty(0)
         begin = guess, total, noise, kept, self.begin_poses, self.prior
         try:
             at = self._at(Fit(*begin, none, none > 0.0, none, none, none))
@@ -179,9 +196,9 @@ class Fitter:
             limits = scipy.stats.chi2.isf(
                 _OUTLYING / len(kept), np.maximum(at.measured.sum(axis=1), 1)
             )
-            kept = scaled**2 <= limits
+            kept = (scaled**2 <= limits) & ~self.barred
             if 2 * kept.sum() < len(kept):  # no rows are the faultless ones
-                kept[:] = True
+                kept = (at.distances < BEYOND) & ~self.barred
             alike = all(abs(noise[k] / at.noise[k] - 1.0) < 0.01 for k in sought)
             if alike and (kept == at.kept).all():
                 break

@@ -1,4 +1,4 @@
-"""Likely mistakes in measurements, found before any fit: wrong units, swapped legs or marks, frame.
+"""Likely mistakes in measurements, found before the fit: units, order, signs, zeros, scales, frame.
 
 Measurements should lie within noise and tolerances of what the machine as drawn would give; where
 they do not, each likely mistake is undone on trial, and told where they then do.
@@ -15,10 +15,13 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.fit import Fitter
+from pteron.calibration.guess import Block, Guess, Unknown, numbered, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.start import placed, starting_poses
+from pteron.calibration.thresholds import OFF_TOLERANCES
+from pteron.calibration.unknowns import TOLERANCES
 from pteron.errors import DataError, UnlikelyValue
 
 Array = NDArray[np.float64]
@@ -68,20 +71,34 @@ def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
         poses = starting_poses(guess, rows)
     except DataError:
         return np.inf
+    return float(np.median(row_misfits(guess, rows, blocks, poses)))
+
+
+def row_misfits(guess: Guess, rows: Measurements, blocks: Sequence[Block], poses: Array) -> Array:
+    """Return each row's mean squared residual (N,), in variances of noise and tolerances.
+
+    inf where it has no pose.
+    """
+    lost = np.isnan(poses).any(axis=1)
+    lost |= (rows.origins >= 0) & lost[rows.origins]
+    if lost.all():
+        return np.full(len(rows), np.inf)
+    poses = np.where(np.isnan(poses), np.median(poses[~np.isnan(poses).any(axis=1)], axis=0), poses)
     start = placed(guess, rows, poses)
     slopes = MachineSlopes(guess.robot, blocks)
     at = slopes.rows(start, rows, poses, np.arange(len(rows)))
+    lost |= ~np.isfinite(at.slopes).all(axis=(1, 2))
     tolerances = np.minimum(tolerances_of(blocks), 1.0)
     for block in blocks:
         if block.kind == "frame" and start.turn is not guess.turn:
             tolerances[block.where] = 0.0  # all rows together have fixed it
-    scaled = at.slopes * tolerances
+    scaled = np.where(lost[:, None, None], 0.0, at.slopes) * tolerances
     width = at.residuals.shape[1]
     covariance = scaled @ np.swapaxes(scaled, -1, -2) + _NOISE**2 * np.eye(width)
-    whitened = np.linalg.solve(covariance, at.residuals[..., None])[..., 0]
-    squares = np.einsum("nk,nk->n", at.residuals, whitened)
-    counts = np.maximum(at.measured.sum(axis=1), 1)
-    return float(np.median(squares / counts))
+    residuals = np.where(lost[:, None], 0.0, at.residuals)
+    whitened = np.linalg.solve(covariance, residuals[..., None])[..., 0]
+    squares = np.einsum("nk,nk->n", residuals, whitened)
+    return np.where(lost, np.inf, squares / np.maximum(at.measured.sum(axis=1), 1))
 
 
 def _units(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
@@ -148,5 +165,130 @@ def _legs(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements
         )
 
 
-_MISTAKES = (_units, _marks, _frames, _legs)
+def _reversed(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield joints whose readings perhaps count the other way, and the measurements turned round.
+
+    About zero, or between the ends of their travel.
+    """
+    names, legs = guess.robot.joint_names, guess.robot.legs
+    count = len(names)
+    ways = [("reverse the signs", np.zeros(count))]
+    if all(leg.limits is not None for leg in legs):
+        ends = np.array([sum(leg.limits or ()) for leg in legs])
+        if np.abs(ends).max() > 0.0:
+            ways.append(("they count from the other end of the limits", ends))
+    for advice, ends in ways:
+        for joints in (tuple(range(count)), *((i,) for i in range(count))):
+            turned = guess.joints(given.readings)
+            turned[:, joints] = ends[list(joints)] - turned[:, joints]
+            yield (
+                f"the readings of {_of(joints, names)} are reversed: {advice} of the columns"
+                if not ends.any()
+                else f"the readings of {_of(joints, names)} are reversed: {advice}",
+                replace(given, readings=guess.readings(turned)),
+            )
+
+
+def _scaled(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield joints whose readings are perhaps in wrong steps, and the measurements mended.
+
+    About zero, or from an end of their travel.
+    """
+    names, legs = guess.robot.joint_names, guess.robot.legs
+    count = len(names)
+    ends = [("", np.zeros(count))]
+    if all(leg.limits is not None for leg in legs):
+        limits = np.array([leg.limits for leg in legs])
+        ends += [(" from the upper end", limits[:, 1]), (" from the lower end", limits[:, 0])]
+    for factor, text, cause in _STEPS:
+        for where, end in ends:
+            for joints in (tuple(range(count)), *((i,) for i in range(count))):
+                mended = guess.joints(given.readings)
+                own = list(joints)
+                mended[:, own] = end[own] + factor * (mended[:, own] - end[own])
+                yield (
+                    f"the readings of {_of(joints, names)}{where} are {text} as large as they "
+                    f"should be, {cause}: give steps, lead or gear ratio as they are",
+                    replace(given, readings=guess.readings(mended)),
+                )
+
+
+def _fitted_zeros(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield the zeros that all rows together show to be off, and the measurements mended."""
+    yield from _fitted(given, guess, ("zeros",))
+
+
+def _fitted_scales(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield the zeros and scales that all rows show to be off, and the measurements mended."""
+    yield from _fitted(given, guess, ("scales",))
+    yield from _fitted(given, guess, ("scales", "zeros"))
+
+
+def _fitted(
+    given: Measurements, guess: Guess, sought: Sequence[str]
+) -> Iterator[tuple[str, Measurements]]:
+    legs, names = guess.robot.legs, guess.robot.joint_names
+    travel = [_WIDE_ZERO * leg.size if leg.joint.unit == "m" else _WIDE_ANGLE for leg in legs]
+    widths = {"zeros": travel, "scales": [_WIDE_SCALE] * len(legs)}
+    blocks = numbered(
+        Block(
+            kind,
+            "",
+            tuple(Unknown("", kind, "", w) for w in widths[kind]),
+            (),
+            tuple(range(len(legs))),
+        )
+        for kind in sought
+    )
+    try:
+        fit = Fitter(given, blocks, guess, starting_poses(guess, given)).run()
+    except DataError:
+        return
+    found = fit.guess
+    texts = []
+    for i, (leg, name) in enumerate(zip(legs, names, strict=True)):
+        unit = leg.joint.unit
+        zero, scale = found.zeros[i] - guess.zeros[i], found.scales[i] / guess.scales[i]
+        if "scales" in sought and abs(scale - 1.0) > OFF_TOLERANCES * TOLERANCES["scales"]:
+            texts.append(f"{name} reads {1.0 / scale:.4g} times what it should")
+        least = TOLERANCES["zeros" if unit == "m" else "zeros, rad"]
+        if "zeros" in sought and abs(zero) > OFF_TOLERANCES * least:
+            told, word = (1e3 * zero, "mm") if unit == "m" else (np.degrees(zero), "degrees")
+            texts.append(f"the zero of {name} is off by {told:+.3g} {word}")
+    if texts:
+        yield (
+            f"{', '.join(texts)}: home the machine again or mend its step units, or give the legs "
+            "reading = { zero = .., scale = .. }",
+            replace(given, readings=guess.readings(found.joints(given.readings))),
+        )
+
+
+def _of(joints: Sequence[int], names: Sequence[str]) -> str:
+    if len(joints) == len(names):
+        return "all joints"
+    return f"joint {joints[0] + 1} ({names[joints[0]]})"
+
+
+_STEPS = (
+    (2.0, "half", "as with half the lead or twice the steps"),
+    (0.5, "twice", "as with twice the lead or half the steps"),
+    (4.0, "a quarter", "as with a quarter of the lead"),
+    (0.25, "four times", "as with four times the lead"),
+    (10.0, "a tenth", "as of cm for mm"),
+    (0.1, "ten times", "as of mm for cm"),
+    (float(np.pi / 180.0), "180/pi times", "as of degrees for radians"),
+    (float(180.0 / np.pi), "pi/180", "as of radians for degrees"),
+    (1.0 / (2.0 * np.pi), "2 pi times", "as of radians for turns"),
+    (2.0 * np.pi, "1/(2 pi)", "as of turns for radians"),
+    (1e-3, "1000 times", "as of mm for m"),
+    (25.4e-3, "1/0.0254 times", "as of inches for m"),
+)
+"""Factors that mend readings, what the readings then are, and a likely cause."""
+
+_WIDE_ZERO = 0.3
+_WIDE_ANGLE = 1.0
+_WIDE_SCALE = 0.5
+"""Widths of a search for zeros (of a leg's size; rad) and scales that may be anything."""
+
+_MISTAKES = (_units, _marks, _frames, _legs, _reversed, _fitted_zeros, _scaled, _fitted_scales)
 """Likely mistakes, those that are quick to try first."""

@@ -6,7 +6,7 @@ squared residuals would fall if it were sought too (a score test).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,19 +53,26 @@ class Trial(NamedTuple):
     """Residuals (N, K) less those without it, before the other unknowns follow."""
 
 
-def residual_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
-    """Return the fault that explains most residuals, and the rows that do not fit even so."""
+def residual_faults(
+    fitter: Fitter, fit: Fit, reasons: Mapping[int, str] | None = None
+) -> tuple[Finding, ...]:
+    """Return the fault that explains most residuals, and the rows that do not fit even so.
+
+    `reasons` say by row why it was set aside before the fit.
+    """
     found, explained = _shown(fitter, fit)
     found = found or tuple(_bad_leg(fitter, fit))
-    return *found, *_outliers(fit, fitter.given, ~fit.kept & ~explained)
+    return *found, *_outliers(fit, fitter.given, ~fit.kept & ~explained, reasons or {})
 
 
-def _outliers(fit: Fit, given: Measurements, out: NDArray[np.bool_]) -> tuple[Finding, ...]:
+def _outliers(
+    fit: Fit, given: Measurements, out: NDArray[np.bool_], reasons: Mapping[int, str]
+) -> tuple[Finding, ...]:
     rows = np.flatnonzero(out)
     if not len(rows):
         return ()
     worst = rows[np.argsort(-fit.distances[rows])][:_LISTED]
-    named = ", ".join(f"{given.places[i]} ({_size(fit, i)})" for i in worst)
+    named = ", ".join(f"{given.places[i]} ({reasons.get(int(i)) or _size(fit, i)})" for i in worst)
     more = f" and {len(rows) - len(worst)} more" if len(rows) > len(worst) else ""
     text = f"Left out, as {'they do' if len(rows) > 1 else 'it does'} not fit: {named}{more}."
     return (Finding("outlier", text, float((fit.distances[rows] ** 2).sum())),)

@@ -37,11 +37,13 @@ def calibrate(
     plan: int | None = None,
     measure: Measure = "positions",
     plane: str | None = None,
+    anyway: bool = False,
 ) -> Result:
     """Find a machine's true geometry from measurements, and say what they cannot show.
 
     The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
-    it was found, robot.toml. The exit code is 0 whatever the verdict.
+    it was found, robot.toml, unless that is not trustworthy. The exit code is 0 whatever the
+    verdict.
 
     With --plan, poses that show the geometry best are written as a table of joints and poses.
 
@@ -62,6 +64,7 @@ def calibrate(
     --measure: What will be measured at the planned poses.
     --plane z=HEIGHT: The level that a planned probe touches, m. [default: z=0 where the tool works
         down to it, as on a printer's bed; else the bottom of the proved poses]
+    --anyway: Write robot.toml even where it is not trustworthy.
 
     Examples
     --------
@@ -93,9 +96,9 @@ def calibrate(
     with spinner(f"Calibrating {machine.name} from {len(given)} rows"):
         result = calibrated(machine, given, free=free, prior=tolerances, held_out=check)
     with spinner("Drawing the report"):
-        files = write_calibration(result, out, sources=sources)
+        files = write_calibration(result, out, sources=sources, anyway=anyway)
     data = {"files": [str(path) for path in files.paths], **numbers(result)}
-    return Result(data, partial(_show, result), files.paths)
+    return Result(data, partial(_show, result, files.left_out), files.paths)
 
 
 def _prior(path: str) -> dict[str, float]:
@@ -189,7 +192,7 @@ def _region(planned: Plan) -> str:
     return f"box, {', '.join(sides)}"
 
 
-def _show(result: Calibration) -> None:
+def _show(result: Calibration, left_out: str) -> None:
     """Print a verdict, what changed, what shows and what does not."""
     from pteron.report.calibration.values import notes
 
@@ -204,6 +207,7 @@ def _show(result: Calibration) -> None:
         *(f"Cannot be seen, as drawn: {plain(line)}" for line in shown.unseen),
         *(f"[yellow]Weak:[/yellow] {plain(line)}" for line in shown.weak),
         *map(plain, notes(result)),
+        *([f"[red]{plain(left_out)}[/red]"] if left_out else []),
     )
 
 

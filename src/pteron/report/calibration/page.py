@@ -47,8 +47,8 @@ class ErrorMap(NamedTuple):
     units: list[str]
 
 
-def page(result: Calibration) -> str:
-    """Return the page as HTML without reference to another file."""
+def page(result: Calibration, *, written: bool = True) -> str:
+    """Return the page as HTML without reference to another file; robot.toml may not be written."""
     made = template("calibration/page.html.j2", scaled=scaled)
     return made.render(
         result=result,
@@ -58,6 +58,7 @@ def page(result: Calibration) -> str:
         maps=error_maps(result),
         figures=_figures(result),
         notes=notes(result),
+        written=written,
     )
 
 
