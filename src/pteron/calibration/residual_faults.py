@@ -16,9 +16,14 @@ from numpy.typing import NDArray
 from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
 from pteron.calibration.guess import Block, Guess, Unknown, numbered
 from pteron.calibration.measurements import Measurements, evenly
+from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
+from pteron.kinematics.evaluate import evaluated
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+Score = Callable[[Array], tuple[float, Array]]
+"""From columns (N, K, c) to the fall of the squared residuals, and the columns' amounts."""
 
 _ROWS = 3000
 """Most rows that are examined, evenly spread."""
@@ -37,6 +42,9 @@ _EXPLAINED = 0.3
 
 _NOISY = 4.0
 """Mean square along one leg's coordinate, in variances, above which its model is doubted."""
+
+_FLAT = 1e-3
+"""Determinant of the couples of rods, over the cube of their size, below which nothing holds."""
 
 _LISTED = 8
 """Most outlying rows that are named."""
@@ -130,7 +138,12 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
 
     tried, best, gain = 0, None, -np.inf
     frame = [block for block in blocks if block.kind == "frame"]
-    for trial in _trials(start, given, chosen, slopes, [*more, *frame], score):
+    trials = (
+        *_trials(start, given, chosen, slopes, [*more, *frame], score),
+        *_scale_trials(start, given, chosen, slopes[..., more[0].where], score),
+        *_rod_trials(fit, given, chosen, slopes, more, score),
+    )
+    for trial in trials:
         tried += 1
         more_than_chance = trial.fall - float(scipy.stats.chi2.isf(0.5, trial.freedom))
         if more_than_chance > gain:
@@ -200,6 +213,82 @@ def _trials(
                 f"{alike}: fix it, and measure anew from there."
             )
             yield Trial(f"moved {block.kind}", text, len(amounts), fall, moved)
+
+
+def _scale_trials(
+    start: Guess, given: Measurements, chosen: Numbers, joints: Array, score: Score
+) -> Iterator[Trial]:
+    """Try a scale of each joint, and one of all; slopes (N, K, n) are against the joints' zeros."""
+    scales = joints * given.readings[chosen][:, None]
+    for i, name in enumerate(start.robot.joint_names):
+        fall, amounts = score(column := scales[..., i : i + 1])
+        text = (
+            f"Joint {i + 1} ({name}) moves {1e2 * amounts[0]:+.3g} % farther than it reads, beyond "
+            "what its tolerance allows: check its lead, gear ratio or steps."
+        )
+        yield Trial("scale", text, 1, fall, column @ amounts)
+    fall, amounts = score(column := scales.sum(axis=-1, keepdims=True))
+    text = (
+        f"All joints move {1e2 * amounts[0]:+.3g} % farther than they read, beyond what tolerances "
+        "allow: check leads, gear ratios or steps, or the unit of what is measured."
+    )
+    yield Trial("scale", text, 1, fall, column @ amounts)
+
+
+def _rod_trials(
+    fit: Fit,
+    given: Measurements,
+    chosen: Numbers,
+    slopes: Array,
+    more: Sequence[Block],
+    score: Score,
+) -> Iterator[Trial]:
+    """Try parallel rods of one leg that differ in length, and so tilt a platform that does not.
+
+    With the rod u from a bar b of length w, ends of the rods that differ by d turn the platform by
+    theta so that theta . (b x u) = |u| d / w, for each leg.
+    """
+    robot = fit.guess.robot
+    if robot.platform.angular.any():
+        return
+    poses = fit.poses[chosen]
+    couples = evaluated(robot, "beams", "nan", poses)[-1]
+    if couples.shape[1] != 3 or not np.isfinite(couples).all(axis=(1, 2)).any():
+        return
+    good = np.isfinite(couples).all(axis=(1, 2)) & (given.origins[chosen] < 0)
+    size = np.linalg.norm(couples, axis=-1).max(axis=-1)
+    flat = np.abs(np.linalg.det(np.where(good[:, None, None], couples, np.eye(3))))
+    good &= flat > _FLAT * size**3
+    turns = np.linalg.inv(np.where(good[:, None, None], couples, np.eye(3)))  # a column a leg
+    arms = np.array([leg.platform_point for leg in robot.legs]) @ np.array(robot.platform.frame)
+    arms += np.array([leg.fixed_offset for leg in robot.legs])
+    against = MachineSlopes(robot, ()).jacobian(fit.guess, poses) @ robot.platform.directions
+    marks = fit.guess.marked([given.marks[i] for i in chosen]) @ np.array(robot.platform.frame)
+    for i, (leg, name) in enumerate(zip(robot.legs, robot.joint_names, strict=True)):
+        turn = np.where(good[:, None], turns[:, :, i], 0.0)
+        shifts = np.cross(turn[:, None], arms)
+        column = -np.einsum(
+            "nkj,nj->nk", slopes[..., more[0].where], np.einsum("njx,njx->nj", against, shifts)
+        )
+        for block in more:
+            if block.kind == "mark":
+                mine = np.array([given.marks[k] == block.name for k in chosen])
+                # A mark's slopes are along the platform's frame.
+                moved = np.cross(turn, marks) @ np.array(robot.platform.frame).T
+                column += mine[:, None] * np.einsum("nkx,nx->nk", slopes[..., block.where], moved)
+        fall, amounts = score(column[..., None])
+        share = abs(amounts[0]) / leg.size
+        bar = leg.bar_length
+        told = (
+            f"{1e2 * share:.2g} % of their distance"
+            if bar is None
+            else f"{1e3 * share * bar:.2g} mm"
+        )
+        text = (
+            f"The parallel rods of leg {i + 1} ({name}) differ in length, by about {told}, and "
+            "tilt the platform: measure both, and fit a pair of equal ones."
+        )
+        yield Trial("unequal rods", text, 1, fall, column[..., None] @ amounts)
 
 
 def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
