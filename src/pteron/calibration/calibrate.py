@@ -12,14 +12,14 @@ from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
-from pteron.calibration.raw_faults import raw_fault
-from pteron.calibration.residual_faults import residual_faults
+from pteron.calibration.raw_faults import hidden_order, raw_fault
+from pteron.calibration.residual_faults import residual_faults, zero_faults
 from pteron.calibration.result import Calibration, HeldOut, calibrated, open_errors, values_of
 from pteron.calibration.set_aside import rows_set_aside
 from pteron.calibration.start import placed, starting_poses
-from pteron.calibration.thresholds import FEW_LEFT_OUT
+from pteron.calibration.thresholds import FEW_LEFT_OUT, ordinary_error
 from pteron.calibration.unknowns import blocks_of
-from pteron.calibration.verdict import EVERY, Evidence, rows_for_check, verdict_of
+from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike, as_manipulator
 
@@ -115,14 +115,22 @@ def calibrate(
         partial = Fitter(rows, blocks, start, own, part.aside, part.barred).run()
     fitter = Fitter(measurements, blocks, start, poses, aside.aside, aside.barred)
     fit = fitter.run(partial)
+    if _far_off(fit, measurements) and (
+        fault := raw_fault(measurements, blocks, Guess.drawn(robot, measurements), fitted=True)
+    ):
+        raise DataError(fault)
     judged = None
     if partial is not None:
         other = held_out if held_out is not None else _fitting(measurements, fit, ~kept)
         judged = _held_out(start, partial, blocks, other)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
     findings = residual_faults(fitter, fit, aside.reasons)
+    findings = (*zero_faults(fitter, fit), *findings)
     possible = open_errors(measurements, fit, blocks)
-    evidence = Evidence(measurements, fit, blocks, shown, judged, findings, possible, checked)
+    hidden = hidden_order(measurements, blocks, start)
+    evidence = Evidence(
+        measurements, fit, blocks, shown, judged, findings, possible, hidden, checked
+    )
     return Calibration(
         robot,
         calibrated(fit.guess),
@@ -137,6 +145,15 @@ def calibrate(
         blocks,
         start,
         possible,
+    )
+
+
+def _far_off(fit: Fit, given: Measurements) -> bool:
+    """Return whether a fit leaves more than ordinary tolerances do, in a kind of measurement."""
+    stated = given.setup.noise
+    return any(
+        error > ordinary_error(kind, stated.get(kind))
+        for kind, error in fitted_errors(fit, given).items()
     )
 
 

@@ -33,36 +33,93 @@ mistakes are tried."""
 _NEAR = 9.0
 """The same below which a mistake, undone, explains the residuals."""
 
+_FALLEN = 0.1
+"""Share of the misfit that a mistake, undone, leaves at most."""
+
+_CLEAR = 2.0
+"""Misfit that leaves no doubt: its expected value is below 1 where nothing is wrong."""
+
+_ALIKE = 2.0
+"""Ratio of misfits up to which the mistake that is more likely beforehand, the earlier, is told."""
+
 _ROWS = 16
 """Rows that are examined, drawn at random."""
+
+_FIRST = 5
+"""Rows that are examined first of a mistake."""
 
 _NOISE = 1e-4
 """Assumed noise, m and rad: small beside the effect of tolerances."""
 
 
-def raw_fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> str | None:
-    """Return the mistake, in words, that explains measurements far from the drawing; else None."""
+def raw_fault(
+    given: Measurements, blocks: Sequence[Block], robot_guess: Guess, *, fitted: bool = False
+) -> str | None:
+    """Return the mistake, in words, that explains measurements far from the drawing; else None.
+
+    After a fit that left errors beyond ordinary tolerances (`fitted`) they are far in any case.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
-        return _fault(given, blocks, robot_guess)
+        rows = _some_rows(given)
+        now = _misfit(rows, blocks, robot_guess)
+        if not fitted and now < _FAR:
+            return None
+        return _best_mistake(rows, blocks, robot_guess, min(_NEAR, _FALLEN * now))
 
 
-def _fault(given: Measurements, blocks: Sequence[Block], robot_guess: Guess) -> str | None:
-    # At random: rows at even steps might all be of one mark.
-    some = np.random.default_rng(0).permutation(len(given)) < _ROWS
-    rows = given.rows(some)
-    now = _misfit(rows, blocks, robot_guess)
-    if now < _FAR:
+def hidden_order(
+    given: Measurements, blocks: Sequence[Block], robot_guess: Guess
+) -> tuple[int, int] | None:
+    """Return two legs, from 1, whose readings could be swapped and nothing would show; else None.
+
+    Heights over the bed of a symmetric machine are those of its mirror image.
+    """
+    rows = _some_rows(given)
+    if {"position", "angle"} & set(given.kinds):
         return None
-    for mistakes in _MISTAKES:
-        tried = (
-            (_misfit(mended, blocks, robot_guess), text)
-            for text, mended in mistakes(rows, robot_guess)
-        )
-        found = [(left, text) for left, text in tried if left < min(_NEAR, 0.1 * now)]
-        if found:
-            return min(found)[1]
+    now = _misfit(rows, blocks, robot_guess)
+    for pair, _, mended in _swapped(rows, robot_guess):
+        if _misfit(mended, blocks, robot_guess) < max(_CLEAR, 1.5 * now):
+            return pair
     return None
+
+
+def _some_rows(given: Measurements) -> Measurements:
+    # At random: rows at even steps might all be of one mark.
+    return given.rows(np.random.default_rng(0).permutation(len(given)) < _ROWS)
+
+
+def _best_mistake(
+    rows: Measurements, blocks: Sequence[Block], guess: Guess, most: float
+) -> str | None:
+    """Return the mistake that, undone, leaves least; of those that leave about as little the first.
+
+    A group of mistakes that clearly has it ends the search.
+    """
+    tried: list[tuple[float, str]] = []
+    for mistakes in _MISTAKES:
+        tried += [
+            (_quick_misfit(mended, blocks, guess, most), text)
+            for text, mended in mistakes(rows, guess)
+        ]
+        if min(tried, default=(np.inf, ""))[0] < min(_CLEAR, most):
+            break
+    best = min(tried, default=(np.inf, ""))[0]
+    if best >= most:
+        return None
+    return next(text for left, text in tried if left <= min(_ALIKE * best + _CLEAR / 4.0, most))
+
+
+def _quick_misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess, most: float) -> float:
+    """Return `_misfit`, or inf where the first few rows are already far above the most that counts.
+
+    All assembly modes of rows that lead to no pose take long to seek.
+    """
+    some = np.arange(len(rows)) < _FIRST
+    if len(rows) > 2 * _FIRST and _misfit(rows.rows(some), blocks, guess) > 10.0 * most:
+        return np.inf
+    return _misfit(rows, blocks, guess)
 
 
 def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
@@ -152,17 +209,22 @@ def _frames(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measuremen
             )
 
 
-def _legs(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
-    """Yield legs whose readings were perhaps swapped, and the measurements with them exchanged."""
+def _swapped(
+    given: Measurements, guess: Guess
+) -> Iterator[tuple[tuple[int, int], str, Measurements]]:
+    """Yield pairs of legs, from 1, their names, and the measurements with readings exchanged."""
     names = guess.robot.joint_names
     for i, j in combinations(range(len(names)), 2):
         order = list(range(len(names)))
         order[i], order[j] = j, i
-        yield (
-            f"the readings of legs {i + 1} and {j + 1} ({names[i]} and {names[j]}) are swapped: "
-            "exchange the columns",
-            replace(given, readings=given.readings[:, order]),
-        )
+        told = f"{names[i]} and {names[j]}"
+        yield (i + 1, j + 1), told, replace(given, readings=given.readings[:, order])
+
+
+def _legs(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
+    """Yield legs whose readings were perhaps swapped, and the measurements with them exchanged."""
+    for (i, j), told, mended in _swapped(given, guess):
+        yield f"the readings of legs {i} and {j} ({told}) are swapped: exchange the columns", mended
 
 
 def _reversed(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:
@@ -290,5 +352,5 @@ _WIDE_ANGLE = 1.0
 _WIDE_SCALE = 0.5
 """Widths of a search for zeros (of a leg's size; rad) and scales that may be anything."""
 
-_MISTAKES = (_units, _marks, _frames, _legs, _reversed, _fitted_zeros, _scaled, _fitted_scales)
+_MISTAKES = (_units, _marks, _frames, _legs, _reversed, _scaled, _fitted_zeros, _fitted_scales)
 """Likely mistakes, those that are quick to try first."""

@@ -18,6 +18,8 @@ from pteron.calibration.guess import Block, Guess, Unknown, numbered
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
+from pteron.calibration.thresholds import OFF_TOLERANCES
+from pteron.calibration.unknowns import TOLERANCES
 from pteron.kinematics.evaluate import evaluated
 
 Array = NDArray[np.float64]
@@ -71,6 +73,24 @@ def residual_faults(
     found, explained = _shown(fitter, fit)
     found = found or tuple(_bad_leg(fitter, fit))
     return *found, *_outliers(fit, fitter.given, ~fit.kept & ~explained, reasons or {})
+
+
+def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
+    """Return the joints whose zeros are far off, as mean differences of joint coordinates."""
+    start, given = fitter.begin, fitter.given
+    rows = np.flatnonzero(fit.kept)
+    joints = fitter.slopes.joints(start, fit.poses[rows]) - start.joints(given.readings[rows])
+    found = []
+    for i, (leg, name) in enumerate(zip(start.robot.legs, start.robot.joint_names, strict=True)):
+        zero, linear = float(np.median(joints[:, i])), leg.joint.unit == "m"
+        if abs(zero) > OFF_TOLERANCES * TOLERANCES["zeros" if linear else "zeros, rad"]:
+            told = f"{1e3 * zero:+.3g} mm" if linear else f"{np.degrees(zero):+.3g} degrees"
+            text = (
+                f"The zero of joint {i + 1} ({name}) is off by about {told}: home it, or check "
+                "where its end stop is."
+            )
+            found.append(Finding("zero", text))
+    return tuple(found)
 
 
 def _outliers(

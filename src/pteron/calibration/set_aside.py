@@ -40,6 +40,10 @@ _PUT_BACK = 0.1
 """Residual, as a share of that before, below which a factor puts a row where it belongs."""
 
 
+_TELLING = 2
+"""Least measured numbers of a row: with one, some factor of many fits by chance."""
+
+
 class SetAside(NamedTuple):
     """Rows that a first fit leaves out, those that stay out (barred), and why, by row."""
 
@@ -164,7 +168,8 @@ class _Factors:
         readings = self.given.readings.copy()
         readings[row] = self.start.readings(joints)
         measured = self.given.rows(one)
-        if (self.given.origins[row]) >= 0 or len(measured) > 1:
+        told = np.isfinite(np.hstack([*measured.parts.values()])).sum()
+        if len(measured) > 1 or told < _TELLING:
             return None
         square = row_misfits(self.start, measured, self.blocks, pose)[0]
         limit = thresholds.FAR_ROW**2

@@ -42,6 +42,8 @@ class Evidence(NamedTuple):
     findings: Sequence[Finding]
     open_errors: Mapping[str, float]
     """Possible error of each coordinate (95 %), m and rad."""
+    hidden_order: tuple[int, int] | None
+    """Two legs, from 1, whose readings could be swapped and nothing would show."""
     rows_for_check: int
     """Rows from which on some are held out."""
 
@@ -84,7 +86,7 @@ def _errors(evidence: Evidence) -> Iterator[_Reason]:
             "or give a second log (--held-out).",
             "usable with care",
         )
-        for kind, error in _fitted_errors(evidence).items():
+        for kind, error in fitted_errors(evidence.fit, evidence.measurements).items():
             if error > thresholds.ordinary_error(kind, stated.get(kind)):
                 text = (
                     f"Even at the rows that were fitted the {kind} error is {_sized(error, kind)}"
@@ -124,9 +126,8 @@ def _errors(evidence: Evidence) -> Iterator[_Reason]:
         )
 
 
-def _fitted_errors(evidence: Evidence) -> dict[str, float]:
+def fitted_errors(fit: Fit, given: Measurements) -> dict[str, float]:
     """Return the root mean square residual of each kind, m and rad, at the rows that are kept."""
-    fit, given = evidence.fit, evidence.measurements
     counted = fit.measured & (fit.kept & (fit.distances < BEYOND))[:, None]
     kinds = {kind: counted & (given.kind_of == kind) for kind in given.kinds}
     return {
@@ -152,9 +153,12 @@ def _open_errors(evidence: Evidence) -> Iterator[_Reason]:
             measured = " and ".join(f"{name}s" for name in kinds)
             where = "" if given.setup.frame_known else " in an unknown frame"
             them = "it" if len(far) == 1 else "them"
+            order = ""
+            if evidence.hidden_order and kind == "position":
+                order = ", nor the order of the legs {} and {}".format(*evidence.hidden_order)
             yield _Reason(
                 f"{_listed(far)} may be off by {_sized(most, kind)} (95 %): "
-                f"{measured}{where} do not show {them}.",
+                f"{measured}{where} do not show {them}{order}.",
                 f"Measure {_listed(far)} too: positions, or distances across the work space.",
             )
 
