@@ -190,7 +190,7 @@ FAULTS = (
 WORDS = {
     "reversed": ("reversed",),
     "one reversed": ("reversed",),
-    "swapped": ("swapped",),
+    "swapped": ("swapped", "nor the order of the legs"),
     "half the lead": ("half as large", "reads 0.5", "half the lead"),
     "millimetres": ("millimetres",),
     "row 195 mm off": ("row 18",),
@@ -250,7 +250,7 @@ def workspace(robot, rng, count, level=None):
     if robot.name == "linear-delta":
         low, high = np.array([-0.055, -0.055, 0.0]), np.array([0.055, 0.055, 0.08])
     elif len(home) == 3:
-        low, high = home - (0.25, 0.25, 0.15), home + (0.25, 0.25, 0.05)
+        low, high = np.add(home, [(-0.25, -0.25, -0.15), (0.25, 0.25, 0.05)])
     else:
         size = 0.1 * max(leg.limits[1] for leg in robot.legs)
         half = np.repeat([size, 0.15], 3)

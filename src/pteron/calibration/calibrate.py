@@ -151,7 +151,7 @@ def calibrate(
 def _far_off(fit: Fit, given: Measurements) -> bool:
     """Return whether a fit leaves more than ordinary tolerances do, in a kind of measurement."""
     stated = given.setup.noise
-    return any(
+    return not fit.settled or any(
         error > ordinary_error(kind, stated.get(kind))
         for kind, error in fitted_errors(fit, given).items()
     )

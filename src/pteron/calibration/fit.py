@@ -42,7 +42,7 @@ _LOST = 30.0
 """Cost of a row whose readings lead to no pose, in variances, as if it hardly fitted."""
 
 BEYOND = 1e3
-"""Standard deviations at which such a row counts, so that it is left out in the end."""
+"""Distance that marks such a row, so that it is left out in the end; no residual has just this."""
 
 _STRAY = 30.0
 """Standard deviations beyond which a row may be left out of a step that improves all others."""
@@ -88,6 +88,8 @@ class Fit:
     shared : array, shape (p, p), or 0
         By how much `information` is too great where several distances share a row's readings: each
         row is weighted as if its noise were its own alone.
+    settled : bool
+        Whether the search has ended where nothing is more probable nearby.
     """
 
     guess: Guess
@@ -104,6 +106,7 @@ class Fit:
     cost: float = np.inf
     steps: int = 0
     shared: Array | float = 0.0
+    settled: bool = True
 
     @cached_property
     def covariance(self) -> Array:
@@ -157,7 +160,7 @@ class Fitter:
         self.prior = 1.0 / tolerances_of(blocks) ** 2
         none = np.zeros(len(given), dtype=bool)
         self.barred = none if barred is None else barred
-        lost = np.isnan(poses).any(axis=1)
+        lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=1))
         self.aside = lost | self.barred | (none if aside is None else aside)
         # Newton's steps to the pose of a lost row, should there be one later, begin in the middle.
         self.begin_poses = poses
@@ -172,7 +175,7 @@ class Fitter:
         Raises
         ------
         DataError
-            If it does not settle, or the measurements leave something without a tolerance open.
+            If most readings lead to no pose, or the measurements leave open what has no tolerance.
         """
         setup = self.given.setup.noise
         sought = [kind for kind in self.given.kinds if kind not in setup]
@@ -198,16 +201,19 @@ class Fitter:
             )
             kept = (scaled**2 <= limits) & ~self.barred
             if 2 * kept.sum() < len(kept):  # no rows are the faultless ones
-                kept = (at.distances < BEYOND) & ~self.barred
+                kept = (at.distances != BEYOND) & ~self.barred
             alike = all(abs(noise[k] / at.noise[k] - 1.0) < 0.01 for k in sought)
             if alike and (kept == at.kept).all():
                 break
-            at = self._at(at, noise=noise, kept=kept)
+            try:
+                at = self._at(at, noise=noise, kept=kept)
+            except ValueError:  # of the rows that fit, most lead to no pose
+                return replace(at, settled=False, shared=self._shared(at))
         return replace(at, shared=self._shared(at))
 
     def _found_again(self, at: Fit) -> Fit:
         """Return the fit with the poses of rows that Newton's steps lost on their way."""
-        lost = np.flatnonzero(at.distances >= BEYOND)
+        lost = np.flatnonzero(at.distances == BEYOND)
         if not len(lost):
             return at
         joints, poses = at.guess.joints(self.given.readings)[lost], at.poses.copy()
@@ -244,10 +250,8 @@ class Fitter:
                 if share < 1e-3:
                     if small.max() < 1e-2:
                         break
-                    raise DataError(
-                        "the search for the geometry does not settle: the measurements contradict "
-                        "the machine as drawn; check units, the order of the joints, and the frame"
-                    )
+                    at = replace(at, settled=False)
+                    break
             if not fell:
                 break
             at = after
@@ -317,7 +321,8 @@ class Fitter:
             raise ValueError
         distances[lost] = BEYOND
         values = guess, fit.total, fit.noise, kept, found, self.prior
-        return Fit(*values, residuals, measured, distances, matrix, right, cost, fit.steps)
+        ends = matrix, right, cost, fit.steps, 0.0, fit.settled
+        return Fit(*values, residuals, measured, distances, *ends)
 
     def whitened(
         self, at: Rows, guess: Guess, noise: dict[str, float]
@@ -361,8 +366,10 @@ class Fitter:
         """Return the noise by kind that the residuals show, less what the unknowns took of it."""
         if not sought:
             return {}
-        kept = fit.kept & (fit.distances < BEYOND)
+        kept = fit.kept & (fit.distances != BEYOND)
         rows = np.flatnonzero(kept)
+        if not len(rows):
+            return {}
         some = rows[evenly(len(rows), _CHUNK)]
         at = self.slopes.rows(fit.guess, self.given, fit.poses, some)
         found = {}

@@ -136,7 +136,7 @@ def row_misfits(guess: Guess, rows: Measurements, blocks: Sequence[Block], poses
 
     inf where it has no pose.
     """
-    lost = np.isnan(poses).any(axis=1)
+    lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=1))
     lost |= (rows.origins >= 0) & lost[rows.origins]
     if lost.all():
         return np.full(len(rows), np.inf)

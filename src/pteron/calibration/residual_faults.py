@@ -19,7 +19,6 @@ from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
 from pteron.calibration.thresholds import OFF_TOLERANCES
-from pteron.calibration.unknowns import TOLERANCES
 from pteron.kinematics.evaluate import evaluated
 
 Array = NDArray[np.float64]
@@ -76,14 +75,24 @@ def residual_faults(
 
 
 def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
-    """Return the joints whose zeros are far off, as mean differences of joint coordinates."""
+    """Return the joints whose zeros are beyond their tolerances, with sizes.
+
+    A size is the median difference of joint coordinates, as a guide point takes part of a zero.
+    """
     start, given = fitter.begin, fitter.given
     rows = np.flatnonzero(fit.kept)
     joints = fitter.slopes.joints(start, fit.poses[rows]) - start.joints(given.readings[rows])
+    far = {
+        leg
+        for block in fitter.blocks
+        if block.kind == "zeros"
+        for leg, u, t in zip(block.legs, block.unknowns, fit.total[block.where], strict=True)
+        if abs(t) > OFF_TOLERANCES * u.tolerance
+    }
     found = []
     for i, (leg, name) in enumerate(zip(start.robot.legs, start.robot.joint_names, strict=True)):
         zero, linear = float(np.median(joints[:, i])), leg.joint.unit == "m"
-        if abs(zero) > OFF_TOLERANCES * TOLERANCES["zeros" if linear else "zeros, rad"]:
+        if i in far:
             told = f"{1e3 * zero:+.3g} mm" if linear else f"{np.degrees(zero):+.3g} degrees"
             text = (
                 f"The zero of joint {i + 1} ({name}) is off by about {told}: home it, or check "
@@ -107,7 +116,7 @@ def _outliers(
 
 
 def _size(fit: Fit, row: int) -> str:
-    if fit.distances[row] >= BEYOND:
+    if fit.distances[row] == BEYOND:
         return "its readings lead to no pose"
     left = fit.residuals[row]
     k = int(np.abs(left).argmax())
@@ -272,7 +281,7 @@ def _rod_trials(
     if robot.platform.angular.any():
         return
     poses = fit.poses[chosen]
-    couples = evaluated(robot, "beams", "nan", poses)[-1]
+    couples: Array = evaluated(robot, "beams", "nan", poses)[-1]
     if couples.shape[1] != 3 or not np.isfinite(couples).all(axis=(1, 2)).any():
         return
     good = np.isfinite(couples).all(axis=(1, 2)) & (given.origins[chosen] < 0)

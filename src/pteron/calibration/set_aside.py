@@ -57,7 +57,7 @@ def rows_set_aside(
 ) -> SetAside:
     """Return the rows that the drawn machine does not reach, that lie beyond limits, or far off."""
     reasons: dict[int, str] = {}
-    lost = np.isnan(poses).any(axis=1)
+    lost: Mask = np.asarray(np.isnan(poses).any(axis=1))
     depths = _depths_under_planes(start, given, poses)
     barred = depths > thresholds.UNDER_PLANE
     squares = row_misfits(start, given, blocks, poses)

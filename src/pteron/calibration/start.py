@@ -72,11 +72,11 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
         same = np.sign(np.linalg.det(slopes.jacobian(guess, modes))) == side
         modes = modes[same] if same.any() and not whole[i] else modes
         poses[i] = modes[np.abs(modes - begin[i]).max(axis=-1).argmin()]
-    lost = np.isnan(poses).any(axis=-1)
+    lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=-1))
     if 2 * lost.sum() > len(lost):
-        i = int(np.argmax(lost))
+        first = int(np.argmax(lost))
         raise DataError(
-            f"{given.places[i]}: the readings {np.round(given.readings[i], 6).tolist()} lead "
+            f"{given.places[first]}: the readings {np.round(given.readings[first], 6).tolist()} lead "
             f"to no pose of {robot.name} as drawn, nor do those of {lost.sum()} of {len(lost)} "
             "rows; check their units, zeros, signs and order"
         )

@@ -69,7 +69,8 @@ def verdict_of(evidence: Evidence) -> Verdict:
     first = findings or ([_Reason(_UNEXPLAINED)] if bad else [])
     reasons = [*_open_errors(evidence), *findings, *errors, *_far_values(evidence)]
     if bad:
-        reasons = [*first, *(reason for reason in reasons if reason not in first)]
+        said = [*first, *_open_errors(evidence)]  # that errors remain needs no other words
+        reasons = [*first, *(reason for reason in reasons if reason not in said)]
     opinion = Opinion()
     for text, step, grade in (*reasons, *_unseen(evidence.observability)):
         opinion.add(text, step, grade=grade)
@@ -79,6 +80,13 @@ def verdict_of(evidence: Evidence) -> Verdict:
 def _errors(evidence: Evidence) -> Iterator[_Reason]:
     """Yield what the errors after the fit say, at held-out rows or, without them, at all rows."""
     held_out, stated = evidence.held_out, evidence.measurements.setup.noise
+    if not evidence.fit.settled:
+        yield _Reason(
+            "The search for the geometry does not settle: the measurements contradict the machine "
+            "as drawn.",
+            "Check units, the order and signs of the joints, and the frame.",
+            "not trustworthy",
+        )
     if held_out is None:
         yield _Reason(
             "No rows were left for a check: all were needed for the fit.",
@@ -128,7 +136,7 @@ def _errors(evidence: Evidence) -> Iterator[_Reason]:
 
 def fitted_errors(fit: Fit, given: Measurements) -> dict[str, float]:
     """Return the root mean square residual of each kind, m and rad, at the rows that are kept."""
-    counted = fit.measured & (fit.kept & (fit.distances < BEYOND))[:, None]
+    counted = fit.measured & (fit.kept & (fit.distances != BEYOND))[:, None]
     kinds = {kind: counted & (given.kind_of == kind) for kind in given.kinds}
     return {
         kind: float(np.sqrt(np.mean(fit.residuals[here] ** 2)))
