@@ -75,10 +75,11 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=-1))
     if 2 * lost.sum() > len(lost):
         first = int(np.argmax(lost))
+        reading = np.round(given.readings[first], 6).tolist()
         raise DataError(
-            f"{given.places[first]}: the readings {np.round(given.readings[first], 6).tolist()} lead "
-            f"to no pose of {robot.name} as drawn, nor do those of {lost.sum()} of {len(lost)} "
-            "rows; check their units, zeros, signs and order"
+            f"{given.places[first]}: the readings {reading} lead to no pose of {robot.name} as "
+            f"drawn, nor do those of {lost.sum()} of {len(lost)} rows; check their units, zeros, "
+            "signs and order"
         )
     return poses
 

@@ -10,6 +10,7 @@ from typing import Any
 from pteron.calibration import Calibration
 from pteron.json_values import json_ready
 from pteron.manipulator.saving import text_of
+from pteron.report.calibration.firmware import FirmwareFit
 from pteron.report.calibration.values import notes
 from pteron.report.write import checked_apart, checked_folder, commented
 from pteron.report.written import Written as Written, write_found
@@ -21,6 +22,7 @@ def write_calibration(
     *,
     sources: Iterable[str | Path] = (),
     anyway: bool = False,
+    firmware: FirmwareFit | None = None,
 ) -> Written:
     """Write a calibration: a page, `calibration.json`, and the calibrated machine, `robot.toml`.
 
@@ -37,6 +39,8 @@ def write_calibration(
         Files that were read, which the machine's file must not replace.
     anyway : bool
         Whether the machine's file is written even where it is not trustworthy.
+    firmware : FirmwareFit, optional
+        A printer's own values, `firmware_fit`, which the page then shows first.
 
     Returns
     -------
@@ -56,8 +60,8 @@ def write_calibration(
     models = {}
     if anyway or result.verdict.grade != "not trustworthy":
         models["robot.toml"] = commented(_header(result)) + text_of(result.robot)
-    html = page(result, written=bool(models))
-    files = write_found(target, "calibration", html, numbers(result), models)
+    html = page(result, written=bool(models), firmware=firmware)
+    files = write_found(target, "calibration", html, numbers(result, firmware), models)
     if models:
         return files
     stale = (target / "robot.toml").exists()
@@ -69,10 +73,13 @@ def write_calibration(
     )
 
 
-def numbers(result: Calibration) -> dict[str, Any]:
+def numbers(result: Calibration, firmware: FirmwareFit | None = None) -> dict[str, Any]:
     """Return the numbers of a calibration as JSON has them, null where one is not finite."""
-    found: dict[str, Any] = json_ready(result.as_dict() | {"notes": list(notes(result))})
-    return found
+    whole = result.as_dict() | {"notes": list(notes(result))}
+    if firmware is not None:
+        whole["firmware"] = firmware.as_dict()
+    ready: dict[str, Any] = json_ready(whole)
+    return ready
 
 
 def _header(result: Calibration) -> list[str]:
