@@ -197,7 +197,7 @@ WORDS = {
     "beyond the reach": ("row 18",),
     "slipped zero": ("slipped",),
     "unequal rods": ("parallel rods of leg 2", "do not show"),
-    "zero off": ("the zero of", "zeros[2]"),
+    "zero off": ("the zero of", "The zero of joint 2"),
 }
 """Words of which one names the cause."""
 

@@ -45,6 +45,9 @@ _ALIKE = 2.0
 _ROWS = 16
 """Rows that are examined, drawn at random."""
 
+_QUICK_MODES = 3
+"""Freedom up to which all assembly modes of a row take milliseconds; of hexapods a tenth second."""
+
 _FIRST = 5
 """Rows that are examined first of a mistake."""
 
@@ -125,10 +128,18 @@ def _quick_misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess, mos
 def _misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
     """Return the rows' median of the mean squared residual, in variances; inf: no pose."""
     try:
-        poses = starting_poses(guess, rows)
+        poses = _trial_poses(guess, rows)
     except DataError:
         return np.inf
     return float(np.median(row_misfits(guess, rows, blocks, poses)))
+
+
+def _trial_poses(guess: Guess, rows: Measurements) -> Array:
+    """Return poses of readings that may be wrong: all assembly modes where these are quick to find.
+
+    The right readings lead to the measured pose, or near home, by Newton's steps alone.
+    """
+    return starting_poses(guess, rows, modes=guess.robot.freedom <= _QUICK_MODES)
 
 
 def row_misfits(guess: Guess, rows: Measurements, blocks: Sequence[Block], poses: Array) -> Array:
@@ -303,7 +314,7 @@ def _fitted(
         for kind in sought
     )
     try:
-        fit = Fitter(given, blocks, guess, starting_poses(guess, given)).run()
+        fit = Fitter(given, blocks, guess, _trial_poses(guess, given)).run()
     except DataError:
         return
     found = fit.guess

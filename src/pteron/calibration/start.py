@@ -34,12 +34,13 @@ _PLANE = 3
 """Least heights that fix a plane's normal."""
 
 
-def starting_poses(guess: Guess, given: Measurements) -> Array:
+def starting_poses(guess: Guess, given: Measurements, *, modes: bool = True) -> Array:
     """Return the pose (N, m) of each row on a guess of the machine; NaN where it has none.
 
     Newton's method finds it from the measured pose, or from the home pose. Where that leads far
     away, across a singularity, or far from a measured height, it is the assembly mode that agrees
     with the row's measurements and, of those that agree alike, the one nearest to the start.
+    Without `modes` these are not sought, and such a row has no pose.
 
     Raises
     ------
@@ -59,19 +60,20 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     other |= np.where(whole, far.any(axis=-1), sides != side)
     off = np.abs(_height_residuals(guess, given, poses, np.arange(len(given))))
     other |= ~(off <= _OTHER_MODE * slopes.size)
-    for i, modes in zip(
-        np.flatnonzero(other), direct_kinematics(robot, joints[other]), strict=True
-    ):
-        modes = modes[~np.isnan(modes).any(axis=-1)]
-        if not len(modes):
+    if not modes:
+        poses[other] = np.nan
+    sought = np.flatnonzero(other if modes else np.zeros_like(other))
+    for i, found in zip(sought, direct_kinematics(robot, joints[sought]), strict=True):
+        several = found[~np.isnan(found).any(axis=-1)]
+        if not len(several):
             poses[i] = np.nan
             continue
         # Of a row without a height all residuals are 0.
-        off = np.abs(_height_residuals(guess, given, modes, np.full(len(modes), i)))
-        modes = modes[off <= off.min() + _OTHER_MODE * slopes.size]
-        same = np.sign(np.linalg.det(slopes.jacobian(guess, modes))) == side
-        modes = modes[same] if same.any() and not whole[i] else modes
-        poses[i] = modes[np.abs(modes - begin[i]).max(axis=-1).argmin()]
+        off = np.abs(_height_residuals(guess, given, several, np.full(len(several), i)))
+        several = several[off <= off.min() + _OTHER_MODE * slopes.size]
+        same = np.sign(np.linalg.det(slopes.jacobian(guess, several))) == side
+        several = several[same] if same.any() and not whole[i] else several
+        poses[i] = several[np.abs(several - begin[i]).max(axis=-1).argmin()]
     lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=-1))
     if 2 * lost.sum() > len(lost):
         first = int(np.argmax(lost))
