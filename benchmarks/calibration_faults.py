@@ -37,7 +37,8 @@ def judged(case: str, fault: str, seed: int) -> tuple[str, bool, float] | None:
         return "refused", any(word in str(error) for word in WORDS.get(fault, ())), 0.0
     lines = [result.verdict.reasons[0], *(finding.text for finding in result.findings[:2])]
     named = any(word in line for word in WORDS.get(fault, ()) for line in lines)
-    stated = [max(result.open_errors[name], FINE) for name in "xyz"]
+    hidden = result.hidden_order.error if result.hidden_order else 0.0
+    stated = [max(result.open_errors[name] + hidden, FINE) for name in "xyz"]
     return result.verdict.grade, named, float((sample.errors(result.robot) / stated).max())
 
 

@@ -127,7 +127,7 @@ def calibrate(
     findings = residual_faults(fitter, fit, aside.reasons)
     findings = (*zero_faults(fitter, fit), *findings)
     possible = open_errors(measurements, fit, blocks)
-    hidden = hidden_order(measurements, blocks, start)
+    hidden = hidden_order(measurements, blocks, start, fit)
     evidence = Evidence(
         measurements, fit, blocks, shown, judged, findings, possible, hidden, checked
     )
@@ -145,6 +145,7 @@ def calibrate(
         blocks,
         start,
         possible,
+        hidden,
     )
 
 

@@ -15,10 +15,11 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.calibration.fit import Fitter
+from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, Unknown, numbered, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.residuals import MachineSlopes
+from pteron.calibration.result import HiddenOrder
 from pteron.calibration.start import placed, starting_poses
 from pteron.calibration.thresholds import OFF_TOLERANCES
 from pteron.calibration.unknowns import TOLERANCES
@@ -72,20 +73,46 @@ def raw_fault(
 
 
 def hidden_order(
-    given: Measurements, blocks: Sequence[Block], robot_guess: Guess
-) -> tuple[int, int] | None:
-    """Return two legs, from 1, whose readings could be swapped and nothing would show; else None.
+    given: Measurements, blocks: Sequence[Block], robot_guess: Guess, fit: Fit
+) -> HiddenOrder | None:
+    """Return two legs whose readings could be swapped and nothing would show; None for none.
 
     Heights over the bed of a symmetric machine are those of its mirror image.
     """
     rows = _some_rows(given)
-    if {"position", "angle"} & set(given.kinds):
+    if set(given.kinds) != {"height"}:
         return None
     now = _misfit(rows, blocks, robot_guess)
     for pair, _, mended in _swapped(rows, robot_guess):
         if _misfit(mended, blocks, robot_guess) < max(_CLEAR, 1.5 * now):
-            return pair
+            return HiddenOrder(pair, _change_by_order(given, robot_guess, fit, pair))
     return None
+
+
+def _change_by_order(given: Measurements, start: Guess, fit: Fit, pair: tuple[int, int]) -> float:
+    """Return the greatest change of the tool's place if two readings are swapped, m.
+
+    It is that of the calibrated machine beyond the mirror image that the drawn one has.
+    """
+    order = list(range(given.readings.shape[1]))
+    order[pair[0] - 1], order[pair[1] - 1] = pair[1] - 1, pair[0] - 1
+    slopes = MachineSlopes(start.robot, ())
+    middle = np.tile(np.median(fit.poses[fit.kept], axis=0), (len(given), 1))
+
+    def places(guess: Guess, readings: Array) -> Array:
+        poses = slopes.poses(guess, guess.joints(readings), middle)
+        return guess.points(given.marks, poses)
+
+    swapped = given.readings[:, order]
+    drawn, drawn_swapped = places(start, given.readings), places(start, swapped)
+    found, found_swapped = places(fit.guess, given.readings), places(fit.guess, swapped)
+    good = fit.kept & np.isfinite(drawn + drawn_swapped + found + found_swapped).all(axis=1)
+    if not good.any():
+        return float("inf")
+    around = np.column_stack([drawn[good], np.ones(good.sum())])
+    mirror = np.linalg.lstsq(around, drawn_swapped[good], rcond=1e-6)[0]
+    image = np.column_stack([found[good], np.ones(good.sum())]) @ mirror
+    return float(np.linalg.norm(found_swapped[good] - image, axis=1).max())
 
 
 def _some_rows(given: Measurements) -> Measurements:

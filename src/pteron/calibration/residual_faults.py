@@ -18,7 +18,7 @@ from pteron.calibration.guess import Block, Guess, Unknown, numbered
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
-from pteron.calibration.thresholds import OFF_TOLERANCES
+from pteron.calibration.thresholds import OFF_TOLERANCES, ORDINARY_ERROR
 from pteron.kinematics.evaluate import evaluated
 
 Array = NDArray[np.float64]
@@ -183,7 +183,11 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
         return (), explained
     after = np.linalg.norm(left + remaining(best.moved), axis=-1)
     explained[chosen] = after < _EXPLAINED * np.linalg.norm(left, axis=-1)
-    return (Finding(best.kind, best.text, gain),), explained
+    # Rods that differ the geometry takes; what it does not take of them is left.
+    moved = remaining(best.moved) if best.kind == "unequal rods" else best.moved
+    limits = np.array([ORDINARY_ERROR[str(kind)] / fit.noise[str(kind)] for kind in given.kind_of])
+    effect = float((np.abs(moved) / limits)[fit.kept[chosen]].max(initial=0.0))
+    return (Finding(best.kind, best.text, gain, effect),), explained
 
 
 def _trials(

@@ -98,6 +98,24 @@ class Finding:
     text: str
     improvement: float = 0.0
     """Fall of the sum of squared residuals with this fault in the fit, in variances."""
+    effect: float = 0.0
+    """Greatest shift that it makes of a measurement that was fitted, in ordinary errors."""
+
+
+@dataclass(frozen=True)
+class HiddenOrder:
+    """Two legs whose readings could be swapped and nothing would show.
+
+    Attributes
+    ----------
+    legs : tuple of int
+        Their numbers, from 1.
+    error : float
+        Greatest further error of the tool on the calibrated machine if they are swapped, m.
+    """
+
+    legs: tuple[int, int]
+    error: float
 
 
 @dataclass(frozen=True)
@@ -130,6 +148,8 @@ class Calibration:
     open_errors : dict
         Possible error (95 %) of each coordinate of the pose, of the tool where it is a length, at
         the measured poses, m and rad.
+    hidden_order : HiddenOrder or None
+        Legs of which the measurements do not show the order.
     """
 
     drawn: Manipulator
@@ -145,6 +165,7 @@ class Calibration:
     blocks: tuple[Block, ...]
     start: Guess
     open_errors: dict[str, float]
+    hidden_order: HiddenOrder | None = None
 
     def errors(self, poses: ArrayLike) -> tuple[Array, Array]:
         """Return the errors of the tool at poses as drawn, and their uncertainty as calibrated.
@@ -210,7 +231,7 @@ class Calibration:
             **picked(self.observability, "rank shown columns"),
             "certificate": self.observability.summary(),
             **picked(self.observability, "unseen weak"),
-            **picked(self, "held_out findings verdict open_errors"),
+            **picked(self, "held_out findings verdict open_errors hidden_order"),
             "outliers": outliers,
         }
 

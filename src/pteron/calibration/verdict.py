@@ -13,7 +13,7 @@ from pteron.calibration.fit import BEYOND, Fit
 from pteron.calibration.guess import Block
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
-from pteron.calibration.result import Finding, HeldOut
+from pteron.calibration.result import Finding, HeldOut, HiddenOrder
 from pteron.verdict import Grade, Opinion, Verdict
 
 EVERY = 5
@@ -42,8 +42,7 @@ class Evidence(NamedTuple):
     findings: Sequence[Finding]
     open_errors: Mapping[str, float]
     """Possible error of each coordinate (95 %), m and rad."""
-    hidden_order: tuple[int, int] | None
-    """Two legs, from 1, whose readings could be swapped and nothing would show."""
+    hidden_order: HiddenOrder | None
     rows_for_check: int
     """Rows from which on some are held out."""
 
@@ -64,8 +63,11 @@ def rows_for_check(given: Measurements, blocks: Sequence[Block]) -> int:
 def verdict_of(evidence: Evidence) -> Verdict:
     """Return the verdict: its first reason is the cause of a bad grade, or what stays open."""
     errors = [*_errors(evidence), *_left_out(evidence.fit)]
-    findings = [_Reason(finding.text, "", "usable with care") for finding in evidence.findings]
-    bad = any(reason.grade == "not trustworthy" for reason in errors)
+    findings = [
+        _Reason(f.text, "", "not trustworthy" if f.effect > 1.0 else "usable with care")
+        for f in evidence.findings
+    ]
+    bad = any(reason.grade == "not trustworthy" for reason in (*errors, *findings))
     first = findings or ([_Reason(_UNEXPLAINED)] if bad else [])
     reasons = [*_open_errors(evidence), *findings, *errors, *_far_values(evidence)]
     if bad:
@@ -162,8 +164,12 @@ def _open_errors(evidence: Evidence) -> Iterator[_Reason]:
             where = "" if given.setup.frame_known else " in an unknown frame"
             them = "it" if len(far) == 1 else "them"
             order = ""
-            if evidence.hidden_order and kind == "position":
-                order = ", nor the order of the legs {} and {}".format(*evidence.hidden_order)
+            hidden = evidence.hidden_order
+            if hidden and kind == "position":
+                order = (
+                    f", nor the order of the legs {hidden.legs[0]} and {hidden.legs[1]}: if they "
+                    f"are swapped, by {_sized(hidden.error, 'position')} more"
+                )
             yield _Reason(
                 f"{_listed(far)} may be off by {_sized(most, kind)} (95 %): "
                 f"{measured}{where} do not show {them}{order}.",
