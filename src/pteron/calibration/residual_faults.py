@@ -89,17 +89,17 @@ def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
         for leg, u, t in zip(block.legs, block.unknowns, fit.total[block.where], strict=True)
         if abs(t) > OFF_TOLERANCES * u.tolerance
     }
-    found = []
+    findings = []
     for i, (leg, name) in enumerate(zip(start.robot.legs, start.robot.joint_names, strict=True)):
         zero, linear = float(np.median(joints[:, i])), leg.joint.unit == "m"
         if i in far:
-            told = f"{1e3 * zero:+.3g} mm" if linear else f"{np.degrees(zero):+.3g} degrees"
+            size = f"{1e3 * zero:+.3g} mm" if linear else f"{np.degrees(zero):+.3g} degrees"
             text = (
-                f"The zero of joint {i + 1} ({name}) is off by about {told}: home it, or check "
+                f"The zero of joint {i + 1} ({name}) is off by about {size}: home it, or check "
                 "where its end stop is."
             )
-            found.append(Finding("zero", text))
-    return tuple(found)
+            findings.append(Finding("zero", text))
+    return tuple(findings)
 
 
 def _outliers(
@@ -312,14 +312,12 @@ def _rod_trials(
         fall, amounts = score(column[..., None])
         share = abs(amounts[0]) / leg.size
         bar = leg.bar_length
-        told = (
-            f"{1e2 * share:.2g} % of their distance"
-            if bar is None
-            else f"{1e3 * share * bar:.2g} mm"
-        )
+        difference = f"{1e2 * share:.2g} % of their distance"
+        if bar is not None:
+            difference = f"{1e3 * share * bar:.2g} mm"
         text = (
-            f"The parallel rods of leg {i + 1} ({name}) differ in length, by about {told}, and "
-            "tilt the platform: measure both, and fit a pair of equal ones."
+            f"The parallel rods of leg {i + 1} ({name}) differ in length, by about {difference}, "
+            "and tilt the platform: measure both, and fit a pair of equal ones."
         )
         yield Trial("unequal rods", text, 1, fall, column[..., None] @ amounts)
 

@@ -63,8 +63,8 @@ def starting_poses(guess: Guess, given: Measurements, *, modes: bool = True) -> 
     if not modes:
         poses[other] = np.nan
     sought = np.flatnonzero(other if modes else np.zeros_like(other))
-    for i, found in zip(sought, direct_kinematics(robot, joints[sought]), strict=True):
-        several = found[~np.isnan(found).any(axis=-1)]
+    for i, assembly_modes in zip(sought, direct_kinematics(robot, joints[sought]), strict=True):
+        several = assembly_modes[~np.isnan(assembly_modes).any(axis=-1)]
         if not len(several):
             poses[i] = np.nan
             continue

@@ -31,6 +31,12 @@ _UNEXPLAINED = (
 )
 
 
+_ROD_ADVICE = (
+    "Measure both rods of each pair: rods that differ tilt the platform, and where positions are "
+    "not measured a fit takes that for geometry."
+)
+
+
 class Evidence(NamedTuple):
     """What a verdict rests on."""
 
@@ -76,6 +82,10 @@ def verdict_of(evidence: Evidence) -> Verdict:
     opinion = Opinion()
     for text, step, grade in (*reasons, *_unseen(evidence.observability)):
         opinion.add(text, step, grade=grade)
+    if "position" not in evidence.measurements.kinds and any(
+        leg.bar for leg in evidence.fit.guess.robot.legs
+    ):
+        opinion.steps.append(_ROD_ADVICE)
     return opinion.verdict()
 
 
