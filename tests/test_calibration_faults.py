@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calibrated import GEOMETRY, off_drawing, printer, tool_places
+from calibrated import GEOMETRY, measured, off_drawing, printer, tool_places
 from calibration_plants import CASES, FAULTS, WORDS, trial
 from mechanisms import CATALOG, CLIENTS
 
@@ -151,6 +151,31 @@ def test_what_heights_do_not_show_stands_in_the_first_sentence():
         "x and y may be off by 2.83 mm (95 %): heights do not show them, nor the order of the legs "
         "1 and 2: if they are swapped, by 2.05 mm more."
     )
+
+
+@pytest.mark.parametrize(("name", "seed"), [("delta-omnid", 1), ("3-rrr", 2)])
+def test_no_row_of_a_sound_log_is_left_out_next_to_a_singularity(name, seed):
+    """A fit without such a row is less sure of its pose than the instrument is."""
+    robot = pteron.load(name)
+    result = calibrate(robot, measured(robot, seed))
+    assert result.fit.kept.all()
+    assert result.verdict.grade == "trustworthy"
+
+
+def test_a_verdict_survives_a_file_rounded_to_a_tenth_of_a_millimetre():
+    robot = pteron.load("linear-delta")
+    legs = tuple(
+        replace(
+            leg,
+            guide_point=tuple(np.round(leg.guide_point, 4).tolist()),
+            platform_point=tuple(np.round(leg.platform_point, 4).tolist()),
+            lower_length=round(leg.lower_length, 4),
+        )
+        for leg in robot.legs
+    )
+    given = measured(robot, 2)
+    rounded = calibrate(replace(robot, legs=legs), given).verdict
+    assert rounded.grade == calibrate(robot, given).verdict.grade == "trustworthy"
 
 
 FILES = ("quadrupteron", "linear-delta", "sprint-z3", "stewart")

@@ -195,7 +195,8 @@ class Fitter:
         for _ in range(_ROUNDS):
             at = self._found_again(self._settled(at))
             noise = at.noise | self._noise(at, sought)
-            scaled = at.distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
+            distances = self._distances_of_left_out(at)
+            scaled = distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
             limits = scipy.stats.chi2.isf(
                 _OUTLYING / len(kept), np.maximum(at.measured.sum(axis=1), 1)
             )
@@ -210,6 +211,21 @@ class Fitter:
             except ValueError:  # of the rows that fit, most lead to no pose
                 return replace(at, settled=False, shared=self._shared(at))
         return replace(at, shared=self._shared(at))
+
+    def _distances_of_left_out(self, at: Fit) -> Array:
+        """Return the rows' distances (N,); of those left out with the fit's own uncertainty there.
+
+        Next to a singularity a fit without a row is less sure of its pose than an instrument.
+        """
+        distances = at.distances.copy()
+        rows = np.flatnonzero(~at.kept & ~self.barred & (at.distances != BEYOND))[:_CHUNK]
+        if len(rows):
+            there = self.slopes.rows(at.guess, self.given, at.poses, rows)
+            r, slopes, _ = self.whitened(there, at.guess, at.noise)
+            spread = np.einsum("nkp,pq,nlq->nkl", slopes, at.covariance, slopes, optimize=True)
+            solved = np.linalg.solve(np.eye(r.shape[1]) + spread, r[..., None])[..., 0]
+            distances[rows] = np.sqrt(np.maximum(np.einsum("nk,nk->n", r, solved), 0.0))
+        return distances
 
     def _found_again(self, at: Fit) -> Fit:
         """Return the fit with the poses of rows that Newton's steps lost on their way."""
