@@ -74,7 +74,8 @@ def calibrate(
     Raises
     ------
     DataError
-        If readings lead to no pose, a name is unknown, or the search does not settle.
+        If most readings lead to no pose, a name is unknown, or a mistake in the whole log, such as
+        swapped or reversed readings, explains the measurements.
 
     Notes
     -----
@@ -101,18 +102,14 @@ def calibrate(
         raise DataError(fault)
     poses = starting_poses(start, measurements)
     start = placed(start, measurements, poses)
-    aside = rows_set_aside(start, measurements, blocks, poses)
-    kept = np.ones(len(measurements), dtype=bool)
     checked = rows_for_check(measurements, blocks)
+    kept = np.ones(len(measurements), dtype=bool)
     if held_out is None and len(measurements) >= checked:
         kept[EVERY // 2 :: EVERY] = False
     partial = None
     if held_out is not None or not kept.all():
-        fitted = np.zeros_like(kept)
-        fitted[np.flatnonzero(kept)[:: -(-int(kept.sum()) // _TRIED_ROWS)]] = True
-        rows = measurements.rows(fitted)
-        part = rows_set_aside(start, rows, blocks, own := starting_poses(start, rows))
-        partial = Fitter(rows, blocks, start, own, part.aside, part.barred).run()
+        partial = _partial_fit(start, measurements, blocks, kept)
+    aside = rows_set_aside(start, measurements, blocks, poses)
     fitter = Fitter(measurements, blocks, start, poses, aside.aside, aside.barred)
     fit = fitter.run(partial)
     if _far_off(fit, measurements) and (
@@ -124,8 +121,7 @@ def calibrate(
         other = held_out if held_out is not None else _fitting(measurements, fit, ~kept)
         judged = _held_out(start, partial, blocks, other)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
-    findings = residual_faults(fitter, fit, aside.reasons)
-    findings = (*zero_faults(fitter, fit), *findings)
+    findings = (*zero_faults(fitter, fit), *residual_faults(fitter, fit, aside.reasons))
     possible = open_errors(measurements, fit, blocks)
     hidden = hidden_order(measurements, blocks, start, fit)
     evidence = Evidence(
@@ -147,6 +143,18 @@ def calibrate(
         possible,
         hidden,
     )
+
+
+def _partial_fit(
+    start: Guess, given: Measurements, blocks: tuple[Block, ...], kept: NDArray[np.bool_]
+) -> Fit:
+    """Return the fit of rows that are kept, by which held-out rows are judged."""
+    fitted = np.zeros_like(kept)
+    fitted[np.flatnonzero(kept)[:: -(-int(kept.sum()) // _TRIED_ROWS)]] = True
+    rows = given.rows(fitted)
+    poses = starting_poses(start, rows)
+    aside = rows_set_aside(start, rows, blocks, poses)
+    return Fitter(rows, blocks, start, poses, aside.aside, aside.barred).run()
 
 
 def _far_off(fit: Fit, given: Measurements) -> bool:
