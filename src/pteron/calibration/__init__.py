@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pteron.calibration.result import (
         Calibration as Calibration,
         Finding as Finding,
+        HiddenOrder as HiddenOrder,
         HeldOut as HeldOut,
         Value as Value,
     )

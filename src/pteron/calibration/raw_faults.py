@@ -49,6 +49,9 @@ _ROWS = 16
 _QUICK_MODES = 3
 """Freedom up to which all assembly modes of a row take milliseconds; of hexapods a tenth second."""
 
+_CHUNK = 4096
+"""Rows that are evaluated at a time."""
+
 _FIRST = 5
 """Rows that are examined first of a mistake."""
 
@@ -181,19 +184,24 @@ def row_misfits(guess: Guess, rows: Measurements, blocks: Sequence[Block], poses
     poses = np.where(np.isnan(poses), np.median(poses[~np.isnan(poses).any(axis=1)], axis=0), poses)
     start = placed(guess, rows, poses)
     slopes = MachineSlopes(guess.robot, blocks)
-    at = slopes.rows(start, rows, poses, np.arange(len(rows)))
-    lost |= ~np.isfinite(at.slopes).all(axis=(1, 2))
     tolerances = np.minimum(tolerances_of(blocks), 1.0)
     for block in blocks:
         if block.kind == "frame" and start.turn is not guess.turn:
             tolerances[block.where] = 0.0  # all rows together have fixed it
-    scaled = np.where(lost[:, None, None], 0.0, at.slopes) * tolerances
-    width = at.residuals.shape[1]
-    covariance = scaled @ np.swapaxes(scaled, -1, -2) + _NOISE**2 * np.eye(width)
-    residuals = np.where(lost[:, None], 0.0, at.residuals)
-    whitened = np.linalg.solve(covariance, residuals[..., None])[..., 0]
-    squares = np.einsum("nk,nk->n", residuals, whitened)
-    return np.where(lost, np.inf, squares / np.maximum(at.measured.sum(axis=1), 1))
+    squares = np.empty(len(rows))
+    for first in range(0, len(rows), _CHUNK):
+        chosen = np.arange(first, min(first + _CHUNK, len(rows)))
+        at = slopes.rows(start, rows, poses, chosen)
+        lost[chosen] |= ~np.isfinite(at.slopes).all(axis=(1, 2))
+        bad = lost[chosen]
+        scaled = np.where(bad[:, None, None], 0.0, at.slopes) * tolerances
+        width = at.residuals.shape[1]
+        covariance = scaled @ np.swapaxes(scaled, -1, -2) + _NOISE**2 * np.eye(width)
+        residuals = np.where(bad[:, None], 0.0, at.residuals)
+        whitened = np.linalg.solve(covariance, residuals[..., None])[..., 0]
+        sums = np.einsum("nk,nk->n", residuals, whitened)
+        squares[chosen] = sums / np.maximum(at.measured.sum(axis=1), 1)
+    return np.where(lost, np.inf, squares)
 
 
 def _units(given: Measurements, guess: Guess) -> Iterator[tuple[str, Measurements]]:

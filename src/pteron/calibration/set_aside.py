@@ -69,7 +69,7 @@ def rows_set_aside(
     beyond = dict(_beyond_limits(start, given))
     if len(beyond) > thresholds.MANY_LEFT_OUT * len(given):  # the limits are wrong
         beyond = {}
-    factors = _Factors(start, given, blocks, poses)
+    factors = _Factors(start, given, blocks, poses, squares)
     for i in np.flatnonzero(lost | barred | far):
         k = int(i)
         reason = beyond.get(k, "its readings lead to no pose as drawn")
@@ -121,13 +121,18 @@ class _Factors:
     """A search for the factor of a row's readings that puts it where it belongs."""
 
     def __init__(
-        self, start: Guess, given: Measurements, blocks: Sequence[Block], poses: Array
+        self,
+        start: Guess,
+        given: Measurements,
+        blocks: Sequence[Block],
+        poses: Array,
+        squares: Array,
     ) -> None:
         self.start, self.given, self.blocks = start, given, blocks
         good = ~np.isnan(poses).any(axis=1)
         self.middle = np.median(poses[good], axis=0)
         self.slopes = MachineSlopes(start.robot, ())
-        self.squares = row_misfits(start, given, blocks, poses)
+        self.squares = squares
         self.poses = poses
 
     def told(self, row: int) -> str:
