@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from pteron.calibration.result import (
         Calibration as Calibration,
         Finding as Finding,
-        HiddenOrder as HiddenOrder,
         HeldOut as HeldOut,
+        HiddenOrder as HiddenOrder,
         Value as Value,
     )
     from pteron.calibration.unknowns import TOLERANCES as TOLERANCES

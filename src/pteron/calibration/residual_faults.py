@@ -179,7 +179,16 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
             best, gain = trial, more_than_chance
     explained = np.zeros(len(given), dtype=bool)
     share = _SHARE * float(squares.sum()) / variance
-    if best is None or best.fall <= max(scipy.stats.chi2.isf(_CHANCE / tried, best.freedom), share):
+    if best is None or best.fall <= share:
+        return (), explained
+    chance = float(scipy.stats.chi2.sf(best.fall, best.freedom))
+    if not set(given.kinds) <= set(given.setup.noise):
+        # The noise that was found has the fault in it: an F test leaves it out.
+        total, fall = float(np.einsum("nk,nk->", left, left)), best.fall * variance
+        free = float(at.measured.sum()) * (1.0 - took) - best.freedom
+        ratio = (fall / best.freedom) / (max(total - fall, 1e-9 * total) / max(free, 1.0))
+        chance = min(chance, float(scipy.stats.f.sf(ratio, best.freedom, max(free, 1.0))))
+    if chance >= _CHANCE / tried:
         return (), explained
     after = np.linalg.norm(left + remaining(best.moved), axis=-1)
     explained[chosen] = after < _EXPLAINED * np.linalg.norm(left, axis=-1)
