@@ -185,9 +185,9 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
     if not set(given.kinds) <= set(given.setup.noise):
         # The noise that was found has the fault in it: an F test leaves it out.
         total, fall = float(np.einsum("nk,nk->", left, left)), best.fall * variance
-        free = float(at.measured.sum()) * (1.0 - took) - best.freedom
-        ratio = (fall / best.freedom) / (max(total - fall, 1e-9 * total) / max(free, 1.0))
-        chance = min(chance, float(scipy.stats.f.sf(ratio, best.freedom, max(free, 1.0))))
+        free = max(float(at.measured.sum()) * (1.0 - took) - best.freedom, 1.0)
+        ratio = (fall / best.freedom) / max((total - fall) / free, least)
+        chance = min(chance, float(scipy.stats.f.sf(ratio, best.freedom, free)))
     if chance >= _CHANCE / tried:
         return (), explained
     after = np.linalg.norm(left + remaining(best.moved), axis=-1)
