@@ -48,6 +48,7 @@ _SCRIPTS = {
     "Maps of eight million poses": "maps.py",
     "A machine for a job": "choosing.py",
     "Twenty thousand damaged files": "mutants.py",
+    "Calibrations with faults": "calibration_faults.py",
     "From a log to a running machine": "identification/chain.py",
     "An owner's way": "identification/owner.py",
 }

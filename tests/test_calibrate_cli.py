@@ -92,3 +92,18 @@ def test_planned_poses_are_a_table_that_the_machine_runs():
     assert "over the plane z = 0 mm, in a disc of radius 87 mm" in " ".join(text.split())
     assert "every pose of it is proved to serve" in " ".join(text.split())
     assert "From 54 poses on, some are held out" in " ".join(text.split())
+
+
+def test_what_is_not_trustworthy_is_written_anyway_only_on_demand():
+    readings, poses = log().select("^rho.$"), log().select("x", "y", "z")
+    order = np.random.default_rng(0).permutation(len(poses))
+    pl.concat([readings, poses[order]], how="horizontal").write_csv("mixed.csv")
+    text = done("calibrate mixed.csv --robot linear-delta --out found")
+    assert text.startswith("linear-delta: not trustworthy, ")
+    assert "robot.toml is not written, as the calibration is not trustworthy (--anyway" in text
+    assert sorted(path.name for path in Path("found").iterdir()) == [
+        "calibration.html",
+        "calibration.json",
+    ]
+    text = done("calibrate mixed.csv --robot linear-delta --out found --anyway")
+    assert "Written: found/robot.toml" in text

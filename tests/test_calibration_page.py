@@ -17,7 +17,7 @@ from pteron.calibration import Measurements, calibrate
 from pteron.errors import DataError, OutputError
 from pteron.motion import joint_points
 from pteron.motion.enlarged_points import enlarged_points, greatest_difference
-from pteron.report.calibration import value_rows, write_calibration
+from pteron.report.calibration import firmware_fit, value_rows, write_calibration
 
 DRAWN = replace(CATALOG["linear-delta"], name=HOSTILE)
 TRUE = built(DRAWN)
@@ -115,3 +115,50 @@ def test_a_picture_says_how_many_times_differences_are_enlarged():
     robot = CATALOG["five-bar"]
     figure = pteron.plots.differences_figure(robot, built(robot, share=0.5), enlarge=20)
     assert figure.get_suptitle() == "differences 20 times enlarged"
+
+
+def test_a_quantity_has_one_unit_and_values_that_changed_most_come_first(tmp_path: Path):
+    text = write_calibration(calibration(), tmp_path).page.read_text("utf-8")
+    assert "µm" not in text
+    assert text.count("Before, in mm: up to ") == text.count("after, in mm: up to ") == 3
+    sizes = [row.size for row in value_rows(calibration())]
+    assert sizes == sorted(sizes, reverse=True)
+    assert f"{len(sizes) - 12} more, which changed less" in text
+    words = " ".join(Reader(text).text.split())
+    assert "What to do next" in words
+    assert "pteron view robot.toml" in words
+
+
+def test_a_printer_gets_its_firmwares_values_first(tmp_path: Path):
+    robot = CATALOG["linear-delta"]
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-0.055, 0.055, (2, 40))
+    readings = pteron.inverse_kinematics(robot, np.stack([x, y, 0.0 * x], axis=-1))
+    off = np.array([3e-4, -2e-4, 1e-4])  # of end stops
+    given = Measurements.of(robot, readings + off, heights=2e-5 * rng.standard_normal(40))
+    result = calibrate(robot, given)
+    firmware = firmware_fit(result)
+    assert firmware is not None
+    assert [row.name for row in firmware.rows] == [
+        "delta radius",
+        *(f"angle of tower {k}" for k in (1, 2)),
+        *(f"end stop of tower {k}" for k in (1, 2, 3)),
+    ]
+    changes = [float(row.change.replace("\u2212", "-")) for row in firmware.rows]
+    assert changes == pytest.approx([0.0, 0.0, 0.0, -0.3, 0.2, -0.1], abs=0.06)
+    assert result.held_out is None
+    assert "at 8 rows that were not fitted, the height error is 0.0" in firmware.sentence
+    files = write_calibration(result, tmp_path, firmware=firmware)
+    page = Reader(files.page.read_text("utf-8"))
+    assert page.faults == page.open == []
+    assert page.ids.index("firmware") < page.ids.index("errors")
+    words = " ".join(page.text.split())
+    assert "pteron export robot.toml" in words
+    assert strict(files.numbers.read_text("utf-8"))["firmware"]["values"][0]["unit"] == "mm"
+
+
+def test_a_machine_that_is_no_printer_has_no_firmware():
+    robot = pteron.load("five-bar")
+    poses = pteron.random_poses(robot, 30)
+    joints = pteron.inverse_kinematics(robot, poses)
+    assert firmware_fit(calibrate(robot, Measurements.of(robot, joints, poses=poses))) is None

@@ -201,6 +201,13 @@ LOGS = {
         ).replace("\n-50", "\nX,Y,-50"),
         [*TOUCHED, (50.0, 40.0, 0.3)],
     ),
+    "first.csv": (
+        MAP.replace("v2", "v1")
+        .replace("xspacing,yspacing", "spacing")
+        .replace("50.00,80.00,3,2", "80.00,3,2")
+        .replace("-50.00,50.00,", "-80.00,80.00,"),
+        [(x * 1.6, y, z) for x, y, z in (*TOUCHED, (50.0, 40.0, 0.3))],
+    ),
     "console.txt": (
         "G30 P0 X0 Y-40 Z-99999\nG30 P1 X50 Y-40 Z-99999\nG30 P2 X-50 Y40 Z-99999 S-1\n"
         "G32 bed probe heights: 0.100 -0.050 0.020, mean 0.023, deviation from mean 0.061\n",
@@ -244,3 +251,39 @@ def test_a_log_of_nothing_known_is_refused_and_places_out_of_reach_are_told(tmp_
     text = "probe at 0.000,900.000 is z=0.100000\n"
     with pytest.raises(DataError, match="line 1: the machine as drawn does not reach X0 Y900"):
         read_measurements(DELTA, written(tmp_path, text, name="klippy.log"))
+
+
+G33 = """Send: G33 {}
+Recv: G33 Auto Calibrate
+Recv: .Height:303.60    Ex:-6.34  Ey:-5.20  Ez:+0.00    Radius:110.05
+Recv: . c:+0.57    x:+0.52  y:+0.47  z:+0.55
+Recv: .          yz:+0.45 zx:+0.49 xy:+0.50
+Recv: Calibration OK                                    std dev:0.510
+"""
+
+
+def test_marlins_g33_is_read_with_its_radius_and_asks_for_it(tmp_path):
+    path = written(tmp_path, G33.format("P3 V2"), name="marlin.log")
+    with pytest.raises(DataError, match=r"on which radius it probes; give \[g33\] radius"):
+        read_measurements(DELTA, path)
+    (tmp_path / "marlin.toml").write_text("[g33]\nradius = 0.05\n")
+    found = read_measurements(DELTA, path)
+    poses = 1e3 * pteron.direct_kinematics(DELTA, found.readings)[:, 0]
+    angles = np.radians([210.0, 330.0, 90.0, 30.0, 150.0, 270.0])
+    rim = 50.0 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    np.testing.assert_allclose(poses[:, :2], [(0.0, 0.0), *rim], atol=1e-9)
+    np.testing.assert_allclose(poses[:, 2], [0.57, 0.52, 0.47, 0.55, 0.45, 0.49, 0.5], atol=1e-9)
+    assert found.places[1] == "marlin.log, line 4, x"
+    path.write_text(G33.format("P4 V2"))
+    with pytest.warns(UnlikelyValue, match="means of neighbouring points"):
+        read_measurements(DELTA, path)
+    path.write_text("Recv: .Height:303.60\nRecv: . c:+0.57\n")
+    with pytest.raises(DataError, match="P1 probes the middle alone"):
+        read_measurements(DELTA, path)
+
+
+def test_a_place_that_the_drawn_machine_does_not_reach_is_left_out_and_named(tmp_path):
+    text = "probe at 0.000,900.000 is z=0.1\n" + "probe at 1.0,2.0 is z=0.1\n" * 3
+    with pytest.warns(UnlikelyValue, match="line 1: the machine as drawn does not reach X0 Y900"):
+        found = read_measurements(DELTA, written(tmp_path, text, name="klippy.log"))
+    assert len(found) == 3

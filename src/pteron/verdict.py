@@ -23,7 +23,9 @@ class Verdict:
         5 % of the force, and a pick-and-place cycle is expected to be at most 3 % off, and no fault
         that matters shows; not trustworthy where either is more than 15 %, or where the error is
         more than half of the force. A calibrated geometry is trustworthy where errors at rows that
-        were held out are those of noise and intervals, and no fault shows.
+        were held out are those of noise and intervals and at most half of an ordinary tolerance,
+        and no fault shows; not trustworthy where they are more than an ordinary tolerance, or did
+        not fall.
     reasons : tuple of str
         The reasons, in sentences.
     next_steps : tuple of str

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         Calibration as Calibration,
         Finding as Finding,
         HeldOut as HeldOut,
+        HiddenOrder as HiddenOrder,
         Value as Value,
     )
     from pteron.calibration.unknowns import TOLERANCES as TOLERANCES

@@ -12,12 +12,14 @@ from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
-from pteron.calibration.raw_faults import raw_fault
-from pteron.calibration.residual_faults import residual_faults
-from pteron.calibration.result import Calibration, HeldOut, calibrated, values_of
+from pteron.calibration.raw_faults import hidden_order, raw_fault
+from pteron.calibration.residual_faults import residual_faults, zero_faults
+from pteron.calibration.result import Calibration, HeldOut, calibrated, open_errors, values_of
+from pteron.calibration.set_aside import rows_set_aside
 from pteron.calibration.start import placed, starting_poses
+from pteron.calibration.thresholds import FEW_LEFT_OUT, ordinary_error
 from pteron.calibration.unknowns import blocks_of
-from pteron.calibration.verdict import EVERY, rows_for_check, verdict_of
+from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike, as_manipulator
 
@@ -72,7 +74,8 @@ def calibrate(
     Raises
     ------
     DataError
-        If readings lead to no pose, a name is unknown, or the search does not settle.
+        If most readings lead to no pose, a name is unknown, or a mistake in the whole log, such as
+        swapped or reversed readings, explains the measurements.
 
     Notes
     -----
@@ -99,22 +102,31 @@ def calibrate(
         raise DataError(fault)
     poses = starting_poses(start, measurements)
     start = placed(start, measurements, poses)
-    kept = np.ones(len(measurements), dtype=bool)
     checked = rows_for_check(measurements, blocks)
+    kept = np.ones(len(measurements), dtype=bool)
     if held_out is None and len(measurements) >= checked:
         kept[EVERY // 2 :: EVERY] = False
-    judged = partial = None
+    partial = None
     if held_out is not None or not kept.all():
-        fitted = np.zeros_like(kept)
-        fitted[np.flatnonzero(kept)[:: -(-int(kept.sum()) // _TRIED_ROWS)]] = True
-        rows = measurements.rows(fitted)
-        partial = Fitter(rows, blocks, start, starting_poses(start, rows)).run()
-        other = held_out if held_out is not None else measurements.rows(~kept)
-        judged = _held_out(start, partial, blocks, other)
-    fitter = Fitter(measurements, blocks, start, poses)
+        partial = _partial_fit(start, measurements, blocks, kept)
+    aside = rows_set_aside(start, measurements, blocks, poses)
+    fitter = Fitter(measurements, blocks, start, poses, aside.aside, aside.barred)
     fit = fitter.run(partial)
+    if _far_off(fit, measurements) and (
+        fault := raw_fault(measurements, blocks, Guess.drawn(robot, measurements), fitted=True)
+    ):
+        raise DataError(fault)
+    judged = None
+    if partial is not None:
+        other = held_out if held_out is not None else _fitting(measurements, fit, ~kept)
+        judged = _held_out(start, partial, blocks, other)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
-    findings = residual_faults(fitter, fit)
+    findings = (*zero_faults(fitter, fit), *residual_faults(fitter, fit, aside.reasons))
+    possible = open_errors(measurements, fit, blocks)
+    hidden = hidden_order(measurements, blocks, start, fit)
+    evidence = Evidence(
+        measurements, fit, blocks, shown, judged, findings, possible, hidden, checked
+    )
     return Calibration(
         robot,
         calibrated(fit.guess),
@@ -123,12 +135,42 @@ def calibrate(
         shown,
         judged,
         findings,
-        verdict_of(fit, blocks, shown, judged, findings, checked),
+        verdict_of(evidence),
         measurements,
         fit,
         blocks,
         start,
+        possible,
+        hidden,
     )
+
+
+def _partial_fit(
+    start: Guess, given: Measurements, blocks: tuple[Block, ...], kept: NDArray[np.bool_]
+) -> Fit:
+    """Return the fit of rows that are kept, by which held-out rows are judged."""
+    fitted = np.zeros_like(kept)
+    fitted[np.flatnonzero(kept)[:: -(-int(kept.sum()) // _TRIED_ROWS)]] = True
+    rows = given.rows(fitted)
+    poses = starting_poses(start, rows)
+    aside = rows_set_aside(start, rows, blocks, poses)
+    return Fitter(rows, blocks, start, poses, aside.aside, aside.barred).run()
+
+
+def _far_off(fit: Fit, given: Measurements) -> bool:
+    """Return whether a fit leaves more than ordinary tolerances do, in a kind of measurement."""
+    stated = given.setup.noise
+    return not fit.settled or any(
+        error > ordinary_error(kind, stated.get(kind))
+        for kind, error in fitted_errors(fit, given).items()
+    )
+
+
+def _fitting(given: Measurements, fit: Fit, chosen: NDArray[np.bool_]) -> Measurements:
+    """Return chosen rows, but for the few that a fit of all rows leaves out and findings name."""
+    few = (~fit.kept).sum() <= FEW_LEFT_OUT * len(fit.kept)
+    some = chosen & fit.kept if few else chosen
+    return given.rows(some if some.any() else chosen)
 
 
 def _check(joints: int, given: Measurements) -> None:
@@ -152,7 +194,7 @@ def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurem
     new = before.slopes.rows(fit.guess, other, moved, chosen)
     spread = np.einsum("nkp,pq,nkq->nk", new.slopes, fit.covariance, new.slopes, optimize=True)
     noise = np.array([fit.noise[kind] for kind in other.kind_of])
-    seen = new.measured & np.isfinite(spread)
+    seen = new.measured & np.isfinite(spread) & np.isfinite(old.residuals + new.residuals)
     kinds = {kind: seen & (other.kind_of == kind) for kind in fit.noise}
 
     def rms(squares: Array) -> dict[str, float]:

@@ -10,13 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from pteron.calibration.measurements import Measurements
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shown, warn_unlikely
 from pteron.export.linuxcnc import linuxcnc_axes
 from pteron.export.printers.printer_cfg import printer_cfg, setting, way_a_step
 from pteron.kinematics import inverse_kinematics
@@ -36,6 +37,14 @@ _OFFSET = re.compile(rf"^\s*z_offset\s*[=:]\s*({_NUMBER})", re.MULTILINE)
 _MARLIN = re.compile(rf"Bed X:\s*({_NUMBER})\s+Y:\s*({_NUMBER})\s+Z:\s*({_NUMBER})")
 _G30 = re.compile(rf"G30\s+P(\d+)\s+X({_NUMBER})\s+Y({_NUMBER})", re.IGNORECASE)
 _HEIGHTS = re.compile(rf"bed probe heights:\s*({_NUMBER}(?:[\s,]+{_NUMBER})*)", re.IGNORECASE)
+_G33 = re.compile(
+    rf"c:\s*{_NUMBER}(?:[\s.]+(?:Recv:)?[\s.]*(?:yz|zx|xy|x|y|z):\s*{_NUMBER})*", re.IGNORECASE
+)
+_G33_POINT = re.compile(rf"\b(c|yz|zx|xy|x|y|z):\s*({_NUMBER})", re.IGNORECASE)
+_G33_ANGLES = {"x": 210.0, "xy": 270.0, "y": 330.0, "yz": 30.0, "z": 90.0, "zx": 150.0}
+"""Where Marlin's G33 probes, degrees: a tower's own angle, or that between two."""
+_G33_MEANS = 4
+"""Number of points, P, from which G33 takes means."""
 _MAP = "RepRapFirmware height map"
 
 
@@ -49,7 +58,9 @@ class _Touched(NamedTuple):
     """Height of the tool over the plane, mm."""
 
 
-def read_controller_log(path: str | Path, robot: Manipulator) -> Measurements | None:
+def read_controller_log(
+    path: str | Path, robot: Manipulator, g33_radius: float | None = None
+) -> Measurements | None:
     """Read the measurements in a file that a controller wrote; None if it is none of these.
 
     - Klipper's printer.cfg: the stable positions of DELTA_CALIBRATE and DELTA_ANALYZE
@@ -57,7 +68,8 @@ def read_controller_log(path: str | Path, robot: Manipulator) -> Measurements | 
       limits where its end stop is.
     - Klipper's log: "probe at X,Y is z=Z", the tool then at `z_offset` over the bed.
     - RepRapFirmware's heightmap.csv, and a console's log with G30 P.. X.. Y.. and the "bed probe
-      heights" of its G32; Marlin's "Bed X: Y: Z:" of G29 V4 and G30.
+      heights" of its G32; Marlin's "Bed X: Y: Z:" of G29 V4 and G30, and the report of its G33,
+      which needs the radius on which it probes, m.
     - LinuxCNC's probe log, of (PROBEOPEN ..): lines of X Y Z A B C U V W; probe in machine
       coordinates.
 
@@ -77,7 +89,7 @@ def read_controller_log(path: str | Path, robot: Manipulator) -> Measurements | 
     try:
         if re.search(r"^(?:#\*# )?\[delta_calibrate\]", text, re.MULTILINE):
             return _stable(robot, text, file.name)
-        for find in _READERS:
+        for find in (*_READERS, partial(_g33, radius=g33_radius), _linuxcnc):
             if touched := list(find(text, file.name)):
                 return _where_touched(robot, touched)
     except DataError as error:
@@ -163,6 +175,8 @@ def _map(text: str, source: str) -> Iterator[_Touched]:
     values = [cell.strip() for cell in lines[2].split(",")]
     given = dict(zip(names, values, strict=False))
     axes = (("xmin", "xspacing"), ("ymin", "yspacing"))
+    if "spacing" in given:  # of version 1, before 2.0
+        axes = (("xmin", "spacing"), ("ymin", "spacing"))
     if "axis0" in given:  # since 3.4
         if (given["axis0"], given.get("axis1")) != ("X", "Y"):
             raise DataError("a height map over X and Y is read, and this one has other axes")
@@ -219,6 +233,40 @@ def _marlin(text: str, source: str) -> Iterator[_Touched]:
         yield _Touched(_line(text, match, source), _xyz(*map(float, match.groups())), 0.0)
 
 
+def _g33(text: str, source: str, radius: float | None) -> Iterator[_Touched]:
+    """Yield the points of Marlin's G33: the middle, beneath the towers, and opposite to them.
+
+    The last report is that of the settings that the log ends with. Of P4 to P10 a point on the
+    radius is the mean of those about it.
+    """
+    reports = list(_G33.finditer(text)) if re.search(r"G33|\.Height:", text) else []
+    if not reports:
+        return
+    report = reports[-1]
+    heights = {name: float(z) for name, z in _G33_POINT.findall(report[0])}
+    if len(heights) == 1:
+        raise DataError("G33 P1 probes the middle alone, which shows no geometry; run G33 P3 V3")
+    if radius is None:
+        raise DataError(
+            "a report of Marlin's G33 does not say on which radius it probes; give [g33] radius "
+            "= .., m, in the TOML file beside it: DELTA_PRINTABLE_RADIUS less PROBING_MARGIN and "
+            "the probe's offset"
+        )
+    many = re.search(r"G33\b[^\n]*\bP(\d+)", text)
+    if many is None or int(many[1]) >= _G33_MEANS:
+        warn_unlikely(
+            f"{source}: G33 from P{_G33_MEANS} on reports means of neighbouring points, which are "
+            "up to 7 % smaller than at the points themselves; P3 reports these"
+        )
+    place = _line(text, report, source)
+    for name, z in heights.items():
+        x, y = 0.0, 0.0
+        if name != "c":
+            angle = np.radians(_G33_ANGLES[name])
+            x, y = 1e3 * radius * np.cos(angle), 1e3 * radius * np.sin(angle)
+        yield _Touched(f"{place}, {name}", _xyz(x, y, z), 0.0)
+
+
 def _linuxcnc(text: str, source: str) -> Iterator[_Touched]:
     """Yield the lines of LinuxCNC's probe log."""
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
@@ -238,7 +286,7 @@ def _linuxcnc(text: str, source: str) -> Iterator[_Touched]:
         yield _Touched(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
 
 
-_READERS = (_map, _g30, _klippy, _marlin, _linuxcnc)
+_READERS = (_map, _g30, _klippy, _marlin)
 
 
 def _xyz(x: float, y: float, z: float) -> dict[str, float]:
@@ -267,7 +315,12 @@ def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measureme
             for one, bad in zip(touched, lost, strict=True)
             if bad
         ]
-        raise DataError(told(faults))
+        if 2 * lost.sum() > len(lost):
+            raise DataError(told(faults))
+        more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
+        warn_unlikely(f"{faults[0]} It is left out{more}.")
+        touched = [one for one, bad in zip(touched, lost, strict=True) if not bad]
+        joints = joints[~lost]
     heights = 1e-3 * np.array([one.height for one in touched])
     found = Measurements.of(robot, to_readings(robot, joints), heights=heights)
     return replace(found, places=tuple(one.place for one in touched))

@@ -42,7 +42,7 @@ _LOST = 30.0
 """Cost of a row whose readings lead to no pose, in variances, as if it hardly fitted."""
 
 BEYOND = 1e3
-"""Standard deviations at which such a row counts, so that it is left out in the end."""
+"""Distance that marks such a row, so that it is left out in the end; no residual has just this."""
 
 _STRAY = 30.0
 """Standard deviations beyond which a row may be left out of a step that improves all others."""
@@ -88,6 +88,8 @@ class Fit:
     shared : array, shape (p, p), or 0
         By how much `information` is too great where several distances share a row's readings: each
         row is weighted as if its noise were its own alone.
+    settled : bool
+        Whether the search has ended where nothing is more probable nearby.
     """
 
     guess: Guess
@@ -104,6 +106,7 @@ class Fit:
     cost: float = np.inf
     steps: int = 0
     shared: Array | float = 0.0
+    settled: bool = True
 
     @cached_property
     def covariance(self) -> Array:
@@ -136,16 +139,33 @@ class Fitter:
     guess : Guess
         Where to begin.
     poses : array, shape (N, m)
-        Near the rows' poses.
+        Near the rows' poses; NaN for a row that is first left out, as its readings lead to none.
+    aside : array of bool, shape (N,), optional
+        Rows that are left out of the first fit, and are back where they then fit.
+    barred : array of bool, shape (N,), optional
+        Rows that stay left out.
     """
 
     def __init__(
-        self, given: Measurements, blocks: tuple[Block, ...], guess: Guess, poses: Array
+        self,
+        given: Measurements,
+        blocks: tuple[Block, ...],
+        guess: Guess,
+        poses: Array,
+        aside: NDArray[np.bool_] | None = None,
+        barred: NDArray[np.bool_] | None = None,
     ) -> None:
         self.given, self.blocks, self.begin = given, blocks, guess
         self.slopes = MachineSlopes(guess.robot, blocks)
         self.prior = 1.0 / tolerances_of(blocks) ** 2
+        none = np.zeros(len(given), dtype=bool)
+        self.barred = none if barred is None else barred
+        lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=1))
+        self.aside = lost | self.barred | (none if aside is None else aside)
+        # Newton's steps to the pose of a lost row, should there be one later, begin in the middle.
         self.begin_poses = poses
+        if lost.any() and not lost.all():
+            self.begin_poses = np.where(lost[:, None], np.median(poses[~lost], axis=0), poses)
         self.kind_of = given.kind_of
         self.readings_noise = given.setup.noise.get("readings", 0.0)
 
@@ -155,7 +175,7 @@ class Fitter:
         Raises
         ------
         DataError
-            If it does not settle, or the measurements leave something without a tolerance open.
+            If most readings lead to no pose, or the measurements leave open what has no tolerance.
         """
         setup = self.given.setup.noise
         sought = [kind for kind in self.given.kinds if kind not in setup]
@@ -163,7 +183,7 @@ class Fitter:
         noise = {kind: max(setup.get(kind, _START), FLOOR) for kind in KINDS}
         if before is not None:
             guess, total, noise = before.guess, before.total, before.noise
-        kept, none = np.ones(len(self.given), dtype=bool), np.empty(0)
+        kept, none = ~self.aside, np.empty(0)
         begin = guess, total, noise, kept, self.begin_poses, self.prior
         try:
             at = self._at(Fit(*begin, none, none > 0.0, none, none, none))
@@ -175,22 +195,41 @@ class Fitter:
         for _ in range(_ROUNDS):
             at = self._found_again(self._settled(at))
             noise = at.noise | self._noise(at, sought)
-            scaled = at.distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
+            distances = self._distances_of_left_out(at)
+            scaled = distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
             limits = scipy.stats.chi2.isf(
                 _OUTLYING / len(kept), np.maximum(at.measured.sum(axis=1), 1)
             )
-            kept = scaled**2 <= limits
+            kept = (scaled**2 <= limits) & ~self.barred
             if 2 * kept.sum() < len(kept):  # no rows are the faultless ones
-                kept[:] = True
+                kept = (at.distances != BEYOND) & ~self.barred
             alike = all(abs(noise[k] / at.noise[k] - 1.0) < 0.01 for k in sought)
             if alike and (kept == at.kept).all():
                 break
-            at = self._at(at, noise=noise, kept=kept)
+            try:
+                at = self._at(at, noise=noise, kept=kept)
+            except ValueError:  # of the rows that fit, most lead to no pose
+                return replace(at, settled=False, shared=self._shared(at))
         return replace(at, shared=self._shared(at))
+
+    def _distances_of_left_out(self, at: Fit) -> Array:
+        """Return the rows' distances (N,); of those left out with the fit's own uncertainty there.
+
+        Next to a singularity a fit without a row is less sure of its pose than an instrument.
+        """
+        distances = at.distances.copy()
+        rows = np.flatnonzero(~at.kept & ~self.barred & (at.distances != BEYOND))[:_CHUNK]
+        if len(rows):
+            there = self.slopes.rows(at.guess, self.given, at.poses, rows)
+            r, slopes, _ = self.whitened(there, at.guess, at.noise)
+            spread = np.einsum("nkp,pq,nlq->nkl", slopes, at.covariance, slopes, optimize=True)
+            solved = np.linalg.solve(np.eye(r.shape[1]) + spread, r[..., None])[..., 0]
+            distances[rows] = np.sqrt(np.maximum(np.einsum("nk,nk->n", r, solved), 0.0))
+        return distances
 
     def _found_again(self, at: Fit) -> Fit:
         """Return the fit with the poses of rows that Newton's steps lost on their way."""
-        lost = np.flatnonzero(at.distances >= BEYOND)
+        lost = np.flatnonzero(at.distances == BEYOND)
         if not len(lost):
             return at
         joints, poses = at.guess.joints(self.given.readings)[lost], at.poses.copy()
@@ -227,10 +266,8 @@ class Fitter:
                 if share < 1e-3:
                     if small.max() < 1e-2:
                         break
-                    raise DataError(
-                        "the search for the geometry does not settle: the measurements contradict "
-                        "the machine as drawn; check units, the order of the joints, and the frame"
-                    )
+                    at = replace(at, settled=False)
+                    break
             if not fell:
                 break
             at = after
@@ -300,7 +337,8 @@ class Fitter:
             raise ValueError
         distances[lost] = BEYOND
         values = guess, fit.total, fit.noise, kept, found, self.prior
-        return Fit(*values, residuals, measured, distances, matrix, right, cost, fit.steps)
+        ends = matrix, right, cost, fit.steps, 0.0, fit.settled
+        return Fit(*values, residuals, measured, distances, *ends)
 
     def whitened(
         self, at: Rows, guess: Guess, noise: dict[str, float]
@@ -344,8 +382,10 @@ class Fitter:
         """Return the noise by kind that the residuals show, less what the unknowns took of it."""
         if not sought:
             return {}
-        kept = fit.kept & (fit.distances < BEYOND)
+        kept = fit.kept & (fit.distances != BEYOND)
         rows = np.flatnonzero(kept)
+        if not len(rows):
+            return {}
         some = rows[evenly(len(rows), _CHUNK)]
         at = self.slopes.rows(fit.guess, self.given, fit.poses, some)
         found = {}

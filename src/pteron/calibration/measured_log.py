@@ -85,7 +85,7 @@ def read_measurements(robot: RobotLike, *paths: str | Path) -> Measurements:
 
 def _read(robot: Manipulator, path: str | Path) -> Measurements:
     about = read_setup_file(path)
-    found = read_controller_log(path, robot)
+    found = read_controller_log(path, robot, about.g33.radius)
     if found is None:
         found = _of_table(robot, _opened(robot, path, about.csv), Path(path).name)
     found = replace(found, setup=about.setup())

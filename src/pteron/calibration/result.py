@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pteron.calibration.fit import Fit
 from pteron.calibration.guess import Block, Guess, Unknown, tolerances_of, variances
-from pteron.calibration.measurements import TOOL, Measurements
+from pteron.calibration.measurements import (
+    TOOL,
+    Measurements,
+    evenly,
+    length_columns,
+    position_axes,
+)
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
 from pteron.json_values import picked
@@ -31,6 +37,9 @@ _BY_DATA = 0.3
 
 _BY_TOLERANCE = 0.9
 """Deviation after the fit, as a share of the tolerance, from which the value is the drawing's."""
+
+_OPEN_ROWS = 400
+"""Most rows, evenly spread, at which possible errors are taken."""
 
 _QUANTILE = float(scipy.stats.norm.ppf(0.975))
 
@@ -89,6 +98,24 @@ class Finding:
     text: str
     improvement: float = 0.0
     """Fall of the sum of squared residuals with this fault in the fit, in variances."""
+    effect: float = 0.0
+    """Greatest shift that it makes of a measurement that was fitted, in ordinary errors."""
+
+
+@dataclass(frozen=True)
+class HiddenOrder:
+    """Two legs whose readings could be swapped and nothing would show.
+
+    Attributes
+    ----------
+    legs : tuple of int
+        Their numbers, from 1.
+    error : float
+        Greatest further error of the tool on the calibrated machine if they are swapped, m.
+    """
+
+    legs: tuple[int, int]
+    error: float
 
 
 @dataclass(frozen=True)
@@ -118,6 +145,11 @@ class Calibration:
         The unknowns, in the order of `values`.
     start : Guess
         The machine as drawn, with its surroundings as described.
+    open_errors : dict
+        Possible error (95 %) of each coordinate of the pose, of the tool where it is a length, at
+        the measured poses, m and rad.
+    hidden_order : HiddenOrder or None
+        Legs of which the measurements do not show the order.
     """
 
     drawn: Manipulator
@@ -132,6 +164,8 @@ class Calibration:
     fit: Fit
     blocks: tuple[Block, ...]
     start: Guess
+    open_errors: dict[str, float]
+    hidden_order: HiddenOrder | None = None
 
     def errors(self, poses: ArrayLike) -> tuple[Array, Array]:
         """Return the errors of the tool at poses as drawn, and their uncertainty as calibrated.
@@ -197,9 +231,28 @@ class Calibration:
             **picked(self.observability, "rank shown columns"),
             "certificate": self.observability.summary(),
             **picked(self.observability, "unseen weak"),
-            **picked(self, "held_out findings verdict"),
+            **picked(self, "held_out findings verdict open_errors hidden_order"),
             "outliers": outliers,
         }
+
+
+def open_errors(given: Measurements, fit: Fit, blocks: Sequence[Block]) -> dict[str, float]:
+    """Return the possible error (95 %) of each coordinate at the measured poses, m and rad."""
+    robot = fit.guess.robot
+    slopes = MachineSlopes(robot, blocks)
+    rows = evenly(len(given), _OPEN_ROWS)
+    tools = Measurements.of(robot, given.readings[rows])
+    poses, moved = slopes.pose_slopes(fit.guess, tools, fit.poses[rows])
+    along = position_axes(robot)[length_columns(robot)] @ moved
+    of_each = np.concatenate([along, poses[:, along.shape[1] :]], axis=1)
+    of_each = of_each[np.isfinite(of_each).all(axis=(1, 2)) & fit.kept[rows]]
+    lengths = [name for name in robot.coordinates if name in "xyz"]
+    names = [*lengths, *(name for name in robot.coordinates if name not in lengths)]
+    possible = {}
+    for k, name in enumerate(names if len(of_each) else ()):
+        most = variances(of_each[:, k : k + 1], fit.covariance).max()
+        possible[name] = _QUANTILE * float(np.sqrt(max(most, 0.0)))
+    return possible
 
 
 def values_of(start: Guess, fit: Fit, blocks: Sequence[Block]) -> tuple[Value, ...]:

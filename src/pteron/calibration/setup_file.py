@@ -80,6 +80,14 @@ class InstrumentTable(Table):
     )
 
 
+class G33Table(Table):
+    """`[g33]`: what a report of Marlin's G33 leaves out."""
+
+    radius: Annotated[Number, Field(gt=0.0)] | None = Field(
+        default=None, description="on which it probed, m"
+    )
+
+
 class MeasuredLog(Table):
     """The whole file; each table may be left out."""
 
@@ -89,6 +97,7 @@ class MeasuredLog(Table):
     planes: dict[str, PlaneTable] = Field(default_factory=dict)
     anchors: dict[str, PlaceTable] = Field(default_factory=dict)
     instrument: InstrumentTable = Field(default_factory=InstrumentTable)
+    g33: G33Table = Field(default_factory=G33Table)
 
     def setup(self) -> Setup:
         """Return what the measurements refer to."""

@@ -16,6 +16,7 @@ from pteron.kinematics import direct_kinematics
 from pteron.workspace.home import home_pose
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]
 
 _FEW = 3
 """Positions that fix a frame, unless they are in line."""
@@ -23,25 +24,73 @@ _FEW = 3
 _TURNED = 0.5
 """Angle, rad, between a measured pose and that of its readings from which they differ."""
 
+_OTHER_MODE = 0.05
+"""Height residual, as a share of the machine's size, from which another assembly mode is tried.
+
+Assembly modes lie apart by a good part of the size, tolerances move a height by less than 1 % of
+it: between a half and twice this share no catalog machine starts in another mode."""
+
 _PLANE = 3
 """Least heights that fix a plane's normal."""
 
 
-def starting_poses(guess: Guess, given: Measurements) -> Array:
-    """Return the pose (N, m) of each row on the machine as drawn.
+def starting_poses(guess: Guess, given: Measurements, *, modes: bool = True) -> Array:
+    """Return the pose (N, m) of each row on a guess of the machine; NaN where it has none.
 
     Newton's method finds it from the measured pose, or from the home pose. Where that leads far
-    away, or across a singularity, it is the assembly mode nearest to the start.
+    away, across a singularity, or far from a measured height, it is the assembly mode that agrees
+    with the row's measurements and, of those that agree alike, the one nearest to the start.
+    Without `modes` these are not sought, and such a row has no pose.
 
     Raises
     ------
     DataError
-        If a row's readings lead to no pose.
+        If the readings of more than half of the rows lead to no pose.
     """
     robot, joints = guess.robot, guess.joints(given.readings)
     home = home_pose(robot)
     slopes = MachineSlopes(robot, ())
     side = np.sign(np.linalg.det(slopes.jacobian(guess, home[None])))
+    begin, whole = _measured_poses(guess, given, home)
+    poses = slopes.poses(guess, joints, begin)
+    with np.errstate(invalid="ignore"):  # of a pose that was not found
+        sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
+    far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
+    other = np.isnan(poses).any(axis=-1)
+    other |= np.where(whole, far.any(axis=-1), sides != side)
+    off = np.abs(_height_residuals(guess, given, poses, np.arange(len(given))))
+    other |= ~(off <= _OTHER_MODE * slopes.size)
+    if not modes:
+        poses[other] = np.nan
+    sought = np.flatnonzero(other if modes else np.zeros_like(other))
+    for i, assembly_modes in zip(sought, direct_kinematics(robot, joints[sought]), strict=True):
+        several = assembly_modes[~np.isnan(assembly_modes).any(axis=-1)]
+        if not len(several):
+            poses[i] = np.nan
+            continue
+        # Of a row without a height all residuals are 0.
+        off = np.abs(_height_residuals(guess, given, several, np.full(len(several), i)))
+        several = several[off <= off.min() + _OTHER_MODE * slopes.size]
+        same = np.sign(np.linalg.det(slopes.jacobian(guess, several))) == side
+        several = several[same] if same.any() and not whole[i] else several
+        poses[i] = several[np.abs(several - begin[i]).max(axis=-1).argmin()]
+    lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=-1))
+    if 2 * lost.sum() > len(lost):
+        first = int(np.argmax(lost))
+        reading = np.round(given.readings[first], 6).tolist()
+        raise DataError(
+            f"{given.places[first]}: the readings {reading} lead to no pose of {robot.name} as "
+            f"drawn, nor do those of {lost.sum()} of {len(lost)} rows; check their units, zeros, "
+            "signs and order"
+        )
+    return poses
+
+
+def _measured_poses(
+    guess: Guess, given: Measurements, home: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the poses (N, m) as measured, home where they are not, and which are whole (N,)."""
+    robot = guess.robot
     begin = np.tile(home, (len(given), 1))
     seen = ~np.isnan(given.angles)
     begin[:, robot.platform.angular] = np.where(
@@ -50,32 +99,26 @@ def starting_poses(guess: Guess, given: Measurements) -> Array:
     lengths = length_columns(robot)
     arms = guess.points(given.marks, begin) - robot.platform.at(begin)[0]
     places = (given.positions - arms @ position_axes(robot).T)[:, lengths]
-    if given.setup.frame_known:
-        at = np.flatnonzero(~robot.platform.angular)
-        begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
-    poses = slopes.poses(guess, joints, begin)
-    whole = seen.all(axis=-1) & ~np.isnan(places).any(axis=-1)
-    told: NDArray[np.bool_] = np.asarray(whole)
     if not given.setup.frame_known:
-        told[:] = False
-    with np.errstate(invalid="ignore"):  # of a pose that was not found
-        sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
-    far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
-    other = np.isnan(poses).any(axis=-1)
-    other |= np.where(told, far.any(axis=-1), sides != side)
-    for i, modes in zip(
-        np.flatnonzero(other), direct_kinematics(robot, joints[other]), strict=True
-    ):
-        modes = modes[~np.isnan(modes).any(axis=-1)]
-        if not len(modes):
-            raise DataError(
-                f"{given.places[i]}: the readings {np.round(given.readings[i], 6).tolist()} lead "
-                f"to no pose of {robot.name} as drawn; check their units, zeros and order"
-            )
-        same = np.sign(np.linalg.det(slopes.jacobian(guess, modes))) == side
-        modes = modes[same] if same.any() and not told[i] else modes
-        poses[i] = modes[np.abs(modes - begin[i]).max(axis=-1).argmin()]
-    return poses
+        return begin, np.zeros(len(given), dtype=bool)
+    at = np.flatnonzero(~robot.platform.angular)
+    begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
+    whole = seen.all(axis=-1) & ~np.isnan(places).any(axis=-1)
+    return begin, np.asarray(whole)
+
+
+def _height_residuals(guess: Guess, given: Measurements, poses: Array, rows: Numbers) -> Array:
+    """Return computed minus measured heights (K,) of rows at poses; 0 over no known plane."""
+    names = [given.planes[i] for i in rows]
+    unknown = {name for name, plane in given.setup.planes.items() if not plane.known}
+    over = ~np.isnan(given.heights[rows]) & np.array([name not in unknown for name in names])
+    residuals = np.zeros(len(rows))
+    if over.any():
+        planes = np.stack([guess.planes[name] for name in names])
+        points = guess.points([given.marks[i] for i in rows], poses)
+        heights = np.einsum("ni,ni->n", planes[:, :3], points) - planes[:, 3]
+        residuals[over] = (heights - given.heights[rows])[over]
+    return residuals
 
 
 def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.calibration.fit import Fit
+from pteron.calibration import thresholds
+from pteron.calibration.fit import BEYOND, Fit
 from pteron.calibration.guess import Block
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
-from pteron.calibration.result import Finding, HeldOut
-from pteron.verdict import Opinion, Verdict
+from pteron.calibration.result import Finding, HeldOut, HiddenOrder
+from pteron.verdict import Grade, Opinion, Verdict
 
 EVERY = 5
 """One row in so many is held out of the fit for a check."""
@@ -20,17 +22,41 @@ EVERY = 5
 _PER_VALUE = {True: 1.0, False: 1.5}
 """Measured numbers for each unknown below which none is, where their noise is given or is not."""
 
-_AT_THE_NOISE = 1.3
-"""Held-out error, over the one expected from noise and intervals, up to which it is trusted."""
-
-_SURE = 0.999
-"""Probability with which a faultless calibration is trusted, however few its rows are."""
-
 _FAR = 2.0
-"""The same ratio above which it is not trusted."""
+"""Held-out error, over the one expected, above which a fit that gained nothing is not trusted."""
 
-_OFF = 5.0
-"""Distance from the drawing, in tolerances, above which a value is doubted."""
+_UNEXPLAINED = (
+    "No single cause explains the errors: units, order, signs, zeros and scales of the readings, "
+    "marks and the instrument's frame were tried."
+)
+
+
+_ROD_ADVICE = (
+    "Measure both rods of each pair: rods that differ tilt the platform, and where positions are "
+    "not measured a fit takes that for geometry."
+)
+
+
+class Evidence(NamedTuple):
+    """What a verdict rests on."""
+
+    measurements: Measurements
+    fit: Fit
+    blocks: Sequence[Block]
+    observability: Observability
+    held_out: HeldOut | None
+    findings: Sequence[Finding]
+    open_errors: Mapping[str, float]
+    """Possible error of each coordinate (95 %), m and rad."""
+    hidden_order: HiddenOrder | None
+    rows_for_check: int
+    """Rows from which on some are held out."""
+
+
+class _Reason(NamedTuple):
+    text: str
+    step: str = ""
+    grade: Grade = "trustworthy"
 
 
 def rows_for_check(given: Measurements, blocks: Sequence[Block]) -> int:
@@ -40,66 +66,171 @@ def rows_for_check(given: Measurements, blocks: Sequence[Block]) -> int:
     return max(2 * EVERY, int(np.ceil(least * len(given) / counted)))
 
 
-def verdict_of(
-    fit: Fit,
-    blocks: Sequence[Block],
-    shown: Observability,
-    held_out: HeldOut | None,
-    findings: Sequence[Finding],
-    checked: int,
-) -> Verdict:
-    """Return the verdict."""
-    found = Opinion()
-    if held_out is None:
-        found.add(
-            "No rows were left for a check: all were needed for the fit.",
-            f"Measure at {checked} or more poses (fewer where the noise is given), or give a "
-            "second log (--held-out).",
-            grade="usable with care",
+def verdict_of(evidence: Evidence) -> Verdict:
+    """Return the verdict: its first reason is the cause of a bad grade, or what stays open."""
+    errors = [*_errors(evidence), *_left_out(evidence.fit)]
+    findings = [
+        _Reason(f.text, "", "not trustworthy" if f.effect > 1.0 else "usable with care")
+        for f in evidence.findings
+    ]
+    bad = any(reason.grade == "not trustworthy" for reason in (*errors, *findings))
+    first = findings or ([_Reason(_UNEXPLAINED)] if bad else [])
+    reasons = [*_open_errors(evidence), *findings, *errors, *_far_values(evidence)]
+    if bad:
+        said = [*first, *_open_errors(evidence)]  # that errors remain needs no other words
+        reasons = [*first, *(reason for reason in reasons if reason not in said)]
+    opinion = Opinion()
+    for text, step, grade in (*reasons, *_unseen(evidence.observability)):
+        opinion.add(text, step, grade=grade)
+    if "position" not in evidence.measurements.kinds and any(
+        leg.bar for leg in evidence.fit.guess.robot.legs
+    ):
+        opinion.steps.append(_ROD_ADVICE)
+    return opinion.verdict()
+
+
+def _errors(evidence: Evidence) -> Iterator[_Reason]:
+    """Yield what the errors after the fit say, at held-out rows or, without them, at all rows."""
+    held_out, stated = evidence.held_out, evidence.measurements.setup.noise
+    if not evidence.fit.settled:
+        yield _Reason(
+            "The search for the geometry does not settle: the measurements contradict the machine "
+            "as drawn.",
+            "Check units, the order and signs of the joints, and the frame.",
+            "not trustworthy",
         )
-    else:
-        for kind, after in held_out.after.items():
-            expected, before = held_out.expected[kind], held_out.before[kind]
-            ratio = after / expected
-            unit = "mrad" if kind == "angle" else "mm"
-            text = (
-                f"At {held_out.rows} rows that the fit did not see the {kind} error is "
-                f"{1e3 * after:.3g} {unit}, {1e3 * before:.3g} before"
-            )
-            # The error of few rows strays further by chance.
-            chance = np.sqrt(scipy.stats.chi2.ppf(_SURE, held_out.rows) / held_out.rows)
-            if ratio <= max(_AT_THE_NOISE, chance):
-                found.add(f"{text}: as noise and intervals expect.")
-            else:
-                lost = ratio > _FAR and after > 0.5 * before
-                found.add(
-                    f"{text}: {ratio:.2g} times what noise and intervals expect.",
-                    grade="not trustworthy" if lost else "usable with care",
+    if held_out is None:
+        yield _Reason(
+            "No rows were left for a check: all were needed for the fit.",
+            f"Measure at {evidence.rows_for_check} or more poses (fewer where the noise is given), "
+            "or give a second log (--held-out).",
+            "usable with care",
+        )
+        for kind, error in fitted_errors(evidence.fit, evidence.measurements).items():
+            if error > thresholds.ordinary_error(kind, stated.get(kind)):
+                text = (
+                    f"Even at the rows that were fitted the {kind} error is {_sized(error, kind)}"
                 )
-    unknowns = [u for block in blocks for u in block.unknowns]
+                yield _Reason(f"{text}, more than ordinary tolerances.", "", "not trustworthy")
+        return
+    for kind, after in held_out.after.items():
+        expected, before = held_out.expected[kind], held_out.before[kind]
+        text = (
+            f"At {held_out.rows} rows that the fit did not see the {kind} error is "
+            f"{_sized(after, kind)}, {_sized(before, kind)[: -len(_unit(kind)) - 1]} before"
+        )
+        most = thresholds.ordinary_error(kind, stated.get(kind))
+        fine = after <= thresholds.FINE_SHARE * most
+        if after > most:
+            yield _Reason(
+                f"{text}: more than {_sized(most, kind)}, which ordinary tolerances leave.",
+                "",
+                "not trustworthy",
+            )
+            continue
+        if not fine and after > thresholds.FALLEN_SHARE * before:
+            yield _Reason(f"{text}: it did not fall.", "", "not trustworthy")
+            continue
+        # The error of few rows strays further by chance.
+        chance = np.sqrt(scipy.stats.chi2.ppf(thresholds.SURE, held_out.rows) / held_out.rows)
+        ratio = after / expected
+        if ratio <= max(thresholds.AT_THE_NOISE, chance):
+            grade: Grade = "trustworthy" if fine else "usable with care"
+            yield _Reason(f"{text}: as noise and intervals expect.", "", grade)
+            continue
+        lost = ratio > _FAR and after > thresholds.FALLEN_SHARE * before
+        yield _Reason(
+            f"{text}: {ratio:.2g} times what noise and intervals expect.",
+            "",
+            "not trustworthy" if lost else "usable with care",
+        )
+
+
+def fitted_errors(fit: Fit, given: Measurements) -> dict[str, float]:
+    """Return the root mean square residual of each kind, m and rad, at the rows that are kept."""
+    counted = fit.measured & (fit.kept & (fit.distances != BEYOND))[:, None]
+    kinds = {kind: counted & (given.kind_of == kind) for kind in given.kinds}
+    return {
+        kind: float(np.sqrt(np.mean(fit.residuals[here] ** 2)))
+        for kind, here in kinds.items()
+        if here.any()
+    }
+
+
+def _open_errors(evidence: Evidence) -> Iterator[_Reason]:
+    """Yield the possible errors of coordinates that the measurements do not show."""
+    given, fit = evidence.measurements, evidence.fit
+    kinds = [k for k, v in given.parts.items() if np.isfinite(v[fit.kept]).any()]
+    linear = [name for name in evidence.open_errors if name in "xyz"]
+    for names, kind in (
+        (linear, "position"),
+        ([name for name in evidence.open_errors if name not in linear], "angle"),
+    ):
+        least = thresholds.OPEN_SHARE * thresholds.ORDINARY_ERROR[kind]
+        far = [name for name in names if evidence.open_errors[name] > least]
+        if far:
+            most = max(evidence.open_errors[name] for name in far)
+            measured = " and ".join(f"{name}s" for name in kinds)
+            where = "" if given.setup.frame_known else " in an unknown frame"
+            them = "it" if len(far) == 1 else "them"
+            order = ""
+            hidden = evidence.hidden_order
+            if hidden and kind == "position":
+                order = (
+                    f", nor the order of the legs {hidden.legs[0]} and {hidden.legs[1]}: if they "
+                    f"are swapped, by {_sized(hidden.error, 'position')} more"
+                )
+            yield _Reason(
+                f"{_listed(far)} may be off by {_sized(most, kind)} (95 %): "
+                f"{measured}{where} do not show {them}{order}.",
+                f"Measure {_listed(far)} too: positions, or distances across the work space.",
+            )
+
+
+def _far_values(evidence: Evidence) -> Iterator[_Reason]:
+    unknowns = [u for block in evidence.blocks for u in block.unknowns]
     far = [
         u.name
-        for u, t in zip(unknowns, fit.total, strict=True)
-        if u.group != "setup" and abs(t) > _OFF * u.tolerance
+        for u, t in zip(unknowns, evidence.fit.total, strict=True)
+        if u.group != "setup" and abs(t) > thresholds.OFF_TOLERANCES * u.tolerance
     ]
     if far:
         several = f"{', '.join(far[:4])}{' ...' if len(far) > 4 else ''}"
-        found.add(
-            f"More than {_OFF:g} tolerances from the drawing: {several}.",
+        yield _Reason(
+            f"More than {thresholds.OFF_TOLERANCES:g} tolerances from the drawing: {several}.",
             "Check the robot's file at these values, or say by `prior` how far off they may be.",
-            grade="usable with care",
+            "usable with care",
         )
-    for finding in findings:
-        found.add(finding.text, grade="usable with care")
-    out = int((~fit.kept).sum())
-    if out > 0.1 * len(fit.kept):
-        text = f"{out} of {len(fit.kept)} rows do not fit and were left out."
-        found.add(text, grade="usable with care")
+
+
+def _left_out(fit: Fit) -> Iterator[_Reason]:
+    out, count = int((~fit.kept).sum()), len(fit.kept)
+    if out > thresholds.FEW_LEFT_OUT * count:
+        many = out > thresholds.MANY_LEFT_OUT * count
+        yield _Reason(
+            f"{out} of {count} rows do not fit and were left out.",
+            "",
+            "not trustworthy" if many else "usable with care",
+        )
+
+
+def _unseen(shown: Observability) -> Iterator[_Reason]:
     open_values = shown.columns - shown.shown
     if open_values:
         more = f"; at more poses {shown.rank} would" if shown.rank > shown.shown else ""
-        found.add(
+        yield _Reason(
             f"{shown.shown} of {shown.columns} combinations show in these measurements, the other "
             f"{open_values} are kept at the drawing{more}."
         )
-    return found.verdict()
+
+
+def _unit(kind: str) -> str:
+    return "mrad" if kind == "angle" else "mm"
+
+
+def _sized(error: float, kind: str) -> str:
+    return f"{1e3 * error:.3g} {_unit(kind)}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

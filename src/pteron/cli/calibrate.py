@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from pteron.calibration import Calibration, Plan, Setup
     from pteron.manipulator import Manipulator
+    from pteron.report.calibration import FirmwareFit, Row
 
 _MOST = 12
 """Values that the terminal shows, those that changed most; the page has them all."""
@@ -37,11 +39,13 @@ def calibrate(
     plan: int | None = None,
     measure: Measure = "positions",
     plane: str | None = None,
+    anyway: bool = False,
 ) -> Result:
     """Find a machine's true geometry from measurements, and say what they cannot show.
 
     The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
-    it was found, robot.toml. The exit code is 0 whatever the verdict.
+    it was found, robot.toml, unless that is not trustworthy. The exit code is 0 whatever the
+    verdict.
 
     With --plan, poses that show the geometry best are written as a table of joints and poses.
 
@@ -62,6 +66,7 @@ def calibrate(
     --measure: What will be measured at the planned poses.
     --plane z=HEIGHT: The level that a planned probe touches, m. [default: z=0 where the tool works
         down to it, as on a printer's bed; else the bottom of the proved poses]
+    --anyway: Write robot.toml even where it is not trustworthy.
 
     Examples
     --------
@@ -80,7 +85,7 @@ def calibrate(
         return _plan(machine, plan, measure, out, free, tolerances, plane)
     with spinner("Reading the measurements"):
         from pteron.calibration import calibrate as calibrated, read_measurements
-        from pteron.report.calibration import numbers, write_calibration
+        from pteron.report.calibration import firmware_fit, numbers, write_calibration
         from pteron.report.write import checked_apart, checked_folder
 
         read = [*(log or ()), *(held_out or ())]
@@ -93,9 +98,10 @@ def calibrate(
     with spinner(f"Calibrating {machine.name} from {len(given)} rows"):
         result = calibrated(machine, given, free=free, prior=tolerances, held_out=check)
     with spinner("Drawing the report"):
-        files = write_calibration(result, out, sources=sources)
-    data = {"files": [str(path) for path in files.paths], **numbers(result)}
-    return Result(data, partial(_show, result), files.paths)
+        firmware = firmware_fit(result)
+        files = write_calibration(result, out, sources=sources, anyway=anyway, firmware=firmware)
+    data = {"files": [str(path) for path in files.paths], **numbers(result, firmware)}
+    return Result(data, partial(_show, result, firmware, files.left_out), files.paths)
 
 
 def _prior(path: str) -> dict[str, float]:
@@ -189,30 +195,42 @@ def _region(planned: Plan) -> str:
     return f"box, {', '.join(sides)}"
 
 
-def _show(result: Calibration) -> None:
+def _show(result: Calibration, firmware: FirmwareFit | None, left_out: str) -> None:
     """Print a verdict, what changed, what shows and what does not."""
     from pteron.report.calibration.values import notes
 
     verdict, shown = result.verdict, result.observability
     color = GRADE_COLORS[verdict.grade]
+    lines: list[str | Table] = [plain(verdict.reasons[0])]
+    if firmware:
+        lines += [_table(firmware.rows), plain(firmware.sentence)]
     show(
         f"[bold {color}]{plain(result.drawn.name)}: {verdict.grade}[/bold {color}], "
         f"{shown.shown} of {shown.columns} combinations shown",
+        *lines,
         _values(result),
         *_errors(result),
-        *map(plain, (*verdict.reasons, *verdict.next_steps)),
+        *map(plain, (*verdict.reasons[1:], *verdict.next_steps)),
         *(f"Cannot be seen, as drawn: {plain(line)}" for line in shown.unseen),
         *(f"[yellow]Weak:[/yellow] {plain(line)}" for line in shown.weak),
         *map(plain, notes(result)),
+        *([f"[red]{plain(left_out)}[/red]"] if left_out else []),
     )
 
 
 def _values(result: Calibration) -> Table:
     from pteron.report.calibration import value_rows
 
-    rows = sorted(value_rows(result), key=lambda row: -row.size)
-    numbers = ("drawn", "change", "+- 95 %")
+    rows = value_rows(result)
     more = len(rows) - _MOST
+    return _table(
+        rows[:_MOST],
+        f"{more} more, which changed less, are on the page." if more > 0 else None,
+    )
+
+
+def _table(rows: Sequence[Row], caption: str | None = None) -> Table:
+    numbers = ("drawn", "change", "+- 95 %")
     return table(
         *("value", *numbers, "unit", "made by"),
         rows=[
@@ -222,11 +240,11 @@ def _values(result: Calibration) -> Table:
                 "deg" if row.unit == "°" else row.unit,
                 row.origin,
             )
-            for row in rows[:_MOST]
+            for row in rows
         ],
         numbers=numbers,
         names=("value",),
-        caption=f"{more} more, which changed less, are on the page." if more > 0 else None,
+        caption=caption,
     )
 
 

@@ -178,8 +178,22 @@ def varied(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> 
         for name in keys:
             vector = np.array(new[i].get(name, getattr(owners[i], name)))
             new[i][name] = tuple((matrix @ vector).tolist())
+    for i, leg in enumerate(robot.legs):
+        _keep_perpendicular(leg, new[i], {key for k, key in turns if k == i})
     legs = tuple(replace(leg, **fields) for leg, fields in zip(robot.legs, new[:-1], strict=True))
     return replace(robot, legs=legs, platform=replace(robot.platform, **new[-1]))
+
+
+def _keep_perpendicular(leg: LegKind, fields: dict[str, Any], turned: Collection[str]) -> None:
+    """Make a leg's directions perpendicular again of which both were turned.
+
+    One turn after the other leaves them so to first order alone.
+    """
+    for name, held in leg.every_key().items():
+        if name in turned and held.across in turned:
+            v, d = np.array(fields[name]), np.array(fields[held.across])
+            v = v - (v @ d) / (d @ d) * d
+            fields[name] = tuple((v / np.linalg.norm(v)).tolist())
 
 
 def varied_numbers(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> Array:

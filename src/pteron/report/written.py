@@ -17,6 +17,8 @@ class Written:
     page: Path
     numbers: Path
     model: Path | None
+    left_out: str = ""
+    """Why a file was not written; "" where all were."""
 
     @property
     def paths(self) -> tuple[Path, ...]:

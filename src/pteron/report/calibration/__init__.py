@@ -5,6 +5,10 @@ from typing import TYPE_CHECKING
 from pteron.public import publish as _publish
 
 if TYPE_CHECKING:
+    from pteron.report.calibration.firmware import (
+        FirmwareFit as FirmwareFit,
+        firmware_fit as firmware_fit,
+    )
     from pteron.report.calibration.values import Row as Row, value_rows as value_rows
     from pteron.report.calibration.write import (
         Written as Written,

@@ -19,7 +19,8 @@ from pteron.plots import (
     tool_errors_figure,
 )
 from pteron.plots.canvas import nice_step
-from pteron.report.calibration.values import notes, value_rows
+from pteron.report.calibration.firmware import FirmwareFit
+from pteron.report.calibration.values import next_steps, notes, value_rows
 from pteron.report.typeset import significant, template
 from pteron.workspace import home_pose, reach_slice
 from pteron.workspace.reach_slices import slice_planes
@@ -33,8 +34,8 @@ _ARROWS = 60
 _LEVELS = 6
 """Shades of a map, about."""
 
-_FINE = 1e-4
-"""Error, m or rad, below which it is told in micrometres or microradians."""
+MOST_ROWS = 12
+"""Values that are in sight; those that changed less are folded."""
 
 
 class ErrorMap(NamedTuple):
@@ -44,11 +45,11 @@ class ErrorMap(NamedTuple):
     before: Figure
     after: Figure
     greatest: list[str]
-    units: list[str]
+    unit: str
 
 
-def page(result: Calibration) -> str:
-    """Return the page as HTML without reference to another file."""
+def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | None = None) -> str:
+    """Return the page as HTML without reference to another file; robot.toml may not be written."""
     made = template("calibration/page.html.j2", scaled=scaled)
     return made.render(
         result=result,
@@ -58,18 +59,20 @@ def page(result: Calibration) -> str:
         maps=error_maps(result),
         figures=_figures(result),
         notes=notes(result),
+        written=written,
+        firmware=firmware,
+        most=MOST_ROWS,
+        next_steps=next_steps(result, written=written, printer=firmware is not None),
     )
 
 
 def scaled(value: float, kind: str) -> str:
-    """Return an error of a kind of measurement with its unit."""
-    factor, unit = _unit(value, kind)
-    return f"{significant(factor * value)} {unit}"
+    """Return an error of a kind of measurement with its unit, the same all over the page."""
+    return f"{significant(1e3 * value)} {_unit(kind)}"
 
 
-def _unit(greatest: float, kind: str) -> tuple[float, str]:
-    factor, prefix = (1e6, "µ") if abs(greatest) < _FINE else (1e3, "m")
-    return factor, prefix + ("rad" if kind == "angle" else "m")
+def _unit(kind: str) -> str:
+    return "mrad" if kind == "angle" else "mm"
 
 
 def error_maps(result: Calibration) -> list[ErrorMap]:
@@ -91,15 +94,13 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
             reached = (cut.status == 0).ravel() & np.isfinite(errors[0]) & np.isfinite(errors[1])
             if not reached.any() or not errors[0][reached].max() > 0.0:
                 continue
-            drawn, units = [], []
-            most = [float(error[reached].max()) for error in errors]
-            for error, greatest in zip(errors, most, strict=True):
-                factor, unit = _unit(greatest, kind)
-                values = np.where(reached, factor * error, np.nan).reshape(cut.status.shape)
-                drawn.append(measure_figure(cut, values, levels=levels(values)))
-                units.append(unit)
-            told = [scaled(value, kind) for value in most]
-            found.append(ErrorMap(tuple(plane), drawn[0], drawn[1], told, units))
+            greatest = [scaled(float(error[reached].max()), kind) for error in errors]
+            values = [
+                np.where(reached, 1e3 * error, np.nan).reshape(cut.status.shape) for error in errors
+            ]
+            shades = levels(np.stack(values))  # of both, so that they compare
+            drawn = [measure_figure(cut, part, levels=shades) for part in values]
+            found.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, _unit(kind)))
     return found
 
 

@@ -32,7 +32,7 @@ class Row:
 
 
 def value_rows(result: Calibration) -> tuple[Row, ...]:
-    """Return the values of a calibration, in its order."""
+    """Return the values of a calibration, those that changed most first."""
     rows = []
     for value in result.values:
         factor, unit = _UNITS[value.unit]
@@ -43,7 +43,29 @@ def value_rows(result: Calibration) -> tuple[Row, ...]:
         )
         size, error = abs(change) / _ORDINARY[value.unit], measured(0.0, half)[1]
         rows.append(Row(value.name, drawn, found, changed, error, unit, value.origin, size))
-    return tuple(rows)
+    return tuple(sorted(rows, key=lambda row: -row.size))
+
+
+def next_steps(
+    result: Calibration, *, written: bool = True, printer: bool = False
+) -> tuple[str, ...]:
+    """Return what to do next: the verdict's advice, then the commands that go on from the files."""
+    if not written:
+        return (
+            *result.verdict.next_steps,
+            "Mend the cause, measure again and calibrate anew.",
+        )
+    steps = ["Give robot.toml, beside this page, to every command in place of the drawing."]
+    if printer:
+        steps.append(
+            "pteron export robot.toml --klipper lines writes new lines for printer.cfg; --marlin "
+            "and --reprap write M665 and M666."
+        )
+    steps += [
+        "pteron view robot.toml --compare DRAWING --enlarge 50 shows what changed.",
+        "Measure once more at other places, and let that judge: --held-out LOG.",
+    ]
+    return (*steps, *result.verdict.next_steps)
 
 
 def notes(result: Calibration) -> tuple[str, ...]:

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pteron.calibration import Calibration
 from pteron.json_values import json_ready
 from pteron.manipulator.saving import text_of
+from pteron.report.calibration.firmware import FirmwareFit
 from pteron.report.calibration.values import notes
 from pteron.report.write import checked_apart, checked_folder, commented
 from pteron.report.written import Written as Written, write_found
 
 
 def write_calibration(
-    result: Calibration, folder: str | Path, *, sources: Iterable[str | Path] = ()
+    result: Calibration,
+    folder: str | Path,
+    *,
+    sources: Iterable[str | Path] = (),
+    anyway: bool = False,
+    firmware: FirmwareFit | None = None,
 ) -> Written:
     """Write a calibration: a page, `calibration.json`, and the calibrated machine, `robot.toml`.
 
-    The page, `calibration.html`, needs no other file or network. All files are written, or none.
+    The page, `calibration.html`, needs no other file or network. All files are written, or none;
+    but the machine's is not where the verdict is "not trustworthy".
 
     Parameters
     ----------
@@ -29,6 +37,10 @@ def write_calibration(
         Where to write; made if it is missing.
     sources : iterable of str or path
         Files that were read, which the machine's file must not replace.
+    anyway : bool
+        Whether the machine's file is written even where it is not trustworthy.
+    firmware : FirmwareFit, optional
+        A printer's own values, `firmware_fit`, which the page then shows first.
 
     Returns
     -------
@@ -45,14 +57,29 @@ def write_calibration(
     target = checked_folder(folder)
     for file in ("calibration.html", "calibration.json", "robot.toml"):
         checked_apart(target / file, sources)
-    model = commented(_header(result)) + text_of(result.robot)
-    return write_found(target, "calibration", page(result), numbers(result), {"robot.toml": model})
+    models = {}
+    if anyway or result.verdict.grade != "not trustworthy":
+        models["robot.toml"] = commented(_header(result)) + text_of(result.robot)
+    html = page(result, written=bool(models), firmware=firmware)
+    files = write_found(target, "calibration", html, numbers(result, firmware), models)
+    if models:
+        return files
+    stale = (target / "robot.toml").exists()
+    return replace(
+        files,
+        left_out="robot.toml is not written, as the calibration is not trustworthy"
+        + ("; the one in the folder is of an earlier run" if stale else "")
+        + " (--anyway writes it).",
+    )
 
 
-def numbers(result: Calibration) -> dict[str, Any]:
+def numbers(result: Calibration, firmware: FirmwareFit | None = None) -> dict[str, Any]:
     """Return the numbers of a calibration as JSON has them, null where one is not finite."""
-    found: dict[str, Any] = json_ready(result.as_dict() | {"notes": list(notes(result))})
-    return found
+    whole = result.as_dict() | {"notes": list(notes(result))}
+    if firmware is not None:
+        whole["firmware"] = firmware.as_dict()
+    ready: dict[str, Any] = json_ready(whole)
+    return ready
 
 
 def _header(result: Calibration) -> list[str]:

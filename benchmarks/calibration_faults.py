@@ -1,0 +1,82 @@
+"""Calibrations with faults: whether each is named, and no error is above the stated one.
+
+    python benchmarks/calibration_faults.py [SEEDS | --quick]
+
+Five machines and instruments, ten faults and none, simulated in NumPy by
+tests/calibration_plants.py. A log is refused with its mistake, or calibrated; then the machine as
+calibrated goes to 80 poses that were not measured, and its error is compared with the one that the
+result states.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+from measuring import quick
+
+from pteron.calibration import calibrate
+from pteron.errors import DataError
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from calibration_plants import CASES, FAULTS, WORDS, trial
+
+FINE = 0.5e-3
+"""m: what a calibration that states no greater error may be off."""
+
+
+def judged(case: str, fault: str, seed: int) -> tuple[str, bool, float] | None:
+    """Return the grade, whether the cause is among what is read first, and error over stated."""
+    sample = trial(case, fault, seed)
+    if sample is None:
+        return None
+    try:
+        result = calibrate(sample.robot, sample.given)
+    except DataError as error:
+        return "refused", any(word in str(error) for word in WORDS.get(fault, ())), 0.0
+    lines = [result.verdict.reasons[0], *(finding.text for finding in result.findings[:2])]
+    named = any(word in line for word in WORDS.get(fault, ()) for line in lines)
+    hidden = result.hidden_order.error if result.hidden_order else 0.0
+    stated = [max(result.open_errors[name] + hidden, FINE) for name in "xyz"]
+    return result.verdict.grade, named, float((sample.errors(result.robot) / stated).max())
+
+
+def main() -> None:
+    """Print a line for each fault and the sums."""
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    seeds = 1 if quick() else (numbers or [4])[0]
+    cases = list(CASES)[:2] if quick() else list(CASES)
+    total: Counter[str] = Counter()
+    print(
+        f"{'fault':20}{'calibrations':>13}{'named':>7}  grades; greatest error over the stated one"
+    )
+    for fault in FAULTS:
+        grades: Counter[str] = Counter()
+        named, most = 0, 0.0
+        for case in cases:
+            for seed in range(seeds):
+                answer = judged(case, fault, seed)
+                if answer is None:
+                    continue
+                grade, known, over = answer
+                grades[grade] += 1
+                named += known
+                if fault != "none" and not known:
+                    print(f"  not named: {case}, {fault}, seed {seed}: {grade}")
+                if grade not in ("refused", "not trustworthy"):
+                    most = max(most, over)
+                    total["above"] += over > 1.0
+        count = sum(grades.values())
+        told = ", ".join(f"{number} {grade}" for grade, number in grades.items())
+        print(f"{fault:20}{count:13}{named:7}  {told}; {most:.2f}", flush=True)
+        total["faulty"] += count * (fault != "none")
+        total["named"] += named
+    print(
+        f"{total['faulty']} calibrations with faults, {total['named']} named first, "
+        f"{total['above']} with an error above the stated one"
+    )
+
+
+if __name__ == "__main__":
+    main()

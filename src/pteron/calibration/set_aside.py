@@ -1,0 +1,195 @@
+"""Rows that are set aside before a calibration's first fit, and why.
+
+Most are back where they fit after it. A row under a plane that others touch is not: no fit moves it
+out of the plate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.calibration import thresholds
+from pteron.calibration.guess import Block, Guess
+from pteron.calibration.measurements import Measurements
+from pteron.calibration.raw_faults import row_misfits
+from pteron.calibration.residuals import MachineSlopes
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_FACTORS = {
+    0.5: "half",
+    2.0: "twice",
+    0.25: "a quarter of",
+    4.0: "four times",
+    0.1: "a tenth of",
+    10.0: "ten times",
+    1e-3: "a thousandth of (mm for m)",
+    1e3: "a thousand times (m for mm)",
+    float(np.pi / 180.0): "pi/180 of (degrees for radians)",
+    1 / 25.4: "1/25.4 of (inches)",
+    -1.0: "minus",
+}
+"""Factors of readings, as wrong step units make them, and how they are called."""
+
+_PUT_BACK = 0.1
+"""Residual, as a share of that before, below which a factor puts a row where it belongs."""
+
+
+_TELLING = 2
+"""Least measured numbers of a row: with one, some factor of many fits by chance."""
+
+
+class SetAside(NamedTuple):
+    """Rows that a first fit leaves out, those that stay out (barred), and why, by row."""
+
+    aside: Mask
+    barred: Mask
+    reasons: dict[int, str]
+
+
+def rows_set_aside(
+    start: Guess, given: Measurements, blocks: Sequence[Block], poses: Array
+) -> SetAside:
+    """Return the rows that the drawn machine does not reach, that lie beyond limits, or far off."""
+    reasons: dict[int, str] = {}
+    lost: Mask = np.asarray(np.isnan(poses).any(axis=1))
+    depths = _depths_under_planes(start, given, poses)
+    barred = depths > thresholds.UNDER_PLANE
+    squares = row_misfits(start, given, blocks, poses)
+    finite = np.isfinite(squares)
+    middle = float(np.median(squares[finite])) if finite.any() else 0.0
+    far = finite & (squares > thresholds.FAR_ROW**2 * max(1.0, middle))
+    if far.sum() > thresholds.FEW_LEFT_OUT * len(given):  # no rows, but the log, is far off
+        far[:] = False
+    beyond = dict(_beyond_limits(start, given))
+    if len(beyond) > thresholds.MANY_LEFT_OUT * len(given):  # the limits are wrong
+        beyond = {}
+    factors = _Factors(start, given, blocks, poses, squares)
+    for i in np.flatnonzero(lost | barred | far):
+        k = int(i)
+        reason = beyond.get(k, "its readings lead to no pose as drawn")
+        if barred[k]:
+            reason = f"{1e3 * depths[k]:.3g} mm under the plane that other rows touch"
+        elif far[k]:
+            reason = beyond.get(k, "far off on the machine as drawn")
+        reasons[k] = reason + factors.told(k)
+    for k, reason in beyond.items():
+        reasons.setdefault(k, reason)
+    aside = lost | barred | far
+    aside[list(beyond)] = True
+    from_barred = given.origins >= 0
+    from_barred &= barred[given.origins] | lost[given.origins]
+    return SetAside(aside | from_barred, barred | (from_barred & barred[given.origins]), reasons)
+
+
+def _depths_under_planes(start: Guess, given: Measurements, poses: Array) -> Array:
+    """Return how deep rows without a height lie under a known plane that other rows touch (N,)."""
+    depths = np.zeros(len(given))
+    names = np.array(given.planes, dtype=object)
+    heights = np.abs(given.heights)
+    points = start.points(given.marks, np.nan_to_num(poses))
+    for name, (*normal, offset) in start.planes.items():
+        plane = given.setup.planes.get(name)
+        touched = (names == name) & (heights < thresholds.UNDER_PLANE)
+        if (plane is not None and not plane.known) or not touched.any():
+            continue
+        under = offset - points @ np.array(normal)
+        depths = np.where(np.isnan(given.heights), np.maximum(depths, under), depths)
+    depths[np.isnan(poses).any(axis=1)] = 0.0
+    return depths
+
+
+def _beyond_limits(start: Guess, given: Measurements) -> Iterator[tuple[int, str]]:
+    """Yield rows whose readings are beyond a joint's limits, and by how much."""
+    joints = start.joints(given.readings)
+    for j, (leg, name) in enumerate(zip(start.robot.legs, start.robot.joint_names, strict=True)):
+        if leg.limits is None:
+            continue
+        low, high = leg.limits
+        excess = np.maximum(low - joints[:, j], joints[:, j] - high)
+        unit = "mm" if leg.joint.unit == "m" else "mrad"
+        for i in np.flatnonzero(excess > thresholds.BEYOND_LIMITS * (high - low)):
+            yield int(i), f"{name} is {1e3 * excess[i]:.3g} {unit} beyond its limits"
+
+
+class _Factors:
+    """A search for the factor of a row's readings that puts it where it belongs."""
+
+    def __init__(
+        self,
+        start: Guess,
+        given: Measurements,
+        blocks: Sequence[Block],
+        poses: Array,
+        squares: Array,
+    ) -> None:
+        self.start, self.given, self.blocks = start, given, blocks
+        good = ~np.isnan(poses).any(axis=1)
+        self.middle = np.median(poses[good], axis=0)
+        self.slopes = MachineSlopes(start.robot, ())
+        self.squares = squares
+        self.poses = poses
+
+    def told(self, row: int) -> str:
+        """Return a clause with the factor that puts a row where it belongs; "" for none."""
+        joints = self.start.joints(self.given.readings[row])
+        legs = self.start.robot.legs
+        ends = [("", np.zeros(len(joints)))]
+        if all(leg.limits is not None for leg in legs):
+            limits = np.array([leg.limits for leg in legs])
+            ends += [(" from the upper end", limits[:, 1]), (" from the lower end", limits[:, 0])]
+        candidates = []
+        for origin, end in ends:
+            for factor, words in _FACTORS.items():
+                tried = end + factor * (joints - end)
+                pose = self.slopes.poses(self.start, tried[None], self.middle[None])
+                if np.isfinite(pose).all():
+                    off = self._off(row, tried, pose)
+                    if off is not None:
+                        candidates.append((*off, factor, words + " its way" + origin))
+        if not candidates:
+            return ""
+        _, where, factor, words = min(candidates)
+        return f"; {words}, factor {factor:.3g}, would put it {where}"
+
+    def _off(self, row: int, joints: Array, pose: Array) -> tuple[float, str] | None:
+        """Return how far a row is off at other joint coordinates, in words; None where far."""
+        one = np.arange(len(self.given)) == row
+        poses = self.poses.copy()
+        poses[one] = pose
+        depth, before = (
+            _heights_over_planes(self.start, self.given, row, at) for at in (pose, self.poses[one])
+        )
+        if np.isnan(self.given.heights[row]) and depth is not None and before is not None:
+            # Nothing says where it was, but that it is on the plane.
+            if abs(depth) < _PUT_BACK * abs(before):
+                return abs(depth), f"{1e3 * abs(depth):.2g} mm from it"
+            return None
+        readings = self.given.readings.copy()
+        readings[row] = self.start.readings(joints)
+        measured = self.given.rows(one)
+        told = np.isfinite(np.hstack([*measured.parts.values()])).sum()
+        if len(measured) > 1 or told < _TELLING:
+            return None
+        square = row_misfits(self.start, measured, self.blocks, pose)[0]
+        limit = thresholds.FAR_ROW**2
+        if np.isfinite(square) and square < min(limit, _PUT_BACK * self.squares[row]):
+            return float(square), "where it was measured"
+        return None
+
+
+def _heights_over_planes(start: Guess, given: Measurements, row: int, pose: Array) -> float | None:
+    """Return a row's height over its known plane at a pose (1, m), m; None where there is none."""
+    name = given.planes[row]
+    plane = given.setup.planes.get(name)
+    if (plane is not None and not plane.known) or name not in start.planes:
+        return None
+    if not np.isfinite(pose).all():
+        return None
+    *normal, offset = start.planes[name]
+    return float((start.points([given.marks[row]], pose) @ np.array(normal))[0] - offset)

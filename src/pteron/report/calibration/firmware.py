@@ -1,0 +1,92 @@
+"""The values that a printer's firmware knows, fitted alone: what its owner looks for first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pteron.calibration import Calibration, calibrate
+from pteron.errors import PteronError
+from pteron.export.printers.linear_delta import LinearDelta
+from pteron.report.calibration.values import Row
+from pteron.report.typeset import measured
+
+_FREE = ("radius", "legs[1].angle", "legs[2].angle", "zeros")
+"""What Klipper, Marlin and RepRapFirmware fit: the third tower's angle fixes the others'."""
+
+_QUANTILE = 1.96
+"""Standard deviations of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class FirmwareFit:
+    """A calibration of the firmware's six values, in its own units, and what it leaves."""
+
+    rows: tuple[Row, ...]
+    sentence: str
+    """The error that it leaves, and the one before."""
+    result: Calibration
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain data: values in mm and degrees, as texts with their digits."""
+        values = [
+            {"name": row.name, "drawn": row.drawn, "found": row.found, "unit": row.unit}
+            for row in self.rows
+        ]
+        return {"values": values, "sentence": self.sentence, "grade": self.result.verdict.grade}
+
+
+def firmware_fit(result: Calibration) -> FirmwareFit | None:
+    """Return the firmware's values fitted to a calibration's measurements; None for no printer."""
+    try:
+        drawn = LinearDelta.of(result.drawn)
+        loose = dict.fromkeys(("radius", "angles", "zeros"), float("inf"))
+        fitted = calibrate(result.drawn, result.measurements, free=_FREE, prior=loose)
+        found = LinearDelta.of(fitted.robot)
+    except PteronError:  # another machine, or too few rows
+        return None
+    names = [unknown.name for block in fitted.blocks for unknown in block.unknowns]
+    deviations = {name: float(np.sqrt(fitted.fit.covariance[k, k])) for k, name in enumerate(names)}
+    width = 1e3 * deviations["radius"]
+    rows = [_row("delta radius", 1e3 * drawn.radius, 1e3 * found.radius, "mm", width)]
+    for i in (1, 2):
+        key = f"legs[{i}].angle"
+        before, after = drawn.angles[i - 1], found.angles[i - 1]
+        width = float(np.degrees(deviations[key]))
+        rows.append(_row(f"angle of tower {i}", before, after, "°", width))
+    ends = [(k, drawn.ends, found.ends) for k in range(3) if drawn.ends and found.ends]
+    for k, old, new in ends:
+        # A radius that is larger lowers the rods' upper ends too.
+        slope = np.zeros(len(names))
+        slope[names.index(f"zeros[{k + 1}]")] = 1.0
+        below = np.sqrt(drawn.arms[k] ** 2 - drawn.radius**2)
+        slope[names.index("radius")] = drawn.radius / below
+        width = 1e3 * float(np.sqrt(slope @ fitted.fit.covariance @ slope))
+        rows.append(_row(f"end stop of tower {k + 1}", 1e3 * old[k], 1e3 * new[k], "mm", width))
+    return FirmwareFit(tuple(rows), _sentence(fitted), fitted)
+
+
+def _row(name: str, drawn: float, found: float, unit: str, deviation: float) -> Row:
+    half = _QUANTILE * deviation
+    change = found - drawn
+    if unit == "°":
+        change = (change + 180.0) % 360.0 - 180.0
+    before, after, changed = (measured(value, half)[0] for value in (drawn, found, change))
+    return Row(name, before, after, changed, measured(0.0, half)[1], unit, "data", abs(change))
+
+
+def _sentence(fitted: Calibration) -> str:
+    held = fitted.held_out
+    if held is None:
+        return "With these six values alone no rows were left for a check."
+    parts = [
+        f"the {kind} error is {1e3 * after:.3g} mm, {1e3 * held.before[kind]:.3g} before"
+        for kind, after in held.after.items()
+        if kind != "angle"
+    ]
+    return (
+        f"With these six values alone, at {held.rows} rows that were not fitted, "
+        f"{' and '.join(parts)}."
+    )
