@@ -42,7 +42,7 @@ from pteron.identification.plausibility import (
 )
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
-from pteron.identification.result import Identification
+from pteron.identification.result import Identification, reflected_inertia
 from pteron.identification.signals import Processing
 from pteron.identification.unknowns import Unknowns, searched_speeds, settled
 from pteron.identification.verdict import judged, verdict_of, with_bodies
@@ -183,7 +183,7 @@ def identify(
                 check_columns(model, fit[0], preprocessing[0])
             hidden = check_motion(model, estimate, preprocessing, fit[0])
         report("Looking for faults", 0, 0)
-        faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
+        faults = isolate_faults(model, estimate, fit, preprocessing, reflected_inertia(rotors))
         if late or given is not None or not faults.held:
             break
         # Forces that are held are no fault, but change values: fit again with that delay.
@@ -198,9 +198,7 @@ def identify(
     report("Finding real bodies", 0, 0)
     again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     essential = essential_parameters(observations, estimate, again)
-    known = np.zeros(len(model.names))
-    for name, mass in _reflected(rotors).items():
-        known += model.share_of(name, mass)
+    known = model.known_values(reflected_inertia(rotors))
     with findings_told(whole):
         consistency, share, off, missing = _real_bodies(
             model, estimate, known, observations, drawn, bounds
@@ -226,7 +224,7 @@ def identify(
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=(
-            *_notes(model, estimate, _reflected(rotors)),
+            *_notes(model, estimate, reflected_inertia(rotors)),
             *_unknowns_notes(found, model, held=late and given is None),
             *missing,
         ),
@@ -270,11 +268,6 @@ def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, 
     if not any(drive and drive.rotor_inertia for drive in drives):
         return None
     return tuple((d.rotor_inertia, d.gear) for d in (drive or Drive() for drive in drives))
-
-
-def _reflected(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:
-    """Return the inertia that rotors add at the joints, J r^2, by name."""
-    return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}
 
 
 def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:

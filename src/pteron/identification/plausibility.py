@@ -71,6 +71,9 @@ _FRICTION = ("coulomb", "viscous", "passive")
 _POSITIVE = ("coulomb", "viscous", "passive", "rotor")
 """Terms that no machine has below zero."""
 
+_ROUNDING = 1e-6
+"""Difference of two rotors' inertia, over the largest, that is rounding of numbers in a file."""
+
 CHANCE = 1e-3
 """Probability below which infeasible values, or a payload's, are not chance."""
 
@@ -196,13 +199,19 @@ class Factor(NamedTuple):
 def known_values(
     model: Model, recordings: Sequence[Recording], rotors: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the values that are known, by name: of a declared payload, of rotors."""
-    found = dict(rotors)
+    """Return the values that are known, by name: of a declared payload, of rotors.
+
+    A rotor's is known as the model has it: where legs share their bodies' inertia one rotor joins
+    them, and of the others the values are their differences from it.
+    """
+    part = model.known_values(rotors)
+    found = {name: float(part[model.names.index(name)]) for name in rotors if name in model.names}
     for one in recordings:
         if (payload := one.head().description.payload) is not None:
             kinds = model.robot.platform.inertia.kinds
             found |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
-    return {name: value for name, value in found.items() if name in model.names and value}
+    least = _ROUNDING * max(map(abs, rotors.values()), default=0.0)
+    return {name: value for name, value in found.items() if name in model.names and abs(value) > least}
 
 
 def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) -> Factor | None:

@@ -130,17 +130,42 @@ class Identification:
         drives = [leg.drive or Drive() for leg in robot.legs]
         if self.rotors is not None:
             motors = zip(drives, self.rotors, strict=True)
-            drives = [
-                d if (j, r) == (d.rotor_inertia, d.gear) else replace(d, rotor_inertia=j, ratio=r)
-                for d, (j, r) in motors
-            ]
-        each = zip(robot.legs, drives, self.friction, strict=True)
-        legs = [replace(leg, drive=replace(drive, **found)) for leg, drive, found in each]
+            drives = [d if r == d.gear else replace(d, ratio=r) for d, (_, r) in motors]
+        reflected = zip(drives, self.reflected_inertia.tolist(), strict=True)
+        inertia = [mass / drive.gear**2 for drive, mass in reflected]
+        each = zip(robot.legs, drives, inertia, self.friction, strict=True)
+        legs = [
+            replace(leg, drive=replace(drive, rotor_inertia=j, **friction))
+            for leg, drive, j, friction in each
+        ]
         return replace(robot, legs=tuple(legs))
 
     @property
+    def known_rotors(self) -> dict[str, float]:
+        """The inertia that known rotors add at the joints, J r^2, by name; kg or kg m^2."""
+        return reflected_inertia(self.rotors)
+
+    @cached_property
+    def values_without_rotors(self) -> Array:
+        """The identified values (p,) less what known rotors add to each, in bodies or offsets."""
+        return self.estimate.values - self.model.known_values(self.known_rotors)
+
+    @property
+    def reflected_inertia(self) -> Array:
+        """Inertia of the motors at the joints (n,), kg or kg m^2, as the fit found it.
+
+        Known rotors count, with what the forces say beside them; what joins bodies is theirs.
+        """
+        known = [j * r**2 for j, r in self.rotors] if self.rotors else [0.0] * len(self.robot.legs)
+        beside = self.model.per_joint("rotor", self.values_without_rotors)
+        return np.maximum(np.array(known) + (0.0 if beside is None else beside), 0.0)
+
+    @property
     def friction(self) -> tuple[dict[str, Any], ...]:
-        """The friction of each joint as the fit found it, by the fields of `Drive`."""
+        """The friction of each joint as the fit found it, by the fields of `Drive`.
+
+        On a guide that gravity pulls along, known rotors join the offset: that is taken out.
+        """
         coulomb, viscous, falls = map(self._per_joint, ("coulomb", "viscous", "stribeck"))
         offset = self._per_joint("offset", least=-np.inf)
         speeds = self.model.stribeck_speeds
@@ -158,7 +183,7 @@ class Identification:
 
         Friction and inertia below zero are noise: no joint pushes itself.
         """
-        values = self.model.per_joint(kind, self.estimate.values)
+        values = self.model.per_joint(kind, self.values_without_rotors)
         n = len(self.robot.legs)
         return np.maximum(np.zeros(n) if values is None else values, least)
 
@@ -195,7 +220,7 @@ class Identification:
                     "stribeck": friction["stribeck"] and asdict(friction["stribeck"]),
                     "inertia": float(inertia),
                 }
-                for friction, inertia in zip(self.friction, self._per_joint("rotor"), strict=True)
+                for friction, inertia in zip(self.friction, self.reflected_inertia, strict=True)
             ],
             **picked(self, "estimate unknowns"),
             "essential": picked(self.essential, "names dropped p_value level")
@@ -207,3 +232,8 @@ class Identification:
             "findings": [picked(one, "kind row column message") for one in self.findings],
             **picked(self, "notes"),
         }
+
+
+def reflected_inertia(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:
+    """Return the inertia that rotors (inertia, ratio) add at the joints, J r^2, by name."""
+    return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}
