@@ -33,7 +33,7 @@ def with_rotors(robot):
 
 
 def as_built(robot, *, alike):
-    """Return a machine of other masses, and friction; with legs that are `alike` or each its own."""
+    """Return a machine with other masses and friction, its legs `alike` or not."""
     values, places = pteron.parameters(robot), {}
     for k, parameter in enumerate(parameter_data(robot)):
         places.setdefault((parameter.kind, parameter.body, alike or parameter.legs), []).append(k)

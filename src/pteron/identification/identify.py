@@ -10,6 +10,7 @@ import numpy as np
 
 from pteron.errors import ModelError
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
+from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.estimators import (
     ESTIMATORS,
     Estimate,
@@ -48,8 +49,8 @@ from pteron.identification.unknowns import Unknowns, searched_speeds, settled
 from pteron.identification.verdict import judged, verdict_of, with_bodies
 from pteron.kernels import Array
 from pteron.legs import Drive
-from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.reduction import base_parameters
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data, parameters
+from pteron.reduction import BaseParameters, base_parameters
 from pteron.reduction.sharing import Sharing
 
 Logs = Log | LogFile | Sequence[Log | LogFile]
@@ -58,6 +59,12 @@ _SLOWLY = (
     "It shows where joints move slowly: pteron excite ROBOT --stribeck --out motion.csv writes "
     "motion-slow.csv too; record it, and give its log with the others."
 )
+
+_SINGULAR = 1e-12
+"""Least eigenvalue of a correlation matrix, over its greatest: below it rounding makes them."""
+
+_ALIKE = 1e-3
+"""Difference of the legs' parameters, relative, that is rounding of a drawing's numbers."""
 
 Stage = Callable[[str, int, int], None]
 """A callback of progress: it gets the step, the number of its rows done, and of all its rows."""
@@ -159,6 +166,7 @@ def identify(
     observations = observe(model)
     used, late, given = wanted, wanted.delay == "auto", wanted.delay
     while True:
+        known = model.known_values(reflected_inertia(rotors))
         with findings_told(whole):
             if late or found.speeds is not None:
                 first = weighted(observations)
@@ -170,6 +178,8 @@ def identify(
                 preprocessing = tuple(replace(how, delay=found.delay) for how in preprocessing)
             estimate = estimated(estimator, model, fit, preprocessing, observations)
             estimate = replace(estimate, covariance=estimate.covariance + more)
+        bare, drawn_values = estimate, DrawnValues.of(model, estimate, known)
+        estimate = drawn_values.added_to(bare, observations)
 
         # Judge by held-out data, which show exchanged columns
         modes = [None] * len(check) if others else [how.start for how in preprocessing]
@@ -181,9 +191,11 @@ def identify(
         with findings_told(whole):
             if not trusted or unphysical(model, observations, estimate):
                 check_columns(model, fit[0], preprocessing[0])
-            hidden = check_motion(model, estimate, preprocessing, fit[0])
+            check_motion(model, bare, preprocessing, fit[0])
         report("Looking for faults", 0, 0)
-        faults = isolate_faults(model, estimate, fit, preprocessing, reflected_inertia(rotors))
+        faults = isolate_faults(
+            model, estimate, fit, preprocessing, reflected_inertia(rotors), drawn=drawn_values
+        )
         if late or given is not None or not faults.held:
             break
         # Forces that are held are no fault, but change values: fit again with that delay.
@@ -198,7 +210,6 @@ def identify(
     report("Finding real bodies", 0, 0)
     again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     essential = essential_parameters(observations, estimate, again)
-    known = model.known_values(reflected_inertia(rotors))
     with findings_told(whole):
         consistency, share, off, missing = _real_bodies(
             model, estimate, known, observations, drawn, bounds
@@ -206,9 +217,10 @@ def identify(
     pushed = friction_below_zero(model, observations, estimate)
     verdict = with_bodies(replace(verdict, reasons=(*pushed, *verdict.reasons)), consistency, off)
     advice = plausibility_warnings(model, estimate, known, consistency, drawn)
-    if hidden or essential.dropped:
-        weak = dict.fromkeys((*hidden, *essential.dropped))
-        advice[:0] = _more_motion(model, list(weak))
+    if essential.dropped:
+        advice[:0] = _more_motion(model, list(essential.dropped))
+    if drawn_values.names:
+        advice[:0] = _what_shows_more(base, drawn_values.names)
     return Identification(
         robot=robot,
         model=model,
@@ -221,7 +233,7 @@ def identify(
         preprocessing=preprocessing,
         fault_isolation=faults,
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
-        unseen=hidden,
+        unseen=drawn_values.names,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=(
             *_notes(model, estimate, reflected_inertia(rotors)),
@@ -268,6 +280,35 @@ def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, 
     if not any(drive and drive.rotor_inertia for drive in drives):
         return None
     return tuple((d.rotor_inertia, d.gear) for d in (drive or Drive() for drive in drives))
+
+
+def _what_shows_more(base: BaseParameters, hidden: Sequence[str]) -> list[str]:
+    """Return advice that shows values which a motion leaves open: shared legs, or more motion."""
+    robot, advice = base.robot, []
+    if not any(len(p.legs) > 1 for p in base.parameters) and _alike(robot):
+        advice.append(
+            "The legs are drawn alike: --shared identifies one set of parameters for all of them, "
+            "which the same motion shows better."
+        )
+    return [
+        *advice,
+        f"Not shown by this motion and left near the drawing: {', '.join(hidden)}. pteron excite "
+        "ROBOT --out motion.csv writes a motion that shows more; faster still with --speed and "
+        "--acceleration.",
+    ]
+
+
+def _alike(robot: Manipulator) -> bool:
+    """Say whether all legs have the same kind and the same inertial parameters as drawn."""
+    groups: dict[tuple[str, str], list[float]] = {}
+    for parameter, value in zip(parameter_data(robot), parameters(robot).tolist(), strict=True):
+        if parameter.legs:
+            groups.setdefault((parameter.kind, parameter.body), []).append(value)
+    legs = len(robot.legs)
+    return all(
+        len(values) == legs and np.ptp(values) <= _ALIKE * np.max(np.abs(values))
+        for values in groups.values()
+    )
 
 
 def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
@@ -331,7 +372,7 @@ def _real_bodies(
     """
     rank = model.base.rank
     values = (estimate.values - known)[:rank]
-    covariance = estimate.covariance[:rank, :rank]
+    covariance = _positive(estimate.covariance[:rank, :rank])
     try:
         found = consistent_model(
             model.robot, model.base, values, covariance, cad=cad, bounds=bounds
@@ -344,6 +385,20 @@ def _real_bodies(
     left = np.sqrt((estimate.residuals**2).mean())
     size, tiny = np.sqrt((observations.forces**2).mean()), np.finfo(float).tiny
     return found, float(moved / max(left, tiny)), float(100.0 * moved / max(size, tiny)), ()
+
+
+def _positive(covariance: Array) -> Array:
+    """Return a covariance (p, p) without the negative eigenvalues that rounding gives it.
+
+    Without noise many values are known alike, to rounding.
+    """
+    size = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    values, ways = np.linalg.eigh(covariance / np.outer(size, size))
+    least = _SINGULAR * values[-1]
+    if values[0] >= least:
+        return covariance
+    lifted = (ways * np.maximum(values, least)) @ ways.T
+    return np.asarray(0.5 * (lifted + lifted.T) * np.outer(size, size))
 
 
 def _notes(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[str]:

@@ -29,9 +29,6 @@ _NO_FORCES = 1e4
 """Standard deviation of a base parameter, over its usual size, beyond which the forces are not the
 machine's."""
 
-_MOST_UNSEEN = 0.5
-"""Largest share of the base parameters that a motion may leave unseen."""
-
 _FAR_ABOVE = 5.0
 """Residuals, over the forces' noise, from which the model is not the machine's."""
 
@@ -211,7 +208,9 @@ def known_values(
             kinds = model.robot.platform.inertia.kinds
             found |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
     least = _ROUNDING * max(map(abs, rotors.values()), default=0.0)
-    return {name: value for name, value in found.items() if name in model.names and abs(value) > least}
+    return {
+        name: value for name, value in found.items() if name in model.names and abs(value) > least
+    }
 
 
 def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) -> Factor | None:
@@ -284,17 +283,22 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
     return found
 
 
-def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
-    """Return the base parameters that a log cannot show, and whether they are too many.
+def unseen(model: Model, deviations: Array) -> tuple[str, ...]:
+    """Return the base parameters whose deviations (p,) exceed their usual size."""
+    return unseen_shares(model, deviations)[0]
 
-    Their standard deviation, among the (p,) of all values, is larger than their usual size.
-    One that is 10 000 times larger is too many: its actuator's forces are no forces of the machine.
+
+def unseen_shares(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
+    """Return the base parameters that a log cannot show, and whether it shows none at all.
+
+    One whose deviation is 10 000 times its usual size says that its actuator's forces are no forces
+    of the machine: then nothing is seen.
     """
     base = model.base
     share = deviations[: base.rank] / usual_sizes(base, parameters(model.robot))
     hidden = share > 1.0
     names = tuple(name for name, flag in zip(base.names, hidden, strict=True) if flag)
-    return names, bool(hidden.mean() > _MOST_UNSEEN or share.max() > _NO_FORCES)
+    return names, bool(share.max() > _NO_FORCES)
 
 
 def usual_sizes(base: BaseParameters, drawn: Array) -> Array:

@@ -114,6 +114,11 @@ class Identification:
         return html_table(self.robot.name, about, columns, rows, self.verdict.reasons)
 
     @property
+    def causes(self) -> tuple[str, ...]:
+        """The faults of log and machine that show, in sentences, the likeliest cause first."""
+        return tuple(fault.message for fault in self.fault_isolation.faults)
+
+    @property
     def understated(self) -> bool:
         """Whether a fault shows for which the values' stated errors do not allow."""
         return self.fault_isolation.understates

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
@@ -133,6 +134,8 @@ def isolate_faults(
     recordings: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
     rotors: Mapping[str, float] | None = None,
+    *,
+    drawn: DrawnValues | None = None,
 ) -> FaultIsolation:
     """Return the faults of logs and machine that a fit's residuals show.
 
@@ -150,12 +153,14 @@ def isolate_faults(
         Preprocessing of each.
     rotors : mapping of str to float, optional
         Inertia that rotors are known to add at the joints, by the name of the value, SI units.
+    drawn : DrawnValues, optional
+        Values that the motion does not show, as drawn; they take part in each fit.
     """
     known, why_not = known_values(model, recordings, rotors or {}), ""
     for rows in (_ROWS, _MORE):
         try:
             parts = _parts(model, estimate, recordings, preprocessing, rows)
-            return _isolated(parts, model, estimate, known)
+            return _isolated(parts, model, estimate, known, drawn)
         except LogError as error:
             why_not = str(error)
         if sum(one.rows for one in recordings) <= rows:
@@ -165,23 +170,31 @@ def isolate_faults(
 
 
 def _isolated(
-    parts: list[_Part], model: Model, estimate: Estimate, known: Mapping[str, float]
+    parts: list[_Part],
+    model: Model,
+    estimate: Estimate,
+    known: Mapping[str, float],
+    drawn: DrawnValues | None,
 ) -> FaultIsolation:
     nothing = np.full(model.robot.joint_count, np.nan)
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
 
     # Which faults the residuals show
-    observations = _observed(parts)
+    def observed(some: Sequence[_Part]) -> Observations:
+        rows = _observed(some)
+        return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
+
+    observations = observed(parts)
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
     left_open = cannot_be_told(columns, observations, noise)
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
     plain, found = searched(columns, observations, () if exact else None)
     if any(one.family is DELAY for one in found):
         # Columns hold for small delays: other faults are sought after a long one is corrected.
-        late, shifted = _delay(parts)
+        late, shifted = _delay(parts, observed)
         rest = tuple(one for one in columns.families if one is not DELAY)
-        fit, found = _searched_for(rest, shifted)
+        fit, found = _searched_for(rest, shifted, observed)
         if late is not None:
             found.insert(0, replace(late, fit=fit))
 
@@ -291,7 +304,7 @@ def delay_of(
 ) -> float:
     """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
     parts = _parts(model, estimate, recordings, preprocessing)
-    _, shifted = _delay(parts)
+    _, shifted = _delay(parts, _observed)
     return shifted[0].how.delay - parts[0].how.delay
 
 
@@ -362,18 +375,22 @@ def _observed(parts: Sequence[_Part]) -> Observations:
 
 
 def _searched_for(
-    families: tuple[Family, ...], parts: Sequence[_Part]
+    families: tuple[Family, ...],
+    parts: Sequence[_Part],
+    observed: Callable[[Sequence[_Part]], Observations],
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
-    return searched(some[0].model, _observed(some))
+    return searched(some[0].model, observed(some))
 
 
-def _delay(parts: Sequence[_Part]) -> tuple[FoundFault | None, list[_Part]]:
+def _delay(
+    parts: Sequence[_Part], observed: Callable[[Sequence[_Part]], Observations]
+) -> tuple[FoundFault | None, list[_Part]]:
     """Return the whole delay of the logs' forces, None if none shows, and the parts without it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
-        _, found = _searched_for((DELAY,), shifted)
+        _, found = _searched_for((DELAY,), shifted, observed)
         if not found:
             break
         first, late = late or found[0], found[0]
