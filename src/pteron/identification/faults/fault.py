@@ -13,6 +13,8 @@ from pteron.kernels import Array
 FaultName = Literal[
     "delay",
     "scale",
+    "ratio",
+    "zero",
     "gain",
     "gravity",
     "clock",
@@ -25,10 +27,10 @@ FaultName = Literal[
     "rotors",
     "play",
 ]
-"""Faults by name: forces that are late, the scale of one force, that of all forces, the direction
-of gravity, its size or the rate of the clock, lengths, friction that falls with speed, elastic
-drives, drifting friction or offsets, friction that grows with load, friction in passive joints,
-motors' inertia, drives with play."""
+"""Faults by name: forces that are late, the scale of one force, the gear ratio of one joint or of
+all, the zero of one, the scale of all forces, the direction of gravity, its size or the rate of the
+clock, lengths, friction that falls with speed, elastic drives, drifting friction or offsets,
+friction that grows with load, friction in passive joints, motors' inertia, drives with play."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters."""
@@ -52,12 +54,16 @@ _SENTENCES = {
     "delay": "The {late} are {size_ms:.3g} ms (+- {error_ms:.1g}) late for the {early}",
     "sampling": _SAMPLING,
     "scale": "{label} is {percent:.2g} % (+- {error:.1g}) too {more} beside the others",
+    "ratio": "{label_moves} {percent:.2g} % (+- {error:.1g}) {less} than the log says, as where "
+    "a gear ratio, a lead or a pulley is off by that",
+    "zero": "The zero of {label} is off by about {shown_size}",
     "gravity": "Gravity is {tilt:.2g} degrees (+- {tilt_error:.1g}) off the direction in the model",
     "gain": "All forces are {percent:.3g} % (+- {error:.1g}) too {more} for what is known",
     "clock": "The weight is {percent:.2g} % (+- {error:.1g}) too {more} for the inertia, as where "
     "the log's clock runs {clock:.2g} % {pace}",
     "sign": "The weight acts the other way: gravity has the wrong sign",
-    "geometry": "Lengths or points of the geometry are off, most clearly in {clearest}",
+    "geometry": "Lengths or points of the geometry are off, most clearly in {clearest}, by about "
+    "{shown_leg}",
     "stribeck": "Friction falls with speed, most clearly at {clearest}",
     "elasticity": "The drives give, most clearly under {clearest}",
     "drift": "Friction or offset changes during the log, most clearly at {clearest}",
@@ -72,6 +78,8 @@ _SENTENCES = {
 _REMEDY: dict[FaultName, str] = {
     "delay": "--delay auto takes it out",
     "scale": "check that drive's gain, or its torque constant",
+    "ratio": "check the ratio, lead or pulley that positions are computed with",
+    "zero": "home that joint again, or calibrate its zero",
     "gravity": "level the machine, or correct gravity in its file",
     "gain": "check gains, rated torque and gear ratio, and the payload's mass",
     "clock": "check the log's time, and gravity and the unit of lengths in the machine's file",
@@ -86,6 +94,13 @@ _REMEDY: dict[FaultName, str] = {
     "play": "take the play out of that drive, or keep to motions whose load does not change "
     "direction; faults named after it may be its own",
 }
+
+
+def _rounded(size: float, angle: bool = False) -> str:
+    """Return a size in mm, or degrees, with the digits that an estimate has."""
+    number = np.degrees(size) if angle else 1e3 * size
+    text = f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
+    return f"{text} {'degrees' if angle else 'mm'}"
 
 
 def is_half(delay: float, deviation: float, step: float) -> bool:
@@ -172,6 +187,11 @@ class IsolatedFault:
             **picked(self, "speeds"),
         }
 
+    def _leg_size(self, label: str) -> float:
+        """Return the size of all errors of one label together."""
+        parts = [size for size, name in zip(self.sizes, self.labels, strict=True) if name == label]
+        return float(np.linalg.norm(parts))
+
     def _sentence(self) -> str:
         first, told = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
         if told == "clock" and first <= -1.0:
@@ -179,6 +199,7 @@ class IsolatedFault:
         size, error = abs(first), float(self.deviations[0])
         late, early = ("forces", "positions")[:: 1 if first > 0.0 else -1]
         clock = max(1.0 + first, 1e-300) ** -0.5 - 1.0
+        whole = self.labels[0] == "all joints"
         clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
         return _SENTENCES[told].format(
             label=self.labels[0],
@@ -192,6 +213,10 @@ class IsolatedFault:
             percent=100.0 * size,
             error=100.0 * error,
             more="large" if first > 0.0 else "small",
+            label_moves="All joints move" if whole else f"{self.labels[0]} moves",
+            less="less" if first > 0.0 else "more",
+            shown_size=_rounded(size, self.labels[0].startswith("theta")),
+            shown_leg=_rounded(self._leg_size(self.labels[clearest])),
             tilt=np.degrees(np.linalg.norm(self.sizes)),
             tilt_error=np.degrees(self.deviations.max()),
             clock=100.0 * abs(clock),
