@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from pteron.errors import ModelError
+from pteron.errors import DataError, ModelError, PteronError
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
 from pteron.identification.drawn_values import DrawnValues
+from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
     Estimate,
@@ -18,7 +19,8 @@ from pteron.identification.estimators import (
     weighted,
 )
 from pteron.identification.faults import delay_of, isolate_faults
-from pteron.identification.faults.fault import of_held_forces
+from pteron.identification.faults.assumptions import contradicted, exchangeable_legs
+from pteron.identification.faults.log_faults import log_faults, lost_share, of_delay
 from pteron.identification.fitting import (
     METHODS,
     balanced,
@@ -33,10 +35,10 @@ from pteron.identification.fitting import (
     preprocessing_for,
 )
 from pteron.identification.logs import Log, LogFile
-from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations
 from pteron.identification.plausibility import (
+    common_factor,
     friction_below_zero,
     plausibility_warnings,
     unphysical,
@@ -44,9 +46,9 @@ from pteron.identification.plausibility import (
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification, reflected_inertia
-from pteron.identification.signals import Processing
+from pteron.identification.signals import Processing, preprocessing_of
 from pteron.identification.unknowns import Unknowns, searched_speeds, settled
-from pteron.identification.verdict import judged, verdict_of, with_bodies
+from pteron.identification.verdict import judged, verdict_of, with_bodies, with_hidden_first
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data, parameters
@@ -59,6 +61,9 @@ _SLOWLY = (
     "It shows where joints move slowly: pteron excite ROBOT --stribeck --out motion.csv writes "
     "motion-slow.csv too; record it, and give its log with the others."
 )
+
+_OF_ASSUMPTIONS = ("no pose", "singular", "too little motion")
+"""Reasons for which a log is refused that a wrong assumption of the file may have."""
 
 _SINGULAR = 1e-12
 """Least eigenvalue of a correlation matrix, over its greatest: below it rounding makes them."""
@@ -124,6 +129,50 @@ def identify(
         If the estimator is not known, or the bounds contradict each other.
     """
     robot = as_manipulator(robot)
+    try:
+        return _identified(
+            robot, logs, held_out, terms, shared, estimator, processing, cad, bounds, progress
+        )
+    except (DataError, ModelError) as error:
+        # No pose, or values that are no machine's: an assumption of its file may be wrong.
+        because = _refusal_cause(robot, logs, processing or Processing(), error)
+        if because:
+            error.args = (f"{because} ({error})",)
+        raise
+
+
+def _refusal_cause(
+    robot: Manipulator, logs: Logs, wanted: Processing, error: DataError | ModelError
+) -> str:
+    """Return the assumption of a machine's file that makes a log impossible; empty if none does."""
+    of_log = isinstance(error, LogError) and error.reason in _OF_ASSUMPTIONS
+    of_poses = isinstance(error, ModelError) and "poses" in str(error)
+    if not (of_log or of_poses):
+        return ""
+    try:
+        log = recording(_sequence(logs, robot)[0]).head()
+        start = (0.0,) * robot.freedom if of_poses else None
+        how = preprocessing_of(robot, log, wanted, start=start)
+        reflected = np.array([(leg.drive or Drive()).inertia for leg in robot.legs])
+        assumption = contradicted(robot, log, how, reflected)
+    except PteronError:
+        return ""
+    return assumption.message if assumption else ""
+
+
+def _identified(
+    robot: Manipulator,
+    logs: Logs,
+    held_out: Logs,
+    terms: Terms | None,
+    shared: Sharing,
+    estimator: str | Callable[[Observations], Estimate],
+    processing: Processing | None,
+    cad: RobotLike | Literal["robot"] | None,
+    bounds: Bounds | None,
+    progress: Stage | None,
+) -> Identification:
+    """Return the identification; see `identify`."""
     drawn = robot if cad == "robot" else None if cad is None else as_manipulator(cad)
     if isinstance(estimator, str) and estimator not in METHODS:
         raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(METHODS)}")
@@ -137,7 +186,7 @@ def identify(
         for given in (logs, held_out)
     )
     check_recordings(robot, whole, others, wanted)
-    limits = tuple(said for one in whole for said in at_limits(one.head()))
+    n, raw = robot.joint_count, _raw_logs(logs)
     halves = [] if others else [divided(one, wanted.period) for one in whole]
     fit = [first for first, _ in halves] or whole
     check = others or [second for _, second in halves]
@@ -188,19 +237,26 @@ def identify(
             for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
         ]
         trusted = verdict_of(held, repeats=not others).grade == "trustworthy"
+        assumption = None
         with findings_told(whole):
             if not trusted or unphysical(model, observations, estimate):
-                check_columns(model, fit[0], preprocessing[0])
+                reflected = np.array([j * r**2 for j, r in rotors or [(0.0, 1.0)] * n])
+                assumption = contradicted(robot, fit[0].head(), preprocessing[0], reflected)
+                if assumption is None:
+                    check_columns(model, fit[0], preprocessing[0])
             check_motion(model, bare, preprocessing, fit[0])
         report("Looking for faults", 0, 0)
         faults = isolate_faults(
             model, estimate, fit, preprocessing, reflected_inertia(rotors), drawn=drawn_values
         )
-        if late or given is not None or not faults.held:
+        if late or given is not None or assumption is not None or not faults.late:
             break
-        # Forces that are held are no fault, but change values: fit again with that delay.
+        # A delay changes values: fit again with it.
         late = True
-    verdict = verdict_of(held, faults, repeats=not others, limits=limits)
+    heads = [one.head() for one in fit]
+    of_log = log_faults(heads, preprocessing, [lost_share(one) for one in raw])
+    if late and given is None:
+        of_log = (*of_log, of_delay(found.delay, found.delay_deviation, 1.0 / heads[0].rate))
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how)
         for one, how in zip(_told(fit, report, "Predicting"), preprocessing, strict=True)
@@ -215,8 +271,20 @@ def identify(
             model, estimate, known, observations, drawn, bounds
         )
     pushed = friction_below_zero(model, observations, estimate)
+    factor = common_factor(model, estimate, known, drawn, observations)
+    verdict = verdict_of(
+        held,
+        faults,
+        repeats=not others,
+        log=of_log,
+        assumption=assumption,
+        factor=factor,
+        exchangeable=exchangeable_legs(robot, heads[0], preprocessing[0]),
+        followed=_followed(model.terms, estimator),
+    )
     verdict = with_bodies(replace(verdict, reasons=(*pushed, *verdict.reasons)), consistency, off)
-    advice = plausibility_warnings(model, estimate, known, consistency, drawn)
+    verdict = with_hidden_first(verdict)
+    advice = plausibility_warnings(model, estimate, known, consistency, drawn, factor)
     if essential.dropped:
         advice[:0] = _more_motion(model, list(essential.dropped))
     if drawn_values.names:
@@ -231,13 +299,13 @@ def identify(
         fitted=fitted,
         held_out=tuple(held),
         preprocessing=preprocessing,
-        fault_isolation=faults,
+        fault_isolation=replace(faults, log=of_log, assumption=assumption),
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=drawn_values.names,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=(
             *_notes(model, estimate, reflected_inertia(rotors)),
-            *_unknowns_notes(found, model, held=late and given is None),
+            *_unknowns_notes(found, model, default=late and given is None),
             *missing,
         ),
         rotors=rotors,
@@ -253,6 +321,18 @@ def _sequence(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
         for one in ([logs] if isinstance(logs, Log | LogFile) else logs)
     ]
     return [in_newtons(one, robot) for one in named]
+
+
+def _raw_logs(logs: Logs) -> list[Log]:
+    """Return the logs that are in memory, or the beginning of their files, as they were given."""
+    several = [logs] if isinstance(logs, Log | LogFile) else logs
+    return [one if isinstance(one, Log) else next(iter(one.pieces())) for one in several]
+
+
+def _followed(terms: Terms, estimator: str | Callable[[Observations], Estimate]) -> frozenset[str]:
+    """Return the options whose advice is followed already."""
+    options = {"--joints each": terms.passive == "each", "--estimator huber": estimator == "huber"}
+    return frozenset(name for name, followed in options.items() if followed)
 
 
 def _reader(report: Stage, task: str) -> Callable[[int], None]:
@@ -328,15 +408,13 @@ def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
     return advice
 
 
-def _unknowns_notes(found: Unknowns, model: Model, *, held: bool) -> list[str]:
+def _unknowns_notes(found: Unknowns, model: Model, *, default: bool) -> list[str]:
     """Return notes on the delay and the speeds of Stribeck's friction that were found.
 
-    `held` says that the delay of held forces was corrected by default.
+    `default` says that the delay was corrected by default, which the faults of the log tell.
     """
     notes = []
-    if held:
-        notes.append(f"{of_held_forces(found.delay)}; that is taken out (--delay 0 leaves it in).")
-    elif found.delay_deviation:
+    if found.delay_deviation and not default:
         notes.append(
             f"The forces are {1e3 * found.delay:.3g} ms (+- {2e3 * found.delay_deviation:.1g}) "
             "late for the positions; that is taken out."

@@ -36,15 +36,12 @@ _FAR = 0.5
 """Difference from the drawn machine, over a base parameter's usual size, from which a warning is
 given."""
 
-_TOLD = 0.2
-"""Largest standard deviation of a value, and spread of the ratios of values to drawn ones, for a
-common factor to be told."""
+_TOLD = 0.3
+"""Largest difference of the bodies' forces from a multiple of the drawn ones, over them, for that
+multiple to be told: bodies that are up to 30 % denser or lighter than drawn differ by less."""
 
 _APART = 1.5
 """Least common factor, or its inverse, that is a wrong scale rather than a bad drawing."""
-
-_FEWEST = 3
-"""Least number of values with a factor in common."""
 
 _LEAST_SHARE = 0.02
 """Least usual size of a parameter, as a share of its body's mass and length."""
@@ -90,6 +87,7 @@ def plausibility_warnings(
     known: Array,
     consistency: Consistency | None,
     cad: Manipulator | None,
+    factor: float = 1.0,
 ) -> list[str]:
     """Return warnings of values that predict forces well and yet belong to another machine.
 
@@ -108,19 +106,12 @@ def plausibility_warnings(
     if cad is not None:
         drawn = parameters(cad)
         base = model.base
-        factor = common_factor(model, estimate, known, drawn)
-        if not 1.0 / _APART < factor < _APART:
-            found.append(
-                f"All values together are {factor:.2g} times those drawn, as where the gain of all "
-                "torques or the gear ratio is off by that factor: check gains, rated torque and "
-                "ratio, or the drawing's masses."
-            )
         usual = usual_sizes(base, drawn)
         values = (estimate.values - known)[: base.rank]
         off = np.abs(values - base.grouping @ drawn)
         far = (off > _FAR * usual) & (off > 5.0 * estimate.deviations[: base.rank])
         worst = [k for k in np.argsort(-off / np.maximum(usual, 1e-300)) if far[k]][:3]
-        if worst:
+        if worst and factor == 1.0:
             names = ", ".join(
                 f"{base.names[k]} ({values[k]:.3g}, drawn {base.grouping[k] @ drawn:.3g})"
                 for k in worst
@@ -150,21 +141,32 @@ def friction_below_zero(model: Model, observations: Observations, fit: Estimate)
     )
 
 
-def common_factor(model: Model, estimate: Estimate, known: Array, drawn: Array) -> float:
-    """Return the factor of all base parameters beside those drawn (N,); 1 where there is none.
+def common_factor(
+    model: Model,
+    estimate: Estimate,
+    known: Array,
+    drawn: Manipulator | None,
+    observations: Observations,
+) -> float:
+    """Return the factor of the bodies' forces beside those of the drawing; 1 where none is clear.
 
-    They need not agree better than drawings do; `known` (p,) is the rotors' part of the values.
+    It is that of least squares. Forces that differ by more than drawings do have no factor; `known`
+    (p,) is the rotors' part of the values.
     """
-    base = model.base
-    wanted = base.grouping @ drawn + known[: base.rank]
-    clear = np.abs(wanted) > _FAR * usual_sizes(base, drawn)
-    clear &= estimate.deviations[: base.rank] < _TOLD * np.abs(wanted)
-    if clear.sum() < _FEWEST:
+    if drawn is None:
         return 1.0
-    ratios = estimate.values[: base.rank][clear] / wanted[clear]
-    factor = float(np.median(ratios))
-    spread = float(np.median(np.abs(ratios - factor)))
-    return factor if spread < _TOLD * abs(factor) else 1.0
+    base = model.base
+    rigid = observations.matrix[..., : base.rank].reshape(-1, base.rank)
+    as_drawn = rigid @ (base.grouping @ parameters(drawn) + known[: base.rank])
+    forces = rigid @ estimate.values[: base.rank]
+    power = float(as_drawn @ as_drawn)
+    if not power > 0.0:
+        return 1.0
+    factor = float(forces @ as_drawn) / power
+    spread = float(np.linalg.norm(forces - factor * as_drawn))
+    if spread > _TOLD * float(np.linalg.norm(forces)):
+        return 1.0
+    return 1.0 if 1.0 / _APART < factor < _APART else factor
 
 
 class Factor(NamedTuple):

@@ -116,7 +116,7 @@ class Identification:
     @property
     def causes(self) -> tuple[str, ...]:
         """The faults of log and machine that show, in sentences, the likeliest cause first."""
-        return tuple(fault.message for fault in self.fault_isolation.faults)
+        return self.fault_isolation.causes
 
     @property
     def understated(self) -> bool:

@@ -32,6 +32,12 @@ all, the zero of one, the scale of all forces, the direction of gravity, its siz
 clock, lengths, friction that falls with speed, elastic drives, drifting friction or offsets,
 friction that grows with load, friction in passive joints, motors' inertia, drives with play."""
 
+ORDER: tuple[FaultName, ...] = (
+    *("delay", "clock", "gain", "scale", "ratio", "zero", "gravity", "geometry"),
+    *("play", "elasticity", "rotors", "drift", "stribeck", "load", "passive"),
+)
+"""The order in which faults are mended, and named: what comes first distorts what comes later."""
+
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters."""
 
@@ -176,6 +182,11 @@ class IsolatedFault:
     def message(self) -> str:
         """The fault, and its remedy, in a sentence."""
         return f"{self._sentence()}; {_REMEDY[self.fault]}."
+
+    @property
+    def beside_log_fault(self) -> str:
+        """The fault without a remedy: a fault of the log may be all there is."""
+        return f"{self._sentence()}, or the log's own fault looks so: mend that first."
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""

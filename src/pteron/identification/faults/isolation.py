@@ -12,9 +12,11 @@ import numpy as np
 from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
+from pteron.identification.faults.assumptions import Assumption
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
-from pteron.identification.faults.fault import FaultName, IsolatedFault, is_half
+from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
+from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import Record, knocks
 from pteron.identification.faults.search import FoundFault, cannot_be_told, searched
 from pteron.identification.logs import Log
@@ -77,9 +79,13 @@ class FaultIsolation:
         Faults that these logs cannot show: by the rank of their equations a common factor of all
         forces, a clock at another rate, a wrong scale of one force; and play, where no drive's load
         changes direction often enough.
-    held : bool
-        Whether forces are half a sample early or late, as where they are held from sample to
-        sample. In a log without noise this changes the values, even if too little to be named.
+    late : bool
+        Whether forces are late for positions, or early; in a log without noise this changes values,
+        even if too little to be named.
+    log : tuple of LogFault
+        Faults of the logs as such.
+    assumption : Assumption, optional
+        The assumption of the machine's file that the logs contradict.
     """
 
     tried: tuple[str, ...]
@@ -88,9 +94,20 @@ class FaultIsolation:
     spoiled: Array
     why_not: str = ""
     hidden: tuple[FaultName, ...] = ()
-    held: bool = False
+    late: bool = False
+    log: tuple[LogFault, ...] = ()
+    assumption: Assumption | None = None
 
     suspicions = former_attribute("suspicions", "faults")
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """All that shows in a sentence each: log, assumptions, then machine, as to be mended."""
+        distorted = any(one.distorts for one in self.log)
+        of_file = [] if self.assumption is None else [self.assumption.message]
+        ranked = sorted(self.faults, key=lambda one: ORDER.index(one.fault))
+        machine = [one.beside_log_fault if distorted else one.message for one in ranked]
+        return (*(one.message for one in self.log), *of_file, *machine)
 
     @property
     def off(self) -> Array:
@@ -111,6 +128,8 @@ class FaultIsolation:
         """Return it as plain data."""
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.off}
         return picked(self, "tried why_not cannot_be_told=hidden faults") | {
+            "log": [one.as_dict() for one in self.log],
+            "assumption": self.assumption and self.assumption.as_dict(),
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
                 for name, values in shares.items()
@@ -260,9 +279,8 @@ def _isolated(
         left_open.insert(0, "gain")
     shown = {one.fault for one in faults}
     hidden = tuple(fault for fault in left_open if fault not in shown)
-    delays = [one for one in found if one.family is DELAY]
-    half = any(is_half(float(one.sizes[0]), float(one.deviations[0]), step) for one in delays)
-    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, held=half)
+    late = any(one.family is DELAY for one in found)
+    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, late=late)
 
 
 def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:

@@ -122,6 +122,11 @@ def _grid(signal: Array) -> Array:
     return steps
 
 
+def force_steps(forces: Array) -> Array:
+    """Return the step (n,) of the grid that forces' values stand on; 0 where there is none."""
+    return _grid(forces)
+
+
 def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:
     """Return signals (T, k) after a Butterworth filter of order 4 forward and backward.
 

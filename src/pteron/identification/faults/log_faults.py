@@ -1,0 +1,164 @@
+"""Faults of a log as such, told without a model: lost samples, jitter, saturation, coarse forces.
+
+They come before all faults of the machine: what a log distorts looks like those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pteron.identification.faults.fault import is_half, of_held_forces
+from pteron.identification.logs import Log
+from pteron.identification.logs.log import gaps
+from pteron.identification.logs.recorded import at_limits
+from pteron.identification.signals import Preprocessing
+from pteron.identification.signals.derivatives import LOST, central_differences, uniform
+from pteron.identification.signals.filters import force_steps, smoothed
+from pteron.json_values import picked
+
+_LOST = 0.01
+"""Share of missing samples from which they are named: fewer cost less than a tenth of the
+precision, and change no value beyond its interval."""
+
+_SURE = 6.0
+"""Standard deviations from which jitter is told: by chance in one of 10^9 logs."""
+
+_FELT = 0.5
+"""Position errors of jitter, over the positions' other noise, from which it is named: below it adds
+less than an eighth to the noise."""
+
+_COARSE = 0.02
+"""Step of forces' values, over their deviation, from which it is named: rounding by 0.6 % of the
+deviation, more than usual noise of 0.5 %."""
+
+_LOOK = 60_000
+"""Rows that are looked at for jitter."""
+
+LogFaultName = Literal["lost", "jitter", "delay", "saturation", "steps"]
+
+
+@dataclass(frozen=True)
+class LogFault:
+    """A fault of a log as such.
+
+    Attributes
+    ----------
+    fault : {"lost", "jitter", "delay", "saturation", "steps"}
+        Lost samples, sampling at other times than the stamps say, forces that are late, or stay at
+        a limit, or are recorded in coarse steps.
+    message : str
+        The fault and its remedy, in a sentence.
+    size : float
+        Share of samples lost, jitter or delay in s, NaN of saturation, steps over the force's deviation.
+    distorts : bool
+        Whether faults of the machine that show too may be its own.
+    """
+
+    fault: LogFaultName
+    message: str
+    size: float
+    distorts: bool
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it as plain data."""
+        return picked(self, "fault message size distorts")
+
+
+def log_faults(
+    logs: Sequence[Log], preprocessing: Sequence[Preprocessing], lost: Sequence[float]
+) -> tuple[LogFault, ...]:
+    """Return the faults of logs, each once; `lost` are the shares of samples that they miss."""
+    found: list[LogFault] = []
+    if (share := max(lost, default=0.0)) > _LOST:
+        worst = logs[int(np.argmax(lost))]
+        message = (
+            f"{100.0 * share:.2g} % of the samples of {worst.source} are missing (lost); record "
+            "with a buffer, or at a lower rate"
+        )
+        found.append(LogFault("lost", f"{message}.", share, False))
+    for log, how in zip(logs, preprocessing, strict=True):
+        jitter, clear, noise = sampling_jitter(log, how)
+        if clear > _SURE and noise > _FELT:
+            message = (
+                f"Samples of {log.source} are taken {1e3 * jitter:.2g} ms (rms) off their time "
+                "stamps, at random (jitter): record with stamps of the drives' own clock, or at "
+                "the cycle of the bus"
+            )
+            found.append(LogFault("jitter", f"{message}.", jitter, True))
+            break
+    found += [
+        LogFault("saturation", message, float("nan"), True)
+        for log in logs
+        for message in at_limits(log)
+    ]
+    for log in logs:
+        steps = force_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
+        if (coarse := float(steps.max(initial=0.0))) > _COARSE:
+            name = log.force_names[int(np.argmax(steps))]
+            message = (
+                f"{name} is recorded in steps of {100.0 * coarse:.2g} % of its deviation "
+                f"(quantised): record it with more digits"
+            )
+            found.append(LogFault("steps", f"{message}.", coarse, False))
+            break
+    return tuple(found)
+
+
+def of_delay(delay: float, deviation: float, step: float) -> LogFault:
+    """Return the fault of forces that are so late, s, in a log of this step; it is taken out."""
+    if is_half(delay, deviation, step):
+        said = of_held_forces(delay)
+    else:
+        late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
+        said = (
+            f"The {late} are {1e3 * abs(delay):.3g} ms (+- {2e3 * deviation:.1g}) late for the "
+            f"{early}"
+        )
+    return LogFault("delay", f"{said}; that is taken out (--delay 0 leaves it in).", delay, False)
+
+
+def lost_share(log: Log) -> float:
+    """Return the share of a log's samples that are missing."""
+    if log.rows < 2:
+        return 0.0
+    step = 1.0 / log.rate
+    steps = np.diff(log.time)
+    missing = np.where(gaps(log.time, step), np.rint(steps / step) - 1.0, 0.0)
+    # A pause between two recordings is no lost sample.
+    few = missing[missing <= _PAUSE * log.rows].sum()
+    return float(few / (log.rows + few))
+
+
+_PAUSE = 0.02
+"""Longest gap, over the log, that is lost samples rather than a pause."""
+
+
+def sampling_jitter(log: Log, how: Preprocessing) -> tuple[float, float, float]:
+    """Return the deviation of sampling times, s, how clear it is, and its share of the noise.
+
+    What the positions' filter takes is e = v dt where samples are taken dt off: joints that move
+    have it in common. The mean of e_i e_j v_i v_j over pairs of joints is that of (v_i v_j)^2 dt^2;
+    encoders' noise, which joints do not share, adds nothing. Clear: in standard deviations.
+    """
+    longest = max(log.segments, key=lambda part: part.stop - part.start)
+    time, joints = uniform(*(part[longest][:_LOOK] for part in (log.time, log.joints)))
+    n = joints.shape[1]
+    if how.cutoff is None or n < 2 or len(time) < 20 * LOST:
+        return 0.0, 0.0, 0.0
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    smooth = smoothed(joints, rate, how.cutoff)
+    inner = slice(LOST, len(time) - LOST)
+    rates = central_differences(smooth, rate)[0] / np.maximum(how.joint_noise, 1e-300)
+    rest = (joints - smooth)[inner] / np.maximum(how.joint_noise, 1e-300)
+    first, second = np.triu_indices(n, 1)
+    pairs = (rest[:, first] * rest[:, second] * rates[:, first] * rates[:, second]).sum(axis=1)
+    sizes = ((rates[:, first] * rates[:, second]) ** 2).sum(axis=1)
+    # The filter keeps its share of white noise.
+    square = pairs.sum() / max(float(sizes.sum()), 1e-300) / (1.0 - 2.0 * how.cutoff / rate)
+    clear = pairs.sum() / max(float(np.sqrt((pairs**2).sum())), 1e-300)
+    jitter = float(np.sqrt(max(square, 0.0)))
+    return jitter, float(clear), float((jitter * np.sqrt((rates**2).mean(axis=0))).max())
