@@ -180,6 +180,12 @@ def _angle(x: Array, y: Array) -> Array:
     return np.asarray(np.arctan2(y.real, x.real) + 1j * (y.imag * x.real - x.imag * y.real) / size)
 
 
+def _seen_from(q: Array, x: Array, y: Array) -> Array:
+    """Return a direction (x, y) as a crank at angle q sees it, (T, 3)."""
+    c, s = np.cos(q), np.sin(q)
+    return np.stack([c * x + s * y, c * y - s * x, 0 * x], axis=-1)
+
+
 def _arccos(share: Array) -> Array:
     """Return the arc cosine, to first order in imaginary parts."""
     return np.asarray(np.arccos(share.real) - 1j * share.imag / np.sqrt(1.0 - share.real**2))
@@ -308,7 +314,8 @@ def ball_table() -> Plant:
             foot = base[i] + 0 * elbow
             points += _rod([foot, elbow])
             points += _rod([elbow, at[:, i]])
-            rods.append((at[:, i] - elbow) / link)
+            way = (at[:, i] - elbow) / link
+            rods.append(_seen_from(q, way @ out[i], way[:, 2]))
             angles.append(q)
         points += [at[:, 3 + k] for k in range(4)] + [p]
         return np.stack(angles, axis=1), np.stack(points, axis=1), np.stack(rods, axis=1)
@@ -340,13 +347,12 @@ def five_bar() -> Plant:
             elbow = base[i] + length * np.stack([np.cos(q), np.sin(q)], axis=-1)
             points += _rod([base[i] + 0 * elbow, elbow])
             points += _rod([elbow, x])
-            rods.append((x - elbow) / length)
+            rods.append(_seen_from(q, *((x - elbow) / length).T))
             angles.append(q)
         points.append(x)
         flat = np.stack(points, axis=1)
-        ways = np.stack(rods, axis=1)
-        level = [np.concatenate([part, 0 * part[..., :1]], axis=-1) for part in (flat, ways)]
-        return np.stack(angles, axis=1), level[0], level[1]
+        level = np.concatenate([flat, 0 * flat[..., :1]], axis=-1)
+        return np.stack(angles, axis=1), level, np.stack(rods, axis=1)
 
     masses = np.array([*([*_rod_masses(crank), *_rod_masses(link)] * 2), pen])
     home, size = np.array([0.0, 0.125]), np.array([0.03, 0.02])
@@ -393,6 +399,7 @@ class Case:
 
     @property
     def home(self) -> Array:
+        """The joints (n,) where the machine is homed."""
         return np.asarray(self.plant.place(self.plant.home[None] + 0j)[0].real[0])
 
     def seen_at(self, instants: Array) -> None:
@@ -622,8 +629,9 @@ class Answer:
     steps: tuple[str, ...] = ()
 
     def names(self, pattern: str, most: int = 2) -> bool:
-        """Say whether one of the first causes is named by words."""
-        return any(re.search(pattern, cause) for cause in self.causes[:most])
+        """Say whether words name one of the first causes, or what the log cannot show at all."""
+        hidden = [self.first] * self.first.startswith("These logs cannot show")
+        return any(re.search(pattern, cause) for cause in (*self.causes[:most], *hidden))
 
 
 def answered(plant: Plant, fault: str, seed: int, **options: Any) -> Answer:
@@ -635,7 +643,7 @@ def answered(plant: Plant, fault: str, seed: int, **options: Any) -> Answer:
     cases[1].drawn = cases[0].drawn
     try:
         result = identify(cases[0].drawn, log, held_out=other, **options)
-    except LogError as error:
+    except (LogError, pteron.ModelError) as error:
         said = str(error)
         return Answer("refused", said, (said,), np.nan)
     verdict = result.verdict

@@ -254,7 +254,7 @@ def _identified(
         # A delay changes values: fit again with it.
         late = True
     heads = [one.head() for one in fit]
-    of_log = log_faults(heads, preprocessing, [lost_share(one) for one in raw])
+    of_log = log_faults(heads, preprocessing, [lost_share(one) for one in raw], fits=trusted)
     if late and given is None:
         of_log = (*of_log, of_delay(found.delay, found.delay_deviation, 1.0 / heads[0].rate))
     fitted = tuple(
@@ -271,7 +271,7 @@ def _identified(
             model, estimate, known, observations, drawn, bounds
         )
     pushed = friction_below_zero(model, observations, estimate)
-    factor = common_factor(model, estimate, known, drawn, observations)
+    factor = common_factor(model, estimate, known, drawn, observations) if trusted else 1.0
     verdict = verdict_of(
         held,
         faults,
@@ -288,7 +288,8 @@ def _identified(
     if essential.dropped:
         advice[:0] = _more_motion(model, list(essential.dropped))
     if drawn_values.names:
-        advice[:0] = _what_shows_more(base, drawn_values.names)
+        clean = trusted and not faults.faults and assumption is None
+        advice[:0] = _what_shows_more(base, drawn_values.names, clean=clean)
     return Identification(
         robot=robot,
         model=model,
@@ -299,7 +300,7 @@ def _identified(
         fitted=fitted,
         held_out=tuple(held),
         preprocessing=preprocessing,
-        fault_isolation=replace(faults, log=of_log, assumption=assumption),
+        fault_isolation=replace(faults, log=of_log, assumption=assumption, factor=factor),
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=drawn_values.names,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
@@ -362,10 +363,13 @@ def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, 
     return tuple((d.rotor_inertia, d.gear) for d in (drive or Drive() for drive in drives))
 
 
-def _what_shows_more(base: BaseParameters, hidden: Sequence[str]) -> list[str]:
-    """Return advice that shows values which a motion leaves open: shared legs, or more motion."""
+def _what_shows_more(base: BaseParameters, hidden: Sequence[str], *, clean: bool) -> list[str]:
+    """Return advice that shows values which a motion leaves open: shared legs, or more motion.
+
+    Fewer values leave less room for a fault: legs are to be shared in a log that is `clean`.
+    """
     robot, advice = base.robot, []
-    if not any(len(p.legs) > 1 for p in base.parameters) and _alike(robot):
+    if clean and not any(len(p.legs) > 1 for p in base.parameters) and _alike(robot):
         advice.append(
             "The legs are drawn alike: --shared identifies one set of parameters for all of them, "
             "which the same motion shows better."
@@ -456,6 +460,12 @@ def _real_bodies(
             model.robot, model.base, values, covariance, cad=cad, bounds=bounds
         )
     except MissingSolver as error:
+        return None, float("nan"), float("nan"), (f"No model of real bodies: {error}",)
+    except ModelError as error:
+        # Values too far from those of real bodies for the solver are no reason to say nothing; what
+        # a user asks of bodies is.
+        if bounds is not None:
+            raise
         return None, float("nan"), float("nan"), (f"No model of real bodies: {error}",)
     shift = np.zeros(len(estimate.values))
     shift[:rank] = found.base_values - values

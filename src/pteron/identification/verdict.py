@@ -63,7 +63,7 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "Check each drive's gain by itself, or move more coordinates at once, and faster.",
     ),
     "play": (
-        "To see play in the drives these logs are of no use: the load of none changes its direction often "
+        "Play in the drives would not be seen: the load of none changes its direction often "
         "enough, four times while the joint moves. While loads stay on one side it does no harm.",
         "To see play, record a motion whose accelerations load the drives both ways.",
     ),
@@ -77,6 +77,9 @@ _STEPS = (
     "the signs of forces and joints.",
 )
 """Remedies for an error beyond the noise, where friction explains some of it and where little."""
+
+_GENERAL = ("Look at the residuals", "Friction of joints explains")
+"""How advice begins that is of no use beside a cause that is named."""
 
 _CANNOT = "These logs cannot show"
 """How sentences begin on what logs cannot show."""
@@ -121,19 +124,16 @@ def verdict_of(
     """
     found = Opinion()
     if faults is not None:
-        faults = replace(faults, log=tuple(log), assumption=assumption)
+        # Beside the drawing a common factor shows, if only to some per cent.
+        hidden = tuple(one for one in faults.hidden if one != "gain" or factor == 1.0)
+        about = {"log": tuple(log), "assumption": assumption, "factor": factor, "hidden": hidden}
+        faults = replace(faults, **about)
     if any(one.distorts for one in log):
         found.lower("usable with care")
     if assumption is not None:
         found.lower("not trustworthy")
     if factor != 1.0:
-        found.add(
-            f"All forces of the bodies are {factor:.2g} times those of the drawing, as where the "
-            "gain of all torques or the gear ratio is off by that factor; a file whose masses are "
-            "right allows for no such factor.",
-            "Check gains, rated torque and gear ratio, or the drawing's masses.",
-            grade="usable with care",
-        )
+        found.lower("usable with care")
     opinions = [_of_prediction(one) for one in held_out]
     if faults is not None:
         opinions.append(_of_faults(faults))
@@ -153,7 +153,8 @@ def verdict_of(
             "Record another motion, such as a pick-and-place cycle, and hold it out (--held-out): "
             "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv.",
         )
-    found.steps = [step for step in found.steps if not any(name in step for name in followed)]
+    unwanted = followed if faults is None or not faults.causes else {*followed, *_GENERAL}
+    found.steps = [step for step in found.steps if not any(name in step for name in unwanted)]
     return found.verdict()
 
 

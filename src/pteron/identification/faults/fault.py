@@ -81,6 +81,25 @@ _SENTENCES = {
 }
 """Sentences on the faults, on a delay of sampling, and on gravity that acts the other way."""
 
+_IN_WORDS: dict[FaultName, str] = {
+    "delay": "a delay",
+    "scale": "the scale of a force",
+    "ratio": "a gear ratio",
+    "zero": "the zero of a joint",
+    "gain": "the gain of all forces",
+    "gravity": "tilted gravity",
+    "clock": "the log's clock",
+    "geometry": "lengths or points of the geometry",
+    "stribeck": "friction that falls with speed",
+    "elasticity": "drives that give",
+    "drift": "friction that changes during the log",
+    "load": "friction that grows with the load",
+    "passive": "friction of passive joints",
+    "rotors": "the motors' inertia",
+    "play": "play of a drive",
+}
+"""Faults as nouns."""
+
 _REMEDY: dict[FaultName, str] = {
     "delay": "--delay auto takes it out",
     "scale": "check that drive's gain, or its torque constant",
@@ -148,6 +167,8 @@ class IsolatedFault:
         Speeds of the joints with which Stribeck's friction falls.
     step : float
         From one sample of the log to the next, s.
+    as_well : tuple of str
+        Other faults that explain the residuals as well.
     """
 
     fault: FaultName
@@ -159,6 +180,7 @@ class IsolatedFault:
     cycle: Array
     speeds: Array | None = None
     step: float = 0.0
+    as_well: tuple[FaultName, ...] = ()
 
     @property
     def of_sampling(self) -> bool:
@@ -181,7 +203,7 @@ class IsolatedFault:
     @property
     def message(self) -> str:
         """The fault, and its remedy, in a sentence."""
-        return f"{self._sentence()}; {_REMEDY[self.fault]}."
+        return f"{self._sentence()}{self._others()}; {_REMEDY[self.fault]}."
 
     @property
     def beside_log_fault(self) -> str:
@@ -193,10 +215,16 @@ class IsolatedFault:
         return {
             **picked(self, "fault message labels sizes"),
             "standard_deviations": [None if np.isnan(v) else float(v) for v in self.deviations],
-            **picked(self, "chance shift matters"),
+            **picked(self, "chance shift matters as_well"),
             "cycle_percent": [None if np.isnan(v) else float(v) for v in self.cycle],
             **picked(self, "speeds"),
         }
+
+    def _others(self) -> str:
+        """Return, in brackets, the other faults that explain the residuals as well."""
+        if not self.as_well:
+            return ""
+        return f" (as well explained by: {', '.join(_IN_WORDS[name] for name in self.as_well)})"
 
     def _leg_size(self, label: str) -> float:
         """Return the size of all errors of one label together."""

@@ -53,6 +53,13 @@ _MOTION = 0.3
 _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
 
+_OF_FACTOR = (
+    "All forces of the bodies are {factor:.2g} times those of the drawing, as where the gain of "
+    "all torques or the gear ratio is off by that factor: check gains, rated torque and gear "
+    "ratio, or the drawing's masses."
+)
+"""Sentence on forces that have a factor in common beside those of the drawing."""
+
 _NAMED = 0.05
 """Percent of a cycle's forces from which a fault is named: statistics see smaller ones where a log
 has no noise, and the sampling itself makes them."""
@@ -86,6 +93,8 @@ class FaultIsolation:
         Faults of the logs as such.
     assumption : Assumption, optional
         The assumption of the machine's file that the logs contradict.
+    factor : float
+        Forces of the bodies over those of the drawing, where all have that factor in common.
     """
 
     tried: tuple[str, ...]
@@ -97,6 +106,7 @@ class FaultIsolation:
     late: bool = False
     log: tuple[LogFault, ...] = ()
     assumption: Assumption | None = None
+    factor: float = 1.0
 
     suspicions = former_attribute("suspicions", "faults")
 
@@ -104,7 +114,8 @@ class FaultIsolation:
     def causes(self) -> tuple[str, ...]:
         """All that shows in a sentence each: log, assumptions, then machine, as to be mended."""
         distorted = any(one.distorts for one in self.log)
-        of_file = [] if self.assumption is None else [self.assumption.message]
+        of_file = [] if self.factor == 1.0 else [_OF_FACTOR.format(factor=self.factor)]
+        of_file += [] if self.assumption is None else [self.assumption.message]
         ranked = sorted(self.faults, key=lambda one: ORDER.index(one.fault))
         machine = [one.beside_log_fault if distorted else one.message for one in ranked]
         return (*(one.message for one in self.log), *of_file, *machine)
@@ -208,7 +219,7 @@ def _isolated(
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
     left_open = cannot_be_told(columns, observations, noise)
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
-    plain, found = searched(columns, observations, () if exact else None)
+    plain, found = searched(columns, observations, () if exact else None, noise)
     if any(one.family is DELAY for one in found):
         # Columns hold for small delays: other faults are sought after a long one is corrected.
         late, shifted = _delay(parts, observed)
@@ -251,7 +262,7 @@ def _isolated(
             family, seen = one.family, (one.sizes, one.deviations, one.chance, shift, spoils)
             speeds = None if family.speed is None else family.speed * columns.usual
             labels = tuple(family.sizes(model))
-            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step))
+            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, one.as_well))
 
     # Play, which no column has
     play, looked = _play(parts, estimate.values, step)
@@ -399,7 +410,8 @@ def _searched_for(
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
-    return searched(some[0].model, observed(some))
+    noise = np.mean([part.how.force_noise for part in parts], axis=0)
+    return searched(some[0].model, observed(some), noise=noise)
 
 
 def _delay(

@@ -19,6 +19,7 @@ from pteron.identification.signals import Preprocessing
 from pteron.identification.signals.derivatives import LOST, central_differences, uniform
 from pteron.identification.signals.filters import force_steps, smoothed
 from pteron.json_values import picked
+from pteron.kernels import Array
 
 _LOST = 0.01
 """Share of missing samples from which they are named: fewer cost less than a tenth of the
@@ -34,6 +35,12 @@ less than an eighth to the noise."""
 _COARSE = 0.02
 """Step of forces' values, over their deviation, from which it is named: rounding by 0.6 % of the
 deviation, more than usual noise of 0.5 %."""
+
+_EXTREME, _SHARE, _LEVEL = 0.01, 0.06, 5.0
+"""Of plateaus: the share of samples at which the extreme value is taken, the least share of samples
+within six deviations of it, and how many times as many they are as the next six. A sine has 2.4
+times as many, random motions without limits up to 0.1 and 4.8 (own plants), with limits 0.07 and 5
+or more."""
 
 _LOOK = 60_000
 """Rows that are looked at for jitter."""
@@ -53,7 +60,8 @@ class LogFault:
     message : str
         The fault and its remedy, in a sentence.
     size : float
-        Share of samples lost, jitter or delay in s, NaN of saturation, steps over the force's deviation.
+        Share of samples lost, jitter or delay in s, NaN of saturation, steps over the force's
+        deviation.
     distorts : bool
         Whether faults of the machine that show too may be its own.
     """
@@ -69,9 +77,17 @@ class LogFault:
 
 
 def log_faults(
-    logs: Sequence[Log], preprocessing: Sequence[Preprocessing], lost: Sequence[float]
+    logs: Sequence[Log],
+    preprocessing: Sequence[Preprocessing],
+    lost: Sequence[float],
+    *,
+    fits: bool = True,
 ) -> tuple[LogFault, ...]:
-    """Return the faults of logs, each once; `lost` are the shares of samples that they miss."""
+    """Return the faults of logs, each once.
+
+    `lost` are the shares of samples that they miss; `fits` says that a model explains the forces,
+    which then are not at their limits, whatever plateaus they have.
+    """
     found: list[LogFault] = []
     if (share := max(lost, default=0.0)) > _LOST:
         worst = logs[int(np.argmax(lost))]
@@ -90,11 +106,9 @@ def log_faults(
             )
             found.append(LogFault("jitter", f"{message}.", jitter, True))
             break
-    found += [
-        LogFault("saturation", message, float("nan"), True)
-        for log in logs
-        for message in at_limits(log)
-    ]
+    for log, how in zip(logs, preprocessing, strict=True):
+        said = at_limits(log) or (() if fits else _plateaus(log, how.force_noise))
+        found += [LogFault("saturation", message, float("nan"), True) for message in said]
     for log in logs:
         steps = force_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
         if (coarse := float(steps.max(initial=0.0))) > _COARSE:
@@ -106,6 +120,31 @@ def log_faults(
             found.append(LogFault("steps", f"{message}.", coarse, False))
             break
     return tuple(found)
+
+
+def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
+    """Return a sentence on forces that have far more samples within the noise of an extreme value.
+
+    A smooth force that turns round has at most 2.4 times as many within six deviations of its
+    extreme value as within the next six.
+    """
+    found = []
+    for name, force, size in zip(log.force_names, log.forces.T, noise.tolist(), strict=True):
+        for sign in (1.0, -1.0):
+            signed = np.sort(sign * force)[::-1]
+            top = signed[int(_EXTREME * len(signed))] + 1.5 * size
+            within = int(((signed <= top) & (signed > top - 6.0 * size)).sum())
+            below = int(((signed <= top - 6.0 * size) & (signed > top - 12.0 * size)).sum())
+            if within >= _SHARE * len(signed) and within > _LEVEL * max(below, 1):
+                found.append(name)
+    if not found:
+        return ()
+    names = ", ".join(dict.fromkeys(found))
+    return (
+        f"{names} stay within the noise of an extreme value far more often than a force that only "
+        f"turns round there: the drive may be at its limit in {log.source} (saturation); move more "
+        "slowly, or leave such stretches out.",
+    )
 
 
 def of_delay(delay: float, deviation: float, step: float) -> LogFault:
