@@ -375,10 +375,18 @@ def test_a_sound_log_is_not_accused():
     assert found.verdict.grade != "not trustworthy"
 
 
-def test_too_little_motion_names_what_is_not_seen():
+def test_what_too_little_motion_does_not_show_stays_near_the_drawing():
     log = noisy(QUADRUPTERON, size=2e-4, turn=1e-3)
-    reason = refused(log, "log.csv: too little motion", "cannot be seen", "mgx_u2")
-    assert reason == "too little motion"
+    found = identify(QUADRUPTERON, log)
+    base = found.model.base
+    assert "mgx_u2" in found.unseen
+    steps = [step for step in found.verdict.next_steps if step.startswith("Not shown by this")]
+    assert len(steps) == 1
+    assert "mgx_u2" in steps[0]
+    # Of usual size, not a thousand times as large, and its interval says that it is not known.
+    k = base.names.index("mgx_u2")
+    assert abs(found.base_values[k] - base.values(QUADRUPTERON)[k]) < found.estimate.deviations[k]
+    assert abs(found.base_values[k]) < 3.0 * abs(base.values(QUADRUPTERON)[k])
 
 
 def test_motion_along_one_axis_names_what_is_not_seen():
@@ -427,9 +435,12 @@ def test_a_payload_needs_its_column():
     refused(noisy(QUADRUPTERON), "no payload column", terms=Terms(payload=True))
 
 
-def test_a_model_that_leaves_too_much_is_named_beside_too_little_motion():
+def test_a_model_that_leaves_too_much_is_said_to():
     terms = Terms(coulomb=False, viscous=False, offset=False)
-    refused(noisy(QUADRUPTERON), "times the noise", "friction is left out", terms=terms)
+    found = identify(QUADRUPTERON, noisy(QUADRUPTERON), terms=terms)
+    assert found.verdict.grade != "trustworthy"
+    said = (*found.causes, *found.verdict.reasons)
+    assert any("friction" in one.lower() for one in said)
 
 
 def test_sliders_in_any_order_are_found():

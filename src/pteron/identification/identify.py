@@ -40,6 +40,7 @@ from pteron.identification.observation import LinearModel, Observations
 from pteron.identification.plausibility import (
     common_factor,
     friction_below_zero,
+    left_over,
     plausibility_warnings,
     unphysical,
 )
@@ -137,7 +138,8 @@ def identify(
         # No pose, or values that are no machine's: an assumption of its file may be wrong.
         because = _refusal_cause(robot, logs, processing or Processing(), error)
         if because:
-            error.args = (f"{because} ({error})",)
+            place = f"{error.place}: " if isinstance(error, LogError) else ""
+            error.args = (f"{place}{because} ({str(error).removeprefix(place)})",)
         raise
 
 
@@ -157,7 +159,7 @@ def _refusal_cause(
         assumption = contradicted(robot, log, how, reflected)
     except PteronError:
         return ""
-    return assumption.message if assumption else ""
+    return assumption.message.rstrip(".") if assumption else ""
 
 
 def _identified(
@@ -237,19 +239,19 @@ def _identified(
             for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
         ]
         trusted = verdict_of(held, repeats=not others).grade == "trustworthy"
-        assumption = None
         with findings_told(whole):
             if not trusted or unphysical(model, observations, estimate):
                 reflected = np.array([j * r**2 for j, r in rotors or [(0.0, 1.0)] * n])
                 assumption = contradicted(robot, fit[0].head(), preprocessing[0], reflected)
-                if assumption is None:
-                    check_columns(model, fit[0], preprocessing[0])
+                if assumption is not None:
+                    raise fit[0].log.fault("contradicted", assumption.message.rstrip("."))
+                check_columns(model, fit[0], preprocessing[0])
             check_motion(model, bare, preprocessing, fit[0])
         report("Looking for faults", 0, 0)
         faults = isolate_faults(
             model, estimate, fit, preprocessing, reflected_inertia(rotors), drawn=drawn_values
         )
-        if late or given is not None or assumption is not None or not faults.late:
+        if late or given is not None or not faults.late:
             break
         # A delay changes values: fit again with it.
         late = True
@@ -277,10 +279,10 @@ def _identified(
         faults,
         repeats=not others,
         log=of_log,
-        assumption=assumption,
         factor=factor,
         exchangeable=exchangeable_legs(robot, heads[0], preprocessing[0]),
         followed=_followed(model.terms, estimator),
+        left=left_over(estimate, preprocessing),
     )
     verdict = with_bodies(replace(verdict, reasons=(*pushed, *verdict.reasons)), consistency, off)
     verdict = with_hidden_first(verdict)
@@ -288,7 +290,7 @@ def _identified(
     if essential.dropped:
         advice[:0] = _more_motion(model, list(essential.dropped))
     if drawn_values.names:
-        clean = trusted and not faults.faults and assumption is None
+        clean = trusted and not faults.faults
         advice[:0] = _what_shows_more(base, drawn_values.names, clean=clean)
     return Identification(
         robot=robot,
@@ -300,7 +302,7 @@ def _identified(
         fitted=fitted,
         held_out=tuple(held),
         preprocessing=preprocessing,
-        fault_isolation=replace(faults, log=of_log, assumption=assumption, factor=factor),
+        fault_isolation=replace(faults, log=of_log, factor=factor),
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=drawn_values.names,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),

@@ -9,7 +9,6 @@ import numpy as np
 
 from pteron.identification.consistency import Consistency
 from pteron.identification.faults import FaultIsolation
-from pteron.identification.faults.assumptions import Assumption
 from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction, predict
@@ -94,10 +93,10 @@ def verdict_of(
     *,
     repeats: bool,
     log: Sequence[LogFault] = (),
-    assumption: Assumption | None = None,
     factor: float = 1.0,
     exchangeable: Sequence[str] = (),
     followed: frozenset[str] = frozenset(),
+    left: str = "",
 ) -> Verdict:
     """Return the verdict on a model.
 
@@ -112,8 +111,6 @@ def verdict_of(
     log : sequence of LogFault
         Faults of the logs as such. Where forces stay at their limit, or samples are taken at other
         times than their stamps say, the grade is "usable with care" at best.
-    assumption : Assumption, optional
-        An assumption of the machine's file that the logs contradict: "not trustworthy".
     factor : float
         Forces of the bodies over those of the drawing; other than 1 it is "usable with care" at
         best.
@@ -121,17 +118,17 @@ def verdict_of(
         Pairs of legs whose exchange the logs do not show.
     followed : frozenset of str
         Options whose advice is followed already, and not given again.
+    left : str
+        How far what the model leaves is above the noise, said where no cause shows.
     """
     found = Opinion()
     if faults is not None:
         # Beside the drawing a common factor shows, if only to some per cent.
         hidden = tuple(one for one in faults.hidden if one != "gain" or factor == 1.0)
-        about = {"log": tuple(log), "assumption": assumption, "factor": factor, "hidden": hidden}
+        about = {"log": tuple(log), "factor": factor, "hidden": hidden}
         faults = replace(faults, **about)
     if any(one.distorts for one in log):
         found.lower("usable with care")
-    if assumption is not None:
-        found.lower("not trustworthy")
     if factor != 1.0:
         found.lower("usable with care")
     opinions = [_of_prediction(one) for one in held_out]
@@ -141,6 +138,8 @@ def verdict_of(
         found.lower(one.grade)
         found.reasons += one.reasons
         found.steps += one.steps
+    if left and found.grade != "trustworthy" and not (faults is not None and faults.causes):
+        found.add(f"{left[0].upper()}{left[1:]}.")
     if exchangeable:
         found.add(
             f"These logs cannot show whether legs {', or '.join(exchangeable)}, are exchanged in "

@@ -228,7 +228,7 @@ class IsolatedFault:
 
     def _leg_size(self, label: str) -> float:
         """Return the size of all errors of one label together."""
-        parts = [size for size, name in zip(self.sizes, self.labels, strict=True) if name == label]
+        parts = [size for size, name in zip(self.sizes, self.labels, strict=False) if name == label]
         return float(np.linalg.norm(parts))
 
     def _sentence(self) -> str:

@@ -12,7 +12,6 @@ import numpy as np
 from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
-from pteron.identification.faults.assumptions import Assumption
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
 from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
@@ -91,8 +90,6 @@ class FaultIsolation:
         even if too little to be named.
     log : tuple of LogFault
         Faults of the logs as such.
-    assumption : Assumption, optional
-        The assumption of the machine's file that the logs contradict.
     factor : float
         Forces of the bodies over those of the drawing, where all have that factor in common.
     """
@@ -105,17 +102,15 @@ class FaultIsolation:
     hidden: tuple[FaultName, ...] = ()
     late: bool = False
     log: tuple[LogFault, ...] = ()
-    assumption: Assumption | None = None
     factor: float = 1.0
 
     suspicions = former_attribute("suspicions", "faults")
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """All that shows in a sentence each: log, assumptions, then machine, as to be mended."""
+        """All that shows in a sentence each: log, scale, then machine, as to be mended."""
         distorted = any(one.distorts for one in self.log)
         of_file = [] if self.factor == 1.0 else [_OF_FACTOR.format(factor=self.factor)]
-        of_file += [] if self.assumption is None else [self.assumption.message]
         ranked = sorted(self.faults, key=lambda one: ORDER.index(one.fault))
         machine = [one.beside_log_fault if distorted else one.message for one in ranked]
         return (*(one.message for one in self.log), *of_file, *machine)
@@ -140,7 +135,6 @@ class FaultIsolation:
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.off}
         return picked(self, "tried why_not cannot_be_told=hidden faults") | {
             "log": [one.as_dict() for one in self.log],
-            "assumption": self.assumption and self.assumption.as_dict(),
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
                 for name, values in shares.items()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb
 from typing import Literal
 
 import numpy as np
@@ -16,8 +17,8 @@ from pteron.identification.logs import Log
 from pteron.identification.logs.log import gaps
 from pteron.identification.logs.recorded import at_limits
 from pteron.identification.signals import Preprocessing
-from pteron.identification.signals.derivatives import LOST, central_differences, uniform
-from pteron.identification.signals.filters import force_steps, smoothed
+from pteron.identification.signals.derivatives import uniform
+from pteron.identification.signals.filters import DIFFERENCE, force_steps, smoothed
 from pteron.json_values import picked
 from pteron.kernels import Array
 
@@ -44,6 +45,9 @@ or more."""
 
 _LOOK = 60_000
 """Rows that are looked at for jitter."""
+
+_ALIKE = (comb(32, 16) / comb(16, 8) ** 2) ** 0.5
+"""Deviation of a sum of squares of eighth differences, over that of independent ones."""
 
 LogFaultName = Literal["lost", "jitter", "delay", "saturation", "steps"]
 
@@ -179,25 +183,26 @@ _PAUSE = 0.02
 def sampling_jitter(log: Log, how: Preprocessing) -> tuple[float, float, float]:
     """Return the deviation of sampling times, s, how clear it is, and its share of the noise.
 
-    What the positions' filter takes is e = v dt where samples are taken dt off: joints that move
-    have it in common. The mean of e_i e_j v_i v_j over pairs of joints is that of (v_i v_j)^2 dt^2;
-    encoders' noise, which joints do not share, adds nothing. Clear: in standard deviations.
+    Where samples are taken dt off, positions are v dt off: joints that move have it in common.
+    Eighth differences e of positions keep that and nothing of a smooth motion. The mean of
+    e_i e_j v_i v_j over pairs of joints is that of (v_i v_j)^2 dt^2; encoders' noise, which joints
+    do not share, adds nothing. Clear: in standard deviations.
     """
     longest = max(log.segments, key=lambda part: part.stop - part.start)
     time, joints = uniform(*(part[longest][:_LOOK] for part in (log.time, log.joints)))
-    n = joints.shape[1]
-    if how.cutoff is None or n < 2 or len(time) < 20 * LOST:
+    n, edge = joints.shape[1], DIFFERENCE // 2
+    if how.cutoff is None or n < 2 or len(time) < 20 * DIFFERENCE:
         return 0.0, 0.0, 0.0
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    smooth = smoothed(joints, rate, how.cutoff)
-    inner = slice(LOST, len(time) - LOST)
-    rates = central_differences(smooth, rate)[0] / np.maximum(how.joint_noise, 1e-300)
-    rest = (joints - smooth)[inner] / np.maximum(how.joint_noise, 1e-300)
+    noise = np.maximum(how.joint_noise, 1e-300)
+    rates = np.gradient(smoothed(joints, rate, how.cutoff), 1.0 / rate, axis=0)[edge:-edge] / noise
+    rough = (
+        np.diff(joints, n=DIFFERENCE, axis=0) / np.sqrt(comb(2 * DIFFERENCE, DIFFERENCE)) / noise
+    )
     first, second = np.triu_indices(n, 1)
-    pairs = (rest[:, first] * rest[:, second] * rates[:, first] * rates[:, second]).sum(axis=1)
+    pairs = (rough[:, first] * rough[:, second] * rates[:, first] * rates[:, second]).sum(axis=1)
     sizes = ((rates[:, first] * rates[:, second]) ** 2).sum(axis=1)
-    # The filter keeps its share of white noise.
-    square = pairs.sum() / max(float(sizes.sum()), 1e-300) / (1.0 - 2.0 * how.cutoff / rate)
-    clear = pairs.sum() / max(float(np.sqrt((pairs**2).sum())), 1e-300)
+    square = pairs.sum() / max(float(sizes.sum()), 1e-300)
+    clear = pairs.sum() / max(_ALIKE * float(np.sqrt((pairs**2).sum())), 1e-300)
     jitter = float(np.sqrt(max(square, 0.0)))
     return jitter, float(clear), float((jitter * np.sqrt((rates**2).mean(axis=0))).max())
