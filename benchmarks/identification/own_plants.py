@@ -685,6 +685,57 @@ def followed(plant: Plant, fault: str, seed: int, answer: Answer) -> list[tuple[
     ]
 
 
+@dataclass(frozen=True)
+class Faultless:
+    """Of logs without a fault: intervals, those within two standard errors, and accused logs."""
+
+    intervals: int
+    within: int
+    logs: int
+    accused: tuple[str, ...]
+
+
+def faultless(plant: Plant, count: int) -> Faultless:
+    """Return what `identify` says of so many logs without a fault.
+
+    The true values are those of a log without noise, which is exact.
+    """
+    symbols = tuple(leg.joint for leg in plant.drawn.legs)
+    exact = [
+        Log(f"exact {k}", m.time, m.joints, m.forces, symbols=symbols)
+        for k, m in ((k, moved(plant, k)) for k in (8001, 8002))
+    ]
+    truth = identify(plant.drawn, exact[0], held_out=exact[1]).estimate.values
+    within, intervals, accused = 0, 0, []
+    for seed in range(3000, 3000 + count):
+        pair = [case_of(plant, "none", seed + k) for k in (0, 1000)]
+        for k, case in enumerate(pair):
+            case.rng = np.random.default_rng((seed, k, 5))
+        log, other = (recorded(c, "none", s) for c, s in zip(pair, ("log", "other"), strict=True))
+        result = identify(plant.drawn, log, held_out=other)
+        off = np.abs(result.estimate.values - truth) / result.estimate.deviations
+        within += int((off <= 2.0).sum())
+        intervals += len(off)
+        if result.causes or result.verdict.grade != "trustworthy":
+            reasons = result.causes or result.verdict.reasons
+            accused.append(f"{seed}: {result.verdict.grade}: {reasons[0][:120]}")
+    return Faultless(intervals, within, count, tuple(accused))
+
+
+_LOGS = {"linear-delta": 64, "five-bar": 60, "ball-table": 31, "hexapod": 23}
+"""Logs without a fault, so many that they have a thousand intervals or more."""
+
+
+def print_faultless(name: str, count: int) -> None:
+    """Print a line on a plant's logs without a fault."""
+    seen = faultless(PLANTS[name](), count)
+    share = 100.0 * seen.within / seen.intervals
+    print(f"{name:12} {seen.within} of {seen.intervals} intervals ({share:.1f} %) hold the true ")
+    print(f"value at 2 standard errors; {len(seen.accused)} of {seen.logs} logs accused")
+    for line in seen.accused:
+        print(f"    {line}")
+
+
 def main() -> None:
     """Print a row for each plant, fault and seed."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -692,7 +743,15 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--faults", nargs="*", default=["none", *FAULTS])
     parser.add_argument("--follow", action="store_true")
+    parser.add_argument("--faultless", action="store_true")
+    parser.add_argument("--quick", action="store_true")
     given = parser.parse_args()
+    if given.quick:
+        given.plants, given.faults = ["linear-delta"], ["none", "delay", "sign"]
+    if given.faultless:
+        for name in given.plants or PLANTS:
+            print_faultless(name, _LOGS[name])
+        return
     for name in given.plants or PLANTS:
         plant = PLANTS[name]()
         for fault in given.faults:

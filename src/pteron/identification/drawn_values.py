@@ -12,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.identification.estimators import Estimate
-from pteron.identification.estimators.estimate import residuals_of
+from pteron.identification.estimators.estimate import residuals_of, whiteness
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations
 from pteron.identification.plausibility import unseen, usual_sizes
 from pteron.kernels import Array
 from pteron.manipulator import parameters
+
+_LITTLE = 0.5
+"""Deviation after a fit, over that of the drawing, from which a value is called not shown."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class DrawnValues:
     Attributes
     ----------
     names : tuple of str
-        The K base parameters.
+        The base parameters that are told to be not shown: all K, or fewer.
     places : array of int, shape (K,)
         Their places among the values.
     values, deviations : array, shape (K,)
@@ -48,9 +51,26 @@ class DrawnValues:
         values = (model.base.grouping @ drawn + known[: model.base.rank])[places]
         return cls(names, places, values, usual_sizes(model.base, drawn)[places])
 
+    @classmethod
+    def of_all(cls, model: Model, known: Array) -> DrawnValues:
+        """Return the drawn values of all base parameters, for a log that does not determine them.
+
+        `known` (p,) is the rotors' part of the values.
+        """
+        drawn = parameters(model.robot)
+        values = model.base.grouping @ drawn + known[: model.base.rank]
+        places = np.arange(model.base.rank)
+        return cls(model.base.names, places, values, usual_sizes(model.base, drawn))
+
+    def told_of(self, estimate: Estimate) -> DrawnValues:
+        """Return it with the names of those only that are little better known after a fit."""
+        share = estimate.deviations[self.places] / self.deviations
+        names = zip(self.names, share.tolist(), strict=True)
+        return replace(self, names=tuple(name for name, s in names if s > _LITTLE))
+
     def added_to(self, estimate: Estimate, observations: Observations) -> Estimate:
         """Return the estimate with the drawn values as further measurements."""
-        if not self.names:
+        if not len(self.places):
             return estimate
         size = np.maximum(estimate.deviations, np.finfo(float).tiny)
         covariance = estimate.covariance / np.outer(size, size)
@@ -62,16 +82,18 @@ class DrawnValues:
         # Joseph's form, which stays positive where deviations differ by many orders.
         covariance = left @ covariance @ left.T + gain @ np.diag(own**2) @ gain.T
         values = estimate.values + size * shift
+        rest = residuals_of(observations, values)
         return replace(
             estimate,
             values=values,
             covariance=0.5 * (covariance + covariance.T) * np.outer(size, size),
-            residuals=residuals_of(observations, values),
+            residuals=rest,
+            whiteness=whiteness(rest, observations.gain > 0.0),
         )
 
     def rows_beside(self, observations: Observations, noise: Array) -> Observations:
         """Return observations with a row for each drawn value, weighted by forces' `noise` (n,)."""
-        count = len(self.names)
+        count = len(self.places)
         if not count:
             return observations
         n, p = observations.matrix.shape[1:]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -143,6 +144,18 @@ def identify(
         raise
 
 
+def _determined(
+    method: Callable[[Observations], Estimate], observations: Observations, error: LogError
+) -> Estimate:
+    """Return a fit of a log that does not determine all values by itself, or raise its error."""
+    if error.reason != "too little motion":
+        raise error
+    try:
+        return method(observations)
+    except LogError:
+        raise error from None
+
+
 def _refusal_cause(
     robot: Manipulator, logs: Logs, wanted: Processing, error: DataError | ModelError
 ) -> str:
@@ -227,10 +240,20 @@ def _identified(
                 )
                 used = replace(wanted, delay=found.delay)
                 preprocessing = tuple(replace(how, delay=found.delay) for how in preprocessing)
-            estimate = estimated(estimator, model, fit, preprocessing, observations)
-            estimate = replace(estimate, covariance=estimate.covariance + more)
-        bare, drawn_values = estimate, DrawnValues.of(model, estimate, known)
-        estimate = drawn_values.added_to(bare, observations)
+            method = partial(estimated, estimator, model, fit, preprocessing)
+            try:
+                bare = method(observations)
+            except LogError as error:
+                # The log does not determine all values: with those of the drawing it may.
+                noise = np.mean([how.force_noise for how in preprocessing], axis=0)
+                drawn_values = DrawnValues.of_all(model, known)
+                observations = drawn_values.rows_beside(observations, noise)
+                estimate = bare = _determined(method, observations, error)
+                drawn_values = drawn_values.told_of(estimate)
+            else:
+                bare = replace(bare, covariance=bare.covariance + more)
+                drawn_values = DrawnValues.of(model, bare, known)
+                estimate = drawn_values.added_to(bare, observations)
 
         # Judge by held-out data, which show exchanged columns
         modes = [None] * len(check) if others else [how.start for how in preprocessing]
