@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -617,6 +616,10 @@ def recorded(case: Case, fault: str, source: str) -> Log:
     return Log(source, case.time, joints, case.forces, symbols=symbols)
 
 
+HIDDEN = "These logs cannot show"
+"""How the first sentence begins on what a log cannot show."""
+
+
 @dataclass(frozen=True)
 class Answer:
     """What `identify` said: grade, first sentence, causes in order, and true error (%)."""
@@ -630,7 +633,7 @@ class Answer:
 
     def names(self, pattern: str, most: int = 2) -> bool:
         """Say whether words name one of the first causes, or what the log cannot show at all."""
-        hidden = [self.first] * self.first.startswith("These logs cannot show")
+        hidden = [self.first] * self.first.startswith(HIDDEN)
         return any(re.search(pattern, cause) for cause in (*self.causes[:most], *hidden))
 
 
@@ -730,42 +733,102 @@ def print_faultless(name: str, count: int) -> None:
     """Print a line on a plant's logs without a fault."""
     seen = faultless(PLANTS[name](), count)
     share = 100.0 * seen.within / seen.intervals
-    print(f"{name:12} {seen.within} of {seen.intervals} intervals ({share:.1f} %) hold the true ")
-    print(f"value at 2 standard errors; {len(seen.accused)} of {seen.logs} logs accused")
+    print(
+        f"{name}: {seen.within} of {seen.intervals} intervals ({share:.1f} %) hold the true value "
+        f"at 2 standard errors; {len(seen.accused)} of {seen.logs} logs without a fault accused"
+    )
     for line in seen.accused:
         print(f"    {line}")
 
 
+@dataclass(frozen=True)
+class Row:
+    """One plant with a fault: what was said, and the errors after each piece of advice."""
+
+    plant: str
+    fault: str
+    seed: int
+    answer: Answer
+    later: tuple[tuple[str, Answer], ...] = ()
+
+    @property
+    def right(self) -> bool:
+        """Whether the cause is among the first two, or named as invisible; none, without one."""
+        if self.fault == "none":
+            return not self.answer.causes
+        return self.answer.names(FAULTS[self.fault][1])
+
+    @property
+    def misleads(self) -> bool:
+        """Whether it is trusted with an error above 3 % that the first sentence does not name."""
+        trusted = self.answer.grade == "trustworthy" and self.answer.off > WORST
+        return trusted and not self.answer.names(FAULTS.get(self.fault, (None, "$^"))[1], 0)
+
+    @property
+    def worse(self) -> tuple[str, ...]:
+        """The advice that made the error larger, by more than a tenth and noise."""
+        most = 1.1 * self.answer.off + 0.3
+        return tuple(name for name, later in self.later if later.off > most)
+
+    def __str__(self) -> str:
+        """Return the row of a table."""
+        a = self.answer
+        row = f"{self.plant:12} {self.fault:16} {self.seed:2} {a.grade:17} {a.off:7.2f} "
+        row += f"{a.expected:7.2f} {'right' if self.right else 'WRONG'} "
+        after = "; ".join(f"{name}: {later.off:.2f}" for name, later in self.later)
+        said = " || ".join(cause[:100] for cause in a.causes[:2])
+        return f"{row} {said}{' >> ' * bool(after)}{after}"
+
+
+WORST = 3.0
+"""Error up to which a model may be trusted, percent."""
+
+
+def row_of(name: str, fault: str, seed: int, *, follow: bool = True) -> Row:
+    """Return the row of a plant, a fault and a seed."""
+    plant = PLANTS[name]()
+    answer = answered(plant, fault, seed)
+    later = followed(plant, fault, seed, answer) if follow else []
+    return Row(name, fault, seed, answer, tuple(later))
+
+
+def print_summary(rows: list[Row]) -> None:
+    """Print how many causes are right, and all that misleads."""
+    for name in dict.fromkeys(row.plant for row in rows):
+        some = [row for row in rows if row.plant == name and row.fault != "none"]
+        right = sum(row.right for row in some)
+        print(f"{name}: {right} of {len(some)} causes among the first two, or named as invisible")
+    for row in rows:
+        if row.misleads:
+            print(f"trusted, and {row.answer.off:.1f} % off: {row.plant}, {row.fault}, {row.seed}")
+        for name in row.worse:
+            print(f"advice makes it worse: {row.plant}, {row.fault}, {row.seed}: {name}")
+
+
 def main() -> None:
-    """Print a row for each plant, fault and seed."""
+    """Print a row for each plant, fault and seed, and what is said of logs without a fault."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("plants", nargs="*", default=list(PLANTS))
+    parser.add_argument("plants", nargs="*")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--faults", nargs="*", default=["none", *FAULTS])
-    parser.add_argument("--follow", action="store_true")
     parser.add_argument("--faultless", action="store_true")
     parser.add_argument("--quick", action="store_true")
     given = parser.parse_args()
+    names = given.plants or list(PLANTS)
     if given.quick:
-        given.plants, given.faults = ["linear-delta"], ["none", "delay", "sign"]
-    if given.faultless:
-        for name in given.plants or PLANTS:
+        names, given.faults = ["linear-delta"], ["none", "delay", "sign"]
+    if not given.faultless:
+        print("plant        fault         seed grade               off %  told % first causes")
+        rows = []
+        for name in names:
+            for fault in given.faults:
+                for seed in range(1, given.seeds + 1):
+                    rows.append(row_of(name, fault, seed))
+                    print(rows[-1], flush=True)
+        print_summary(rows)
+    if not given.quick:
+        for name in names:
             print_faultless(name, _LOGS[name])
-        return
-    for name in given.plants or PLANTS:
-        plant = PLANTS[name]()
-        for fault in given.faults:
-            for seed in range(1, given.seeds + 1):
-                began = time.perf_counter()
-                answer = answered(plant, fault, seed)
-                right = fault == "none" or answer.names(FAULTS[fault][1])
-                row = f"{name:12} {fault:16} {seed:2} {answer.grade:17} "
-                row += f"off {answer.off:7.2f} told {answer.expected:6.2f} "
-                row += f"{'ok   ' if right else 'WRONG'} {time.perf_counter() - began:4.1f} s | "
-                print(row + " || ".join(cause[:110] for cause in answer.causes[:2]), flush=True)
-                if given.follow:
-                    for advice, later in followed(plant, fault, seed, answer):
-                        print(f"    {advice}: off {later.off:.2f}, {later.grade}", flush=True)
 
 
 if __name__ == "__main__":
