@@ -576,7 +576,7 @@ FAULTS: dict[str, tuple[Callable[[Case], None], str]] = {
     "length": (length_off, "geometry|[Pp]oints|[Ll]engths"),
     "passive friction": (passive, "[Pp]assive"),
     "load friction": (load_friction, "with the load"),
-    "flexible": (flexible, "drives give|elastic|flexib"),
+    "flexible": (flexible, "drives (that )?give|flexib"),
     "payload": (payload, "payload|changes during"),
     "quantised": (quantised, "quanti|steps"),
 }

@@ -234,15 +234,21 @@ def check_motion(
     )
 
 
-def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:
-    """Refuse a log whose columns, exchanged or with other signs, would be explained far better."""
+def check_columns(
+    model: Model, one: Recording, preprocessing: Preprocessing, *, decisive: bool = False
+) -> None:
+    """Refuse a log whose columns, exchanged or with other signs, would be explained far better.
+
+    With `decisive` only where the error falls so: not for values that are no machine's, which
+    another fault of the log may have made.
+    """
     head = one.head().part(0, _LOOK)
     if model.terms.payload and (head.payload is None or not head.payload.any()):
         model = identification_model(
             model.robot, replace(model.terms, payload=False), base=model.base
         )
     fault = column_fault(model, head, preprocessing)
-    if fault is None:
+    if fault is None or (decisive and not fault.after * DECISIVE < fault.before):
         return
     if fault.after < 1e-6 * fault.before:
         why = ": mended so, the error of the fit vanishes"

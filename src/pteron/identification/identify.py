@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from pteron.errors import DataError, ModelError, PteronError
+from pteron.identification.conditional_values import conditional_shift
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
 from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError
@@ -262,13 +263,17 @@ def _identified(
             for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
         ]
         trusted = verdict_of(held, repeats=not others).grade == "trustworthy"
+        heads = [one.head() for one in fit]
+        lost = [lost_share(one) for one in raw]
+        of_log = log_faults(heads, preprocessing, lost, fits=trusted)
+        distorted = any(one.distorts for one in of_log)
         with findings_told(whole):
             if not trusted or unphysical(model, observations, estimate):
                 reflected = np.array([j * r**2 for j, r in rotors or [(0.0, 1.0)] * n])
                 assumption = contradicted(robot, fit[0].head(), preprocessing[0], reflected)
                 if assumption is not None:
                     raise fit[0].log.fault("contradicted", assumption.message.rstrip("."))
-                check_columns(model, fit[0], preprocessing[0])
+                check_columns(model, fit[0], preprocessing[0], decisive=distorted)
             check_motion(model, bare, preprocessing, fit[0])
         report("Looking for faults", 0, 0)
         faults = isolate_faults(
@@ -278,8 +283,6 @@ def _identified(
             break
         # A delay changes values: fit again with it.
         late = True
-    heads = [one.head() for one in fit]
-    of_log = log_faults(heads, preprocessing, [lost_share(one) for one in raw], fits=trusted)
     if late and given is None:
         of_log = (*of_log, of_delay(found.delay, found.delay_deviation, 1.0 / heads[0].rate))
     fitted = tuple(
@@ -313,7 +316,7 @@ def _identified(
     if essential.dropped:
         advice[:0] = _more_motion(model, list(essential.dropped))
     if drawn_values.names:
-        clean = trusted and not faults.faults
+        clean = trusted and not faults.faults and not distorted
         advice[:0] = _what_shows_more(base, drawn_values.names, clean=clean)
     return Identification(
         robot=robot,
@@ -492,8 +495,8 @@ def _real_bodies(
         if bounds is not None:
             raise
         return None, float("nan"), float("nan"), (f"No model of real bodies: {error}",)
-    shift = np.zeros(len(estimate.values))
-    shift[:rank] = found.base_values - values
+    # Friction and offsets follow, as in the model file.
+    shift = conditional_shift(estimate.covariance, range(rank), found.base_values - values)
     moved = np.sqrt(((observations.matrix @ shift) ** 2).mean())
     left = np.sqrt((estimate.residuals**2).mean())
     size, tiny = np.sqrt((observations.forces**2).mean()), np.finfo(float).tiny

@@ -206,9 +206,9 @@ class IsolatedFault:
         return f"{self._sentence()}{self._others()}; {_REMEDY[self.fault]}."
 
     @property
-    def beside_log_fault(self) -> str:
-        """The fault without a remedy: a fault of the log may be all there is."""
-        return f"{self._sentence()}, or the log's own fault looks so: mend that first."
+    def beside_another(self) -> str:
+        """The fault without a remedy: another one, which is mended first, may be all there is."""
+        return f"{self._sentence()}{self._others()}, or what is named before looks so: mend that."
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""

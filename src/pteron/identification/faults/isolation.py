@@ -112,7 +112,11 @@ class FaultIsolation:
         distorted = any(one.distorts for one in self.log)
         of_file = [] if self.factor == 1.0 else [_OF_FACTOR.format(factor=self.factor)]
         ranked = sorted(self.faults, key=lambda one: ORDER.index(one.fault))
-        machine = [one.beside_log_fault if distorted else one.message for one in ranked]
+        # What comes first may look like what comes later: only the first gets a remedy.
+        machine = [
+            one.message if k == 0 and not distorted else one.beside_another
+            for k, one in enumerate(ranked)
+        ]
         return (*(one.message for one in self.log), *of_file, *machine)
 
     @property

@@ -15,20 +15,23 @@ from pteron.identification.logs.log import Finding, Log, gaps, rows_of, stretche
 
 _LONGEST = 3
 """Samples, at most, that are bridged: a gap of four steps is short for any motion that the sampling
-resolves (ten samples a period of its fastest part), and splines do not swing in it."""
+resolves (ten samples a period of its fastest part), and polynomials do not swing in it."""
 
 _OFTEN = 1e-3
 """Gaps a row from which they are bridged: each costs a filter's edges, some hundred rows, so that
 fewer take less than a tenth of the log."""
 
-_AROUND = 6
-"""Rows of a stretch, at least, that a spline of degree 5 goes through."""
+_SIDES = (8, 5, 3)
+"""Rows on each side of a gap that a polynomial is fitted to: those that predict known rows best."""
+
+_AROUND = 40
+"""Rows of a stretch, at least, that is filled: shorter ones are left to the filters' edges."""
 
 
 def bridged(log: Log) -> Log:
-    """Return a log with short gaps filled by splines and a finding; unchanged if they are rare.
+    """Return a log with short gaps filled and a finding; unchanged if they are rare.
 
-    Positions get a spline of degree 5, forces one of degree 3, which passes on less noise.
+    Positions get polynomials of degree 5, forces of degree 3, which passes on less noise.
     """
     if log.rows < 2:
         return log
@@ -50,7 +53,7 @@ def bridged(log: Log) -> Log:
     count = int(missing[short].sum())
     message = (
         f"{log.source}: {count} samples that are missing ({100.0 * count / (log.rows + count):.2g} "
-        f"%), at most {int(missing[short].max())} one after the other, are bridged by splines"
+        f"%), at most {int(missing[short].max())} one after the other, are bridged by polynomials"
     )
     names = ("time", "joints", "forces", "pose", "payload", "rows_in_file")
     joined = {
@@ -73,8 +76,8 @@ def _filled(log: Log, missing: np.ndarray) -> Log:
     rows = rows_of(log)
 
     def between(values: np.ndarray, degree: int) -> np.ndarray:
-        spline = scipy.interpolate.make_interp_spline(log.time, values, k=degree)
-        return np.asarray(np.concatenate([values, spline(instants)])[order])
+        filled = _fitted(log.time, values, places, instants, degree)
+        return np.asarray(np.concatenate([values, filled])[order])
 
     return replace(
         log,
@@ -85,3 +88,43 @@ def _filled(log: Log, missing: np.ndarray) -> Log:
         payload=None if log.payload is None else np.r_[log.payload, log.payload[places]][order],
         rows_in_file=np.concatenate([rows, rows[places]])[order],
     )
+
+
+def _fitted(
+    time: np.ndarray, values: np.ndarray, places: np.ndarray, instants: np.ndarray, degree: int
+) -> np.ndarray:
+    """Return values (K, n) at instants behind rows `places` (K,), of polynomials fitted around.
+
+    Through more rows than they have coefficients: an interpolated noise is no white one, and
+    filters and their cut-offs are made for white noise.
+    """
+    step = float(np.median(np.diff(time)))
+    side = _side(time / step, values, degree)
+    found = np.empty((len(places), values.shape[1]))
+    for k, (row, at) in enumerate(zip(places.tolist(), instants.tolist(), strict=True)):
+        start = min(max(row + 1 - side, 0), max(len(time) - 2 * side, 0))
+        rows = slice(start, start + 2 * side)
+        powers = np.vander((time[rows] - at) / step, degree + 1, increasing=True)
+        found[k] = np.linalg.lstsq(powers, values[rows], rcond=None)[0][0]
+    return found
+
+
+def _side(ticks: np.ndarray, values: np.ndarray, degree: int) -> int:
+    """Return how many rows on each side predict a row best, by polynomials of a degree.
+
+    Many rows make less of the noise, few follow a motion that is fast for its sampling.
+    """
+    errors = {}
+    for side in _SIDES:
+        offsets = np.r_[-side:0, 1 : side + 1].astype(float)
+        weights = np.linalg.pinv(np.vander(offsets, degree + 1, increasing=True))[0]
+        kernel = np.insert(weights, side, 0.0)
+        predicted = scipy.ndimage.correlate1d(values, kernel, axis=0)[side:-side]
+        whole = ticks[2 * side :] - ticks[: -2 * side] < 2 * side + 0.5
+        if whole.any():
+            errors[side] = np.median(np.abs(predicted - values[side:-side])[whole], axis=0)
+    if not errors:
+        return _SIDES[-1]
+    least = np.min([*errors.values()], axis=0)
+    tiny = np.finfo(float).tiny
+    return min(errors, key=lambda side: float((errors[side] / np.maximum(least, tiny)).max()))
