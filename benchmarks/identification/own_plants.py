@@ -45,6 +45,10 @@ _COMPLEX = 1e-30
 _STEP = 1e-3
 
 
+Place = Callable[[Any], tuple[Any, Any, Any]]
+"""Returns joints, points and directions of poses, real or complex."""
+
+
 @dataclass(frozen=True)
 class Plant:
     """A machine as it was built: its drawn twin, the masses, and positions by its pose.
@@ -73,7 +77,7 @@ class Plant:
     drawn: pteron.Manipulator
     home: Array
     size: Array
-    place: Callable[[Array], tuple[Array, Array, Array]]
+    place: Place
     masses: Array
     gravity: Array
     rotor: float
@@ -96,16 +100,14 @@ class Moved:
     load: Array = field(repr=False)
 
 
-def _slopes(place: Callable[[Array], tuple[Array, Array, Array]], x: Array) -> list[Array]:
+def _slopes(place: Place, x: Array) -> list[Array]:
     """Return slopes of joints (T, n, m), points (T, k, 3, m) and directions (T, r, 3, m)."""
     m = x.shape[1]
     changed = [place(x + 1j * _COMPLEX * np.eye(m)[k]) for k in range(m)]
     return [np.stack([c[k].imag / _COMPLEX for c in changed], axis=-1) for k in range(3)]
 
 
-def _seconds(
-    place: Callable[[Array], tuple[Array, Array, Array]], x: Array, v: Array, a: Array
-) -> list[Array]:
+def _seconds(place: Place, x: Array, v: Array, a: Array) -> list[Array]:
     """Return rates and accelerations of joints and points along a motion: (q', q'', p'')."""
 
     def along(s: float) -> list[Array]:
@@ -146,7 +148,7 @@ def forces_along(
     plant: Plant, time: Array, x: Array, v: Array, a: Array, *, payload: float = 0.0
 ) -> Moved:
     """Return the plant's motion along poses x with rates v and accelerations a, (T, m)."""
-    joints, _, _ = plant.place(x + 0j)
+    joints, _, _ = plant.place(np.asarray(x + 0j))
     jacobian, of_points, of_rods = _slopes(plant.place, x)
     rates, accelerations, seconds, turning = _seconds(plant.place, x, v, a)
     masses = plant.masses.copy()
@@ -399,7 +401,7 @@ class Case:
     @property
     def home(self) -> Array:
         """The joints (n,) where the machine is homed."""
-        return np.asarray(self.plant.place(self.plant.home[None] + 0j)[0].real[0])
+        return np.asarray(self.plant.place(np.asarray(self.plant.home[None] + 0j))[0].real[0])
 
     def seen_at(self, instants: Array) -> None:
         """Take positions at other instants than the stamps say."""

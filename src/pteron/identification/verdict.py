@@ -125,8 +125,7 @@ def verdict_of(
     if faults is not None:
         # Beside the drawing a common factor shows, if only to some per cent.
         hidden = tuple(one for one in faults.hidden if one != "gain" or factor == 1.0)
-        about = {"log": tuple(log), "factor": factor, "hidden": hidden}
-        faults = replace(faults, **about)
+        faults = replace(faults, log=tuple(log), factor=factor, hidden=hidden)
     if any(one.distorts for one in log):
         found.lower("usable with care")
     if factor != 1.0:

@@ -195,6 +195,7 @@ def _turned_gravity(
         for sign in (-1.0, 1.0):
             turned = np.zeros(3)
             turned[axis] = sign * size
+            x, y, z = turned.tolist()
             if np.abs(turned - g).max() < 1e-3 * size:
                 continue
             name = f"{'-' if sign < 0.0 else ''}{'xyz'[axis]}"
@@ -202,7 +203,7 @@ def _turned_gravity(
                 f"Gravity is along {name}, not as in the machine's file",
                 f"write gravity = [{', '.join(f'{v:g}' for v in turned)}] into the file",
             )
-            yield "gravity", message, replace(robot, gravity=tuple(turned)), s
+            yield "gravity", message, replace(robot, gravity=(x, y, z)), s
 
 
 def _other_modes(

@@ -288,8 +288,8 @@ def _isolated(
         left_open.insert(0, "gain")
     shown = {one.fault for one in faults}
     hidden = tuple(fault for fault in left_open if fault not in shown)
-    late = any(one.family is DELAY for one in found)
-    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, late=late)
+    delayed = any(one.family is DELAY for one in found)
+    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, late=delayed)
 
 
 def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:

@@ -7,11 +7,14 @@ where they come every few rows nothing would be left.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
 from pteron.identification.logs.log import Finding, Log, gaps, rows_of, stretches
+from pteron.kernels import Array
 
 _LONGEST = 3
 """Samples, at most, that are bridged: a gap of four steps is short for any motion that the sampling
@@ -56,7 +59,7 @@ def bridged(log: Log) -> Log:
         f"%), at most {int(missing[short].max())} one after the other, are bridged by polynomials"
     )
     names = ("time", "joints", "forces", "pose", "payload", "rows_in_file")
-    joined = {
+    joined: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in names
         if getattr(parts[0], name) is not None
@@ -65,7 +68,7 @@ def bridged(log: Log) -> Log:
     return replace(log, **joined, findings=(*log.findings, finding), step=step)
 
 
-def _filled(log: Log, missing: np.ndarray) -> Log:
+def _filled(log: Log, missing: NDArray[np.int64]) -> Log:
     """Return a stretch with `missing` (T - 1,) samples put in between its rows."""
     places = np.repeat(np.arange(log.rows - 1), missing)
     nth = np.concatenate([np.arange(1, k + 1) for k in missing[missing > 0]] or [np.zeros(0)])
@@ -75,7 +78,7 @@ def _filled(log: Log, missing: np.ndarray) -> Log:
     order = np.argsort(time, kind="stable")
     rows = rows_of(log)
 
-    def between(values: np.ndarray, degree: int) -> np.ndarray:
+    def between(values: Array, degree: int) -> Array:
         filled = _fitted(log.time, values, places, instants, degree)
         return np.asarray(np.concatenate([values, filled])[order])
 
@@ -91,8 +94,8 @@ def _filled(log: Log, missing: np.ndarray) -> Log:
 
 
 def _fitted(
-    time: np.ndarray, values: np.ndarray, places: np.ndarray, instants: np.ndarray, degree: int
-) -> np.ndarray:
+    time: Array, values: Array, places: NDArray[np.int64], instants: Array, degree: int
+) -> Array:
     """Return values (K, n) at instants behind rows `places` (K,), of polynomials fitted around.
 
     Through more rows than they have coefficients: an interpolated noise is no white one, and
@@ -109,7 +112,7 @@ def _fitted(
     return found
 
 
-def _side(ticks: np.ndarray, values: np.ndarray, degree: int) -> int:
+def _side(ticks: Array, values: Array, degree: int) -> int:
     """Return how many rows on each side predict a row best, by polynomials of a degree.
 
     Many rows make less of the noise, few follow a motion that is fast for its sampling.
