@@ -489,7 +489,7 @@ def _with_leg(case: Case, **changes: object) -> None:
 def wrong_elbow(case: Case) -> None:
     """Give the file the other elbow of one leg; rams, which have none, two legs exchanged."""
     leg = case.drawn.legs[case.actuator]
-    if hasattr(leg, "elbow"):
+    if len(leg.branches) > 1:
         _with_leg(case, elbow=-leg.elbow)
         return
     legs = list(case.drawn.legs)
