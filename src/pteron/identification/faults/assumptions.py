@@ -25,7 +25,7 @@ from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
-from pteron.manipulator.variants import with_elbows
+from pteron.manipulator.variants import working_modes
 
 _LOOK = 12_000
 """Rows of the log, at most, that these samples are from."""
@@ -209,18 +209,17 @@ def _turned_gravity(
 def _other_modes(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["mode"], tuple[str, str], Manipulator, _Samples]]:
-    sides_of = [leg.branches for leg in robot.legs]
-    bent = [i for i, branches in enumerate(sides_of) if len(branches) > 1]
-    sides = [[i] for i in bent] + [bent] * (len(bent) > 1)
-    count = len(bent)
-    for bits in range(1, 1 << count if count <= 4 else 1):
-        chosen = [bent[k] for k in range(count) if bits >> k & 1]
-        if chosen not in sides:
-            sides.append(chosen)
-    for chosen in sides[:_MODES]:
-        if not chosen:
-            continue
-        signs = [-leg.elbow if i in chosen else leg.elbow for i, leg in enumerate(robot.legs)]
+    count = len(robot.legs)
+    modes: list[tuple[list[int], Manipulator]] = []
+    for mode in working_modes(robot):
+        pairs = zip(mode.legs, robot.legs, strict=True)
+        changed = [i for i, (other, drawn) in enumerate(pairs) if other != drawn]
+        if changed:
+            modes.append((changed, mode))
+    # One leg is most often wrong, or all of them.
+    most = max((len(changed) for changed, _ in modes), default=count)
+    modes.sort(key=lambda pair: (len(pair[0]) not in (1, most), len(pair[0]), pair[0]))
+    for chosen, other in modes[:_MODES]:
         names = ", ".join(str(i + 1) for i in chosen)
         plural = "s" if len(chosen) > 1 else ""
         message = (
@@ -228,7 +227,7 @@ def _other_modes(
             f"{'are' if plural else 'is'} on the other side",
             f"change the sign of elbow in leg{plural} {names} of the file",
         )
-        yield "mode", message, with_elbows(robot, signs), s
+        yield "mode", message, other, s
 
 
 def _left(robot: Manipulator, s: _Samples) -> float:
