@@ -22,6 +22,7 @@ from pteron.identification.estimators import (
 )
 from pteron.identification.faults import delay_of, isolate_faults
 from pteron.identification.faults.assumptions import contradicted, exchangeable_legs
+from pteron.identification.faults.fault import is_half, of_held_forces
 from pteron.identification.faults.log_faults import log_faults, lost_share, of_delay
 from pteron.identification.fitting import (
     METHODS,
@@ -283,8 +284,10 @@ def _identified(
             break
         # A delay changes values: fit again with it.
         late = True
-    if late and given is None:
-        of_log = (*of_log, of_delay(found.delay, found.delay_deviation, 1.0 / heads[0].rate))
+    step = 1.0 / heads[0].rate
+    half = is_half(found.delay, found.delay_deviation, step)
+    if late and given is None and not half:
+        of_log = (*of_log, of_delay(found.delay, found.delay_deviation))
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how)
         for one, how in zip(_told(fit, report, "Predicting"), preprocessing, strict=True)
@@ -334,7 +337,7 @@ def _identified(
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=(
             *_notes(model, estimate, reflected_inertia(rotors)),
-            *_unknowns_notes(found, model, default=late and given is None),
+            *_unknowns_notes(found, model, default=late and given is None, half=half),
             *missing,
         ),
         rotors=rotors,
@@ -440,13 +443,16 @@ def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
     return advice
 
 
-def _unknowns_notes(found: Unknowns, model: Model, *, default: bool) -> list[str]:
+def _unknowns_notes(found: Unknowns, model: Model, *, default: bool, half: bool) -> list[str]:
     """Return notes on the delay and the speeds of Stribeck's friction that were found.
 
-    `default` says that the delay was corrected by default, which the faults of the log tell.
+    `default` says that the delay was corrected by default, which the faults of the log tell but for
+    `half` a sample: that is no fault.
     """
     notes = []
-    if found.delay_deviation and not default:
+    if default and half:
+        notes.append(f"{of_held_forces(found.delay)}; that is taken out (--delay 0 leaves it in).")
+    elif found.delay_deviation and not default:
         notes.append(
             f"The forces are {1e3 * found.delay:.3g} ms (+- {2e3 * found.delay_deviation:.1g}) "
             "late for the positions; that is taken out."

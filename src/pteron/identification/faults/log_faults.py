@@ -12,7 +12,6 @@ from typing import Literal
 
 import numpy as np
 
-from pteron.identification.faults.fault import is_half, of_held_forces
 from pteron.identification.logs import Log
 from pteron.identification.logs.log import gaps
 from pteron.identification.logs.recorded import at_limits
@@ -151,16 +150,12 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
     )
 
 
-def of_delay(delay: float, deviation: float, step: float) -> LogFault:
-    """Return the fault of forces that are so late, s, in a log of this step; it is taken out."""
-    if is_half(delay, deviation, step):
-        said = of_held_forces(delay)
-    else:
-        late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
-        said = (
-            f"The {late} are {1e3 * abs(delay):.3g} ms (+- {2e3 * deviation:.1g}) late for the "
-            f"{early}"
-        )
+def of_delay(delay: float, deviation: float) -> LogFault:
+    """Return the fault of forces that are so late, s; it is taken out."""
+    late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
+    said = (
+        f"The {late} are {1e3 * abs(delay):.3g} ms (+- {2e3 * deviation:.1g}) late for the {early}"
+    )
     return LogFault("delay", f"{said}; that is taken out (--delay 0 leaves it in).", delay, False)
 
 
