@@ -111,7 +111,9 @@ def log_faults(
             break
     for log, how in zip(logs, preprocessing, strict=True):
         said = at_limits(log) or (() if fits else _plateaus(log, how.force_noise))
-        found += [LogFault("saturation", message, float("nan"), True) for message in said]
+        if said:
+            message = _of_all(said)
+            found.append(LogFault("saturation", message, float("nan"), True))
     for log in logs:
         steps = force_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
         if (coarse := float(steps.max(initial=0.0))) > _COARSE:
@@ -123,6 +125,14 @@ def log_faults(
             found.append(LogFault("steps", f"{message}.", coarse, False))
             break
     return tuple(found)
+
+
+def _of_all(sentences: Sequence[str]) -> str:
+    """Return the first of sentences on forces at a limit, with the names of the other forces."""
+    first = sentences[0].rstrip(".")
+    names = dict.fromkeys(one.partition(" ")[0] for one in sentences[1:])
+    others = ", ".join(name for name in names if not first.startswith(f"{name} "))
+    return f"{first}; the same of {others}." if others else f"{first}."
 
 
 def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
