@@ -57,9 +57,14 @@ def moved(robot, built, seed, rows=1500):
     """Return the log, without noise, of a motion, and the motion's states."""
     size = 0.05 * float(np.mean([leg.size for leg in robot.legs if leg.size] or [1.0]))
     time = np.arange(rows) / 500.0
-    shape = {"seed": seed, "period": 3.0, "harmonics": 5, "size": size, "turn": 0.15}
-    states = motion(robot, time, **shape)
-    joints = FullMotion.of_platform(robot, *states).joints
+    low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
+    for share in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02):
+        # Strokes are long or short: the Rubin hexapods' is 3 % of their rams.
+        shape = {"period": 3.0, "harmonics": 5, "size": share * size, "turn": 0.15 * share}
+        states = motion(robot, time, seed=seed, **shape)
+        joints = FullMotion.of_platform(robot, *states).joints
+        if ((joints > low) & (joints < high)).all():
+            break
     forces = pteron.drive_forces(built, *states)
     symbols = tuple(leg.joint for leg in robot.legs)
     return Log(f"motion {seed}", time, joints, forces, symbols=symbols), states
