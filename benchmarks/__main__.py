@@ -51,6 +51,7 @@ _SCRIPTS = {
     "Calibrations with faults": "calibration_faults.py",
     "From a log to a running machine": "identification/chain.py",
     "An owner's way": "identification/owner.py",
+    "Plants of their own equations, twenty faults each": "identification/own_plants.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")
 

@@ -557,9 +557,23 @@ def test_an_interrupt_during_the_program_ends_it_at_once():
 @CLIENTS
 def test_time_cuts_the_search_and_a_result_is_there_all_the_same():
     found = optimal_excitation(CATALOG["quadrupteron"], seconds=0.5, draws=50, workers=1)
-    assert found.seconds < 10.0
-    assert 1 <= found.draws <= 50
+    # A choice of ten motions at least; one was tried on a machine that was busy.
+    assert 10 <= found.draws <= 50
     assert found.margins.kept
+    assert f"{found.draws} random motions drawn" in found.progress_text
+    assert f"condition number {found.conditioning.scaled:.3g}" in found.progress_text
+
+
+def test_a_motion_that_would_not_identify_the_machine_is_said_to():
+    """With one harmonic some parameters all but depend on others."""
+    found = optimal_excitation(
+        CATALOG["tripteron"], harmonics=1, starts=1, draws=10, workers=1, seconds=1.0
+    )
+    bad = replace(found, conditioning=replace(found.conditioning, scaled=6165.0))
+    assert "leaves some base parameters open" in bad.progress_text
+    assert "--shared" in bad.progress_text
+    good = replace(found, conditioning=replace(found.conditioning, scaled=50.0))
+    assert "leaves" not in good.progress_text
 
 
 @pytest.mark.parametrize(

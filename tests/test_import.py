@@ -207,6 +207,7 @@ ALLOWED = {
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
     ("export/printers/", "an elbow"): "where Klipper has it, in the message that refuses",
     ("export/printers/", "data of one kind"): "Klipper's cranks count from the level",
+    ("identification/faults/assumptions.py", "an elbow"): "the working mode, in a message",
     ("report/", "an elbow"): "the working mode",
     ("viewer/", "an elbow"): "the working mode",
     ("workspace/mode_places.py", "an elbow"): "the working modes",

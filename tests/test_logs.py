@@ -374,6 +374,16 @@ def test_declared_columns_units_and_gains_are_taken(tmp_path):
     assert back.findings == ()
 
 
+def test_one_description_serves_all_logs_of_a_folder(tmp_path):
+    """Logs that have one of their own keep it; a machine's file is none."""
+    write_description(Description(column_force_unit="N"), tmp_path / "logs.toml")
+    pteron.save(pteron.load("tripteron"), tmp_path / "machine.toml")
+    write_description(Description(), tmp_path / "own.toml")
+    for name, expected in (("a", "logs"), ("b", "logs"), ("own", "own"), ("machine", "logs")):
+        found = find_description(tmp_path / f"{name}.csv")
+        assert found == tmp_path / f"{expected}.toml"
+
+
 def test_a_description_is_written_and_read_back(tmp_path):
     path = tmp_path / "motion.toml"
     path.write_text(DECLARED)

@@ -409,18 +409,21 @@ def judged(name: str, fault: str, seed: int) -> Said:
     extent = Extent(pose, np.abs(rates).max(axis=0), np.abs(seconds).max(axis=0))
     cycle = ReferenceCycle.within(case.motion.robot, extent, size=_SIZE)
     assert cycle is not None
-    assert found.machine is not None
     s = cycle.states
     joints = s.joints, s.joint_rates, s.joint_accelerations
     true = States.of_joints(case.robot, joints, s.time, home_pose(case.robot))
     forces = pteron.drive_forces(case.robot, true.pose, true.velocity, true.acceleration)
-    told = pteron.drive_forces(found.machine, s.pose, s.velocity, s.acceleration)
-    named: tuple[str, ...] = tuple(one.fault for one in found.fault_isolation.faults if one.matters)
-    if any("stays at its" in reason for reason in found.verdict.reasons):
-        named = (*named, "saturation")
+    off = np.nan
+    if found.machine is not None:
+        told = pteron.drive_forces(found.machine, s.pose, s.velocity, s.acceleration)
+        off = float(cycle.share(told - forces, forces).max())
+    shown = found.fault_isolation
+    named: tuple[str, ...] = tuple(one.fault for one in shown.log)
+    named += tuple(one.fault for one in shown.faults if one.matters)
+    if shown.factor != 1.0:
+        named = ("factor", *named)
     if any((one.outliers > 0.0).any() for one in found.held_out):
         named = (*named, "outliers")
-    off = float(cycle.share(told - forces, forces).max())
     return Said(found.verdict.grade, named, off, found.fault_isolation.hidden)
 
 

@@ -116,7 +116,7 @@ def excite(
     --criterion: What is made small.
     --starts: Random motions improved.
     --draws: Random motions drawn.
-    --seconds: Time for the search.
+    --seconds: Time for the search; three times as long where it would not identify the machine.
     --seed: Of the random motions.
     --workers: Processes at a time. [default: one a core, up to 4]
 
@@ -201,6 +201,7 @@ def excite(
     data = {**found.as_dict(), **more, "files": [str(path) for path in files]}
     told: list[str | Table] = [
         _quality(found),
+        found.progress_text,
         _margins(left),
         *_kept_off(machine, limits, left),
         f"From rest to rest in {led.duration:g} s: periodic from {led.start:g} to {led.end:g} s, "

@@ -86,13 +86,13 @@ def identify(
     --robot ROBOT: The machine as it is drawn.
     --out DIR: The folder to write it to.
     --held-out LOG: A log to judge by; once for each. By default the last 30 % of every log.
-    --description TOML: Description of all logs; by default that beside each.
+    --description TOML: Description of all logs. [default: the one beside each, or logs.toml]
     --estimator: How the equations are solved.
     --without TERMS: Leave out: coulomb,viscous,offset.
     --joints: Viscous friction in the passive joints.
     --stribeck SPEED,...|auto: Friction falls with this speed, m/s or rad/s.
-    --delay S|auto: How late forces are for positions, s; auto: find it. [default: 0, or the half
-        sample of forces that are held]
+    --delay S|auto: How late forces are for positions, s; by default it is found where the
+        forces show one. 0 leaves it in.
     --rotors: With the inertia of the motors.
     --payload: A payload too: logs with it and without, column payload 1 and 0.
     --shared: All legs share one set of inertial parameters.

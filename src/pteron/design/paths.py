@@ -100,7 +100,7 @@ def _in_leg(
         close = get_close_matches(key, known, n=1)
         guess = f'; did you mean "{close[0]}"?' if close else ""
         raise ModelError(
-            f"{shown(path)}: leg {i}, a {leg.type}, has no number {key}; it has "
+            f"{shown(path)}: leg {i}, a {leg.type}, has no number {shown(key)}; it has "
             f"{', '.join(known)}{guess}"
         )
     role = leg.every_key()[key].role

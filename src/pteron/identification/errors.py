@@ -9,6 +9,7 @@ from pteron.errors import DataError
 Reason = Literal[
     "columns",
     "constant",
+    "contradicted",
     "currents",
     "gap",
     "no payload",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 
 import numpy as np
 
@@ -34,6 +34,9 @@ _ROWS = 4000
 
 _LOOKED_INTO = 12
 """Faults that fit alike, those of fewest changes, whose fits are tested for physical values."""
+
+_ALL_ORDERS = 4
+"""Joints of which all orders are tried: 23 others."""
 
 _TOLD = 3
 """Equivalent faults that a message lists."""
@@ -202,15 +205,27 @@ def _moved_joints(
     faults = [
         replace(none, joint_signs=tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)
     ]
-    # Few exchanges first: of two orders that explain equally well, the simpler one is right.
-    orders = sorted(permutations(none.order), key=_exchanges)
-    faults += [replace(none, joint_order=order) for order in orders[1:]]
+    faults += [replace(none, joint_order=order) for order in _orders(n)]
     for fault in faults:
         joints = log.joints[:, list(fault.joint_order)] * np.array(fault.joint_signs)
         try:
             yield fault, observations_of(model, replace(log, joints=joints), how)
         except DataError:
             continue  # no poses in this order
+
+
+def _orders(n: int) -> list[tuple[int, ...]]:
+    """Return the orders of n joints that are tried, those of fewest exchanges first.
+
+    Of two orders that explain equally well, the simpler one is right. Of many joints not all 719 or
+    more are tried, each with poses of its own, but exchanges of two, shifts and the reverse.
+    """
+    usual = tuple(range(n))
+    if n <= _ALL_ORDERS:
+        return sorted(permutations(usual), key=_exchanges)[1:]
+    shifts = [usual[k:] + usual[:k] for k in range(1, n)]
+    pairs = [tuple({i: j, j: i}.get(k, k) for k in usual) for i, j in combinations(usual, 2)]
+    return [*pairs, *shifts, usual[::-1]]
 
 
 def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[ColumnFault]:

@@ -28,7 +28,7 @@ from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cen
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model, identification_model
 from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
-from pteron.identification.plausibility import left_over, unseen
+from pteron.identification.plausibility import left_over, unseen_shares
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.manipulator import Manipulator
@@ -216,14 +216,14 @@ def findings_told(whole: Sequence[Recording]) -> Iterator[None]:
 
 def check_motion(
     model: Model, estimate: Estimate, preprocessing: Sequence[Preprocessing], first: Recording
-) -> tuple[str, ...]:
-    """Return the base parameters that a motion leaves unseen; refuse one that leaves most so."""
-    hidden, too_many = unseen(model, estimate.deviations)
-    if not too_many:
-        return hidden
+) -> None:
+    """Refuse a log whose forces say nothing of the machine; what motion leaves open is no fault."""
+    hidden, nothing = unseen_shares(model, estimate.deviations)
+    if not nothing:
+        return
+    cause = left_over(estimate, preprocessing)
     rank = model.base.rank
     names = ", ".join(hidden) if len(hidden) < rank else "all"
-    cause = left_over(estimate, preprocessing)
     raise first.log.fault(
         "too little motion",
         f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
@@ -234,15 +234,21 @@ def check_motion(
     )
 
 
-def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:
-    """Refuse a log whose columns, exchanged or with other signs, would be explained far better."""
+def check_columns(
+    model: Model, one: Recording, preprocessing: Preprocessing, *, decisive: bool = False
+) -> None:
+    """Refuse a log whose columns, exchanged or with other signs, would be explained far better.
+
+    With `decisive` only where the error falls so: not for values that are no machine's, which
+    another fault of the log may have made.
+    """
     head = one.head().part(0, _LOOK)
     if model.terms.payload and (head.payload is None or not head.payload.any()):
         model = identification_model(
             model.robot, replace(model.terms, payload=False), base=model.base
         )
     fault = column_fault(model, head, preprocessing)
-    if fault is None:
+    if fault is None or (decisive and not fault.after * DECISIVE < fault.before):
         return
     if fault.after < 1e-6 * fault.before:
         why = ": mended so, the error of the fit vanishes"

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from pteron.errors import ModelError
+from pteron.errors import DataError, ModelError, PteronError
+from pteron.identification.conditional_values import conditional_shift
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
+from pteron.identification.drawn_values import DrawnValues
+from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
     Estimate,
@@ -17,7 +21,9 @@ from pteron.identification.estimators import (
     weighted,
 )
 from pteron.identification.faults import delay_of, isolate_faults
-from pteron.identification.faults.fault import of_held_forces
+from pteron.identification.faults.assumptions import contradicted, exchangeable_legs
+from pteron.identification.faults.fault import is_half, of_held_forces
+from pteron.identification.faults.log_faults import log_faults, lost_share, of_delay
 from pteron.identification.fitting import (
     METHODS,
     balanced,
@@ -32,24 +38,25 @@ from pteron.identification.fitting import (
     preprocessing_for,
 )
 from pteron.identification.logs import Log, LogFile
-from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations
 from pteron.identification.plausibility import (
+    common_factor,
     friction_below_zero,
+    left_over,
     plausibility_warnings,
     unphysical,
 )
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
-from pteron.identification.result import Identification
-from pteron.identification.signals import Processing
+from pteron.identification.result import Identification, reflected_inertia
+from pteron.identification.signals import Processing, preprocessing_of
 from pteron.identification.unknowns import Unknowns, searched_speeds, settled
-from pteron.identification.verdict import judged, verdict_of, with_bodies
+from pteron.identification.verdict import judged, verdict_of, with_bodies, with_hidden_first
 from pteron.kernels import Array
 from pteron.legs import Drive
-from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.reduction import base_parameters
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data, parameters
+from pteron.reduction import BaseParameters, base_parameters
 from pteron.reduction.sharing import Sharing
 
 Logs = Log | LogFile | Sequence[Log | LogFile]
@@ -58,6 +65,15 @@ _SLOWLY = (
     "It shows where joints move slowly: pteron excite ROBOT --stribeck --out motion.csv writes "
     "motion-slow.csv too; record it, and give its log with the others."
 )
+
+_OF_ASSUMPTIONS = ("no pose", "singular", "too little motion")
+"""Reasons for which a log is refused that a wrong assumption of the file may have."""
+
+_SINGULAR = 1e-12
+"""Least eigenvalue of a correlation matrix, over its greatest: below it rounding makes them."""
+
+_ALIKE = 1e-3
+"""Difference of the legs' parameters, relative, that is rounding of a drawing's numbers."""
 
 Stage = Callable[[str, int, int], None]
 """A callback of progress: it gets the step, the number of its rows done, and of all its rows."""
@@ -117,6 +133,63 @@ def identify(
         If the estimator is not known, or the bounds contradict each other.
     """
     robot = as_manipulator(robot)
+    try:
+        return _identified(
+            robot, logs, held_out, terms, shared, estimator, processing, cad, bounds, progress
+        )
+    except (DataError, ModelError) as error:
+        # No pose, or values that are no machine's: an assumption of its file may be wrong.
+        because = _refusal_cause(robot, logs, processing or Processing(), error)
+        if because:
+            place = f"{error.place}: " if isinstance(error, LogError) else ""
+            error.args = (f"{place}{because} ({str(error).removeprefix(place)})",)
+        raise
+
+
+def _determined(
+    method: Callable[[Observations], Estimate], observations: Observations, error: LogError
+) -> Estimate:
+    """Return a fit of a log that does not determine all values by itself, or raise its error."""
+    if error.reason != "too little motion":
+        raise error
+    try:
+        return method(observations)
+    except LogError:
+        raise error from None
+
+
+def _refusal_cause(
+    robot: Manipulator, logs: Logs, wanted: Processing, error: DataError | ModelError
+) -> str:
+    """Return the assumption of a machine's file that makes a log impossible; empty if none does."""
+    of_log = isinstance(error, LogError) and error.reason in _OF_ASSUMPTIONS
+    of_poses = isinstance(error, ModelError) and "poses" in str(error)
+    if not (of_log or of_poses):
+        return ""
+    try:
+        log = recording(_sequence(logs, robot)[0]).head()
+        start = (0.0,) * robot.freedom if of_poses else None
+        how = preprocessing_of(robot, log, wanted, start=start)
+        reflected = np.array([(leg.drive or Drive()).inertia for leg in robot.legs])
+        assumption = contradicted(robot, log, how, reflected)
+    except PteronError:
+        return ""
+    return assumption.message.rstrip(".") if assumption else ""
+
+
+def _identified(
+    robot: Manipulator,
+    logs: Logs,
+    held_out: Logs,
+    terms: Terms | None,
+    shared: Sharing,
+    estimator: str | Callable[[Observations], Estimate],
+    processing: Processing | None,
+    cad: RobotLike | Literal["robot"] | None,
+    bounds: Bounds | None,
+    progress: Stage | None,
+) -> Identification:
+    """Return the identification; see `identify`."""
     drawn = robot if cad == "robot" else None if cad is None else as_manipulator(cad)
     if isinstance(estimator, str) and estimator not in METHODS:
         raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(METHODS)}")
@@ -130,7 +203,7 @@ def identify(
         for given in (logs, held_out)
     )
     check_recordings(robot, whole, others, wanted)
-    limits = tuple(said for one in whole for said in at_limits(one.head()))
+    n, raw = robot.joint_count, _raw_logs(logs)
     halves = [] if others else [divided(one, wanted.period) for one in whole]
     fit = [first for first, _ in halves] or whole
     check = others or [second for _, second in halves]
@@ -159,6 +232,7 @@ def identify(
     observations = observe(model)
     used, late, given = wanted, wanted.delay == "auto", wanted.delay
     while True:
+        known = model.known_values(reflected_inertia(rotors))
         with findings_told(whole):
             if late or found.speeds is not None:
                 first = weighted(observations)
@@ -168,8 +242,20 @@ def identify(
                 )
                 used = replace(wanted, delay=found.delay)
                 preprocessing = tuple(replace(how, delay=found.delay) for how in preprocessing)
-            estimate = estimated(estimator, model, fit, preprocessing, observations)
-            estimate = replace(estimate, covariance=estimate.covariance + more)
+            method = partial(estimated, estimator, model, fit, preprocessing)
+            try:
+                bare = method(observations)
+            except LogError as error:
+                # The log does not determine all values: with those of the drawing it may.
+                noise = np.mean([how.force_noise for how in preprocessing], axis=0)
+                drawn_values = DrawnValues.of_all(model, known)
+                observations = drawn_values.rows_beside(observations, noise)
+                estimate = bare = _determined(method, observations, error)
+                drawn_values = drawn_values.told_of(estimate)
+            else:
+                bare = replace(bare, covariance=bare.covariance + more)
+                drawn_values = DrawnValues.of(model, bare, known)
+                estimate = drawn_values.added_to(bare, observations)
 
         # Judge by held-out data, which show exchanged columns
         modes = [None] * len(check) if others else [how.start for how in preprocessing]
@@ -178,17 +264,30 @@ def identify(
             for one, start in zip(_told(check, report, "Checking"), modes, strict=True)
         ]
         trusted = verdict_of(held, repeats=not others).grade == "trustworthy"
+        heads = [one.head() for one in fit]
+        lost = [lost_share(one) for one in raw]
+        of_log = log_faults(heads, preprocessing, lost, fits=trusted)
+        distorted = any(one.distorts for one in of_log)
         with findings_told(whole):
             if not trusted or unphysical(model, observations, estimate):
-                check_columns(model, fit[0], preprocessing[0])
-            hidden = check_motion(model, estimate, preprocessing, fit[0])
+                reflected = np.array([j * r**2 for j, r in rotors or [(0.0, 1.0)] * n])
+                assumption = contradicted(robot, fit[0].head(), preprocessing[0], reflected)
+                if assumption is not None:
+                    raise fit[0].log.fault("contradicted", assumption.message.rstrip("."))
+                check_columns(model, fit[0], preprocessing[0], decisive=distorted)
+            check_motion(model, bare, preprocessing, fit[0])
         report("Looking for faults", 0, 0)
-        faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
-        if late or given is not None or not faults.held:
+        faults = isolate_faults(
+            model, estimate, fit, preprocessing, reflected_inertia(rotors), drawn=drawn_values
+        )
+        if late or given is not None or not faults.late:
             break
-        # Forces that are held are no fault, but change values: fit again with that delay.
+        # A delay changes values: fit again with it.
         late = True
-    verdict = verdict_of(held, faults, repeats=not others, limits=limits)
+    step = 1.0 / heads[0].rate
+    half = is_half(found.delay, found.delay_deviation, step)
+    if late and given is None and not half:
+        of_log = (*of_log, of_delay(found.delay, found.delay_deviation))
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how)
         for one, how in zip(_told(fit, report, "Predicting"), preprocessing, strict=True)
@@ -198,19 +297,30 @@ def identify(
     report("Finding real bodies", 0, 0)
     again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     essential = essential_parameters(observations, estimate, again)
-    known = np.zeros(len(model.names))
-    for name, mass in _reflected(rotors).items():
-        known += model.share_of(name, mass)
     with findings_told(whole):
         consistency, share, off, missing = _real_bodies(
             model, estimate, known, observations, drawn, bounds
         )
     pushed = friction_below_zero(model, observations, estimate)
+    factor = common_factor(model, estimate, known, drawn, observations) if trusted else 1.0
+    verdict = verdict_of(
+        held,
+        faults,
+        repeats=not others,
+        log=of_log,
+        factor=factor,
+        exchangeable=exchangeable_legs(robot, heads[0], preprocessing[0]),
+        followed=_followed(model.terms, estimator),
+        left=left_over(estimate, preprocessing),
+    )
     verdict = with_bodies(replace(verdict, reasons=(*pushed, *verdict.reasons)), consistency, off)
-    advice = plausibility_warnings(model, estimate, known, consistency, drawn)
-    if hidden or essential.dropped:
-        weak = dict.fromkeys((*hidden, *essential.dropped))
-        advice[:0] = _more_motion(model, list(weak))
+    verdict = with_hidden_first(verdict)
+    advice = plausibility_warnings(model, estimate, known, consistency, drawn, factor)
+    if essential.dropped:
+        advice[:0] = _more_motion(model, list(essential.dropped))
+    if drawn_values.names:
+        clean = trusted and not faults.faults and not distorted
+        advice[:0] = _what_shows_more(base, drawn_values.names, clean=clean)
     return Identification(
         robot=robot,
         model=model,
@@ -221,13 +331,13 @@ def identify(
         fitted=fitted,
         held_out=tuple(held),
         preprocessing=preprocessing,
-        fault_isolation=faults,
+        fault_isolation=replace(faults, log=of_log, factor=factor),
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
-        unseen=hidden,
+        unseen=drawn_values.names,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=(
-            *_notes(model, estimate, _reflected(rotors)),
-            *_unknowns_notes(found, model, held=late and given is None),
+            *_notes(model, estimate, reflected_inertia(rotors)),
+            *_unknowns_notes(found, model, default=late and given is None, half=half),
             *missing,
         ),
         rotors=rotors,
@@ -243,6 +353,18 @@ def _sequence(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
         for one in ([logs] if isinstance(logs, Log | LogFile) else logs)
     ]
     return [in_newtons(one, robot) for one in named]
+
+
+def _raw_logs(logs: Logs) -> list[Log]:
+    """Return the logs that are in memory, or the beginning of their files, as they were given."""
+    several = [logs] if isinstance(logs, Log | LogFile) else logs
+    return [one if isinstance(one, Log) else next(iter(one.pieces())) for one in several]
+
+
+def _followed(terms: Terms, estimator: str | Callable[[Observations], Estimate]) -> frozenset[str]:
+    """Return the options whose advice is followed already."""
+    options = {"--joints each": terms.passive == "each", "--estimator huber": estimator == "huber"}
+    return frozenset(name for name, followed in options.items() if followed)
 
 
 def _reader(report: Stage, task: str) -> Callable[[int], None]:
@@ -272,9 +394,36 @@ def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, 
     return tuple((d.rotor_inertia, d.gear) for d in (drive or Drive() for drive in drives))
 
 
-def _reflected(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:
-    """Return the inertia that rotors add at the joints, J r^2, by name."""
-    return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}
+def _what_shows_more(base: BaseParameters, hidden: Sequence[str], *, clean: bool) -> list[str]:
+    """Return advice that shows values which a motion leaves open: shared legs, or more motion.
+
+    Fewer values leave less room for a fault: legs are to be shared in a log that is `clean`.
+    """
+    robot, advice = base.robot, []
+    if clean and not any(len(p.legs) > 1 for p in base.parameters) and _alike(robot):
+        advice.append(
+            "The legs are drawn alike: --shared identifies one set of parameters for all of them, "
+            "which the same motion shows better."
+        )
+    return [
+        *advice,
+        f"Not shown by this motion and left near the drawing: {', '.join(hidden)}. pteron excite "
+        "ROBOT --out motion.csv writes a motion that shows more; faster still with --speed and "
+        "--acceleration.",
+    ]
+
+
+def _alike(robot: Manipulator) -> bool:
+    """Say whether all legs have the same kind and the same inertial parameters as drawn."""
+    groups: dict[tuple[str, str], list[float]] = {}
+    for parameter, value in zip(parameter_data(robot), parameters(robot).tolist(), strict=True):
+        if parameter.legs:
+            groups.setdefault((parameter.kind, parameter.body), []).append(value)
+    legs = len(robot.legs)
+    return all(
+        len(values) == legs and np.ptp(values) <= _ALIKE * np.max(np.abs(values))
+        for values in groups.values()
+    )
 
 
 def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
@@ -294,15 +443,16 @@ def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
     return advice
 
 
-def _unknowns_notes(found: Unknowns, model: Model, *, held: bool) -> list[str]:
+def _unknowns_notes(found: Unknowns, model: Model, *, default: bool, half: bool) -> list[str]:
     """Return notes on the delay and the speeds of Stribeck's friction that were found.
 
-    `held` says that the delay of held forces was corrected by default.
+    `default` says that the delay was corrected by default, which the faults of the log tell but for
+    `half` a sample: that is no fault.
     """
     notes = []
-    if held:
+    if default and half:
         notes.append(f"{of_held_forces(found.delay)}; that is taken out (--delay 0 leaves it in).")
-    elif found.delay_deviation:
+    elif found.delay_deviation and not default:
         notes.append(
             f"The forces are {1e3 * found.delay:.3g} ms (+- {2e3 * found.delay_deviation:.1g}) "
             "late for the positions; that is taken out."
@@ -338,19 +488,39 @@ def _real_bodies(
     """
     rank = model.base.rank
     values = (estimate.values - known)[:rank]
-    covariance = estimate.covariance[:rank, :rank]
+    covariance = _positive(estimate.covariance[:rank, :rank])
     try:
         found = consistent_model(
             model.robot, model.base, values, covariance, cad=cad, bounds=bounds
         )
     except MissingSolver as error:
         return None, float("nan"), float("nan"), (f"No model of real bodies: {error}",)
-    shift = np.zeros(len(estimate.values))
-    shift[:rank] = found.base_values - values
+    except ModelError as error:
+        # Values too far from those of real bodies for the solver are no reason to say nothing; what
+        # a user asks of bodies is.
+        if bounds is not None:
+            raise
+        return None, float("nan"), float("nan"), (f"No model of real bodies: {error}",)
+    # Friction and offsets follow, as in the model file.
+    shift = conditional_shift(estimate.covariance, range(rank), found.base_values - values)
     moved = np.sqrt(((observations.matrix @ shift) ** 2).mean())
     left = np.sqrt((estimate.residuals**2).mean())
     size, tiny = np.sqrt((observations.forces**2).mean()), np.finfo(float).tiny
     return found, float(moved / max(left, tiny)), float(100.0 * moved / max(size, tiny)), ()
+
+
+def _positive(covariance: Array) -> Array:
+    """Return a covariance (p, p) without the negative eigenvalues that rounding gives it.
+
+    Without noise many values are known alike, to rounding.
+    """
+    size = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    values, ways = np.linalg.eigh(covariance / np.outer(size, size))
+    least = _SINGULAR * values[-1]
+    if values[0] >= least:
+        return covariance
+    lifted = (ways * np.maximum(values, least)) @ ways.T
+    return np.asarray(0.5 * (lifted + lifted.T) * np.outer(size, size))
 
 
 def _notes(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[str]:

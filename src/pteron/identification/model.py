@@ -213,6 +213,14 @@ class Model:
             added[self.names.index(kept)] = share * value
         return added
 
+    def known_values(self, known: Mapping[str, float]) -> Array:
+        """Return the part of the values (p,) that terms of known size make, by their names.
+
+        A term that joins others adds to those.
+        """
+        parts = [self.share_of(name, value) for name, value in known.items()]
+        return np.asarray(np.sum([np.zeros(len(self.names)), *parts], axis=0))
+
     def per_joint(self, kind: str, values: Array) -> Array | None:
         """Return a kind of term (n,) of values (p,); 0 where it joins others, None if it is none.
 

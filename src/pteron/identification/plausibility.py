@@ -29,9 +29,6 @@ _NO_FORCES = 1e4
 """Standard deviation of a base parameter, over its usual size, beyond which the forces are not the
 machine's."""
 
-_MOST_UNSEEN = 0.5
-"""Largest share of the base parameters that a motion may leave unseen."""
-
 _FAR_ABOVE = 5.0
 """Residuals, over the forces' noise, from which the model is not the machine's."""
 
@@ -39,15 +36,12 @@ _FAR = 0.5
 """Difference from the drawn machine, over a base parameter's usual size, from which a warning is
 given."""
 
-_TOLD = 0.2
-"""Largest standard deviation of a value, and spread of the ratios of values to drawn ones, for a
-common factor to be told."""
+_TOLD = 0.3
+"""Largest difference of the bodies' forces from a multiple of the drawn ones, over them, for that
+multiple to be told: bodies that are up to 30 % denser or lighter than drawn differ by less."""
 
 _APART = 1.5
 """Least common factor, or its inverse, that is a wrong scale rather than a bad drawing."""
-
-_FEWEST = 3
-"""Least number of values with a factor in common."""
 
 _LEAST_SHARE = 0.02
 """Least usual size of a parameter, as a share of its body's mass and length."""
@@ -71,6 +65,9 @@ _FRICTION = ("coulomb", "viscous", "passive")
 _POSITIVE = ("coulomb", "viscous", "passive", "rotor")
 """Terms that no machine has below zero."""
 
+_ROUNDING = 1e-6
+"""Difference of two rotors' inertia, over the largest, that is rounding of numbers in a file."""
+
 CHANCE = 1e-3
 """Probability below which infeasible values, or a payload's, are not chance."""
 
@@ -90,6 +87,7 @@ def plausibility_warnings(
     known: Array,
     consistency: Consistency | None,
     cad: Manipulator | None,
+    factor: float = 1.0,
 ) -> list[str]:
     """Return warnings of values that predict forces well and yet belong to another machine.
 
@@ -108,19 +106,12 @@ def plausibility_warnings(
     if cad is not None:
         drawn = parameters(cad)
         base = model.base
-        factor = common_factor(model, estimate, known, drawn)
-        if not 1.0 / _APART < factor < _APART:
-            found.append(
-                f"All values together are {factor:.2g} times those drawn, as where the gain of all "
-                "torques or the gear ratio is off by that factor: check gains, rated torque and "
-                "ratio, or the drawing's masses."
-            )
         usual = usual_sizes(base, drawn)
         values = (estimate.values - known)[: base.rank]
         off = np.abs(values - base.grouping @ drawn)
         far = (off > _FAR * usual) & (off > 5.0 * estimate.deviations[: base.rank])
         worst = [k for k in np.argsort(-off / np.maximum(usual, 1e-300)) if far[k]][:3]
-        if worst:
+        if worst and factor == 1.0:
             names = ", ".join(
                 f"{base.names[k]} ({values[k]:.3g}, drawn {base.grouping[k] @ drawn:.3g})"
                 for k in worst
@@ -150,21 +141,32 @@ def friction_below_zero(model: Model, observations: Observations, fit: Estimate)
     )
 
 
-def common_factor(model: Model, estimate: Estimate, known: Array, drawn: Array) -> float:
-    """Return the factor of all base parameters beside those drawn (N,); 1 where there is none.
+def common_factor(
+    model: Model,
+    estimate: Estimate,
+    known: Array,
+    drawn: Manipulator | None,
+    observations: Observations,
+) -> float:
+    """Return the factor of the bodies' forces beside those of the drawing; 1 where none is clear.
 
-    They need not agree better than drawings do; `known` (p,) is the rotors' part of the values.
+    It is that of least squares. Forces that differ by more than drawings do have no factor; `known`
+    (p,) is the rotors' part of the values.
     """
-    base = model.base
-    wanted = base.grouping @ drawn + known[: base.rank]
-    clear = np.abs(wanted) > _FAR * usual_sizes(base, drawn)
-    clear &= estimate.deviations[: base.rank] < _TOLD * np.abs(wanted)
-    if clear.sum() < _FEWEST:
+    if drawn is None:
         return 1.0
-    ratios = estimate.values[: base.rank][clear] / wanted[clear]
-    factor = float(np.median(ratios))
-    spread = float(np.median(np.abs(ratios - factor)))
-    return factor if spread < _TOLD * abs(factor) else 1.0
+    base = model.base
+    rigid = observations.matrix[..., : base.rank].reshape(-1, base.rank)
+    as_drawn = rigid @ (base.grouping @ parameters(drawn) + known[: base.rank])
+    forces = rigid @ estimate.values[: base.rank]
+    power = float(as_drawn @ as_drawn)
+    if not power > 0.0:
+        return 1.0
+    factor = float(forces @ as_drawn) / power
+    spread = float(np.linalg.norm(forces - factor * as_drawn))
+    if spread > _TOLD * float(np.linalg.norm(forces)):
+        return 1.0
+    return 1.0 if 1.0 / _APART < factor < _APART else factor
 
 
 class Factor(NamedTuple):
@@ -196,13 +198,21 @@ class Factor(NamedTuple):
 def known_values(
     model: Model, recordings: Sequence[Recording], rotors: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the values that are known, by name: of a declared payload, of rotors."""
-    found = dict(rotors)
+    """Return the values that are known, by name: of a declared payload, of rotors.
+
+    A rotor's is known as the model has it: where legs share their bodies' inertia one rotor joins
+    them, and of the others the values are their differences from it.
+    """
+    part = model.known_values(rotors)
+    found = {name: float(part[model.names.index(name)]) for name in rotors if name in model.names}
     for one in recordings:
         if (payload := one.head().description.payload) is not None:
             kinds = model.robot.platform.inertia.kinds
             found |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
-    return {name: value for name, value in found.items() if name in model.names and value}
+    least = _ROUNDING * max(map(abs, rotors.values()), default=0.0)
+    return {
+        name: value for name, value in found.items() if name in model.names and abs(value) > least
+    }
 
 
 def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) -> Factor | None:
@@ -275,17 +285,22 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
     return found
 
 
-def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
-    """Return the base parameters that a log cannot show, and whether they are too many.
+def unseen(model: Model, deviations: Array) -> tuple[str, ...]:
+    """Return the base parameters whose deviations (p,) exceed their usual size."""
+    return unseen_shares(model, deviations)[0]
 
-    Their standard deviation, among the (p,) of all values, is larger than their usual size.
-    One that is 10 000 times larger is too many: its actuator's forces are no forces of the machine.
+
+def unseen_shares(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
+    """Return the base parameters that a log cannot show, and whether it shows none at all.
+
+    One whose deviation is 10 000 times its usual size says that its actuator's forces are no forces
+    of the machine: then nothing is seen.
     """
     base = model.base
     share = deviations[: base.rank] / usual_sizes(base, parameters(model.robot))
     hidden = share > 1.0
     names = tuple(name for name, flag in zip(base.names, hidden, strict=True) if flag)
-    return names, bool(hidden.mean() > _MOST_UNSEEN or share.max() > _NO_FORCES)
+    return names, bool(share.max() > _NO_FORCES)
 
 
 def usual_sizes(base: BaseParameters, drawn: Array) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
+from pteron.identification.logs.bridging import bridged
 from pteron.identification.logs.log import TimeStamps
 from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
@@ -105,7 +106,8 @@ def recording(
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        log = periodic_part(replace(log, time=_since(log.time), findings=_noticed(log)), period)
+        log = bridged(replace(log, time=_since(log.time), findings=_noticed(log)))
+        log = periodic_part(log, period)
         return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pteron.html_table import Column, html_table
+from pteron.identification.conditional_values import conditional_values
 from pteron.identification.consistency import Consistency
 from pteron.identification.estimators import Essential, Estimate
 from pteron.identification.faults import FaultIsolation
@@ -114,6 +116,11 @@ class Identification:
         return html_table(self.robot.name, about, columns, rows, self.verdict.reasons)
 
     @property
+    def causes(self) -> tuple[str, ...]:
+        """The faults of log and machine that show, in sentences, the likeliest cause first."""
+        return self.fault_isolation.causes
+
+    @property
     def understated(self) -> bool:
         """Whether a fault shows for which the values' stated errors do not allow."""
         return self.fault_isolation.understates
@@ -130,19 +137,69 @@ class Identification:
         drives = [leg.drive or Drive() for leg in robot.legs]
         if self.rotors is not None:
             motors = zip(drives, self.rotors, strict=True)
-            drives = [
-                d if (j, r) == (d.rotor_inertia, d.gear) else replace(d, rotor_inertia=j, ratio=r)
-                for d, (j, r) in motors
-            ]
-        each = zip(robot.legs, drives, self.friction, strict=True)
-        legs = [replace(leg, drive=replace(drive, **found)) for leg, drive, found in each]
+            drives = [d if r == d.gear else replace(d, ratio=r) for d, (_, r) in motors]
+        reflected = zip(drives, self.reflected_inertia.tolist(), strict=True)
+        inertia = [mass / drive.gear**2 for drive, mass in reflected]
+        friction = self._friction(self.file_values)
+        each = zip(robot.legs, drives, inertia, friction, strict=True)
+        legs = [
+            replace(leg, drive=replace(drive, rotor_inertia=j, **law))
+            for leg, drive, j, law in each
+        ]
         return replace(robot, legs=tuple(legs))
 
     @property
+    def known_rotors(self) -> dict[str, float]:
+        """The inertia that known rotors add at the joints, J r^2, by name; kg or kg m^2."""
+        return reflected_inertia(self.rotors)
+
+    @cached_property
+    def values_without_rotors(self) -> Array:
+        """The identified values (p,) less what known rotors add to each, in bodies or offsets."""
+        return self.estimate.values - self.model.known_values(self.known_rotors)
+
+    @cached_property
+    def file_values(self) -> Array:
+        """The values (p,) of the model file: real bodies', friction not below zero, less rotors.
+
+        Where real bodies have other base parameters than the fit, or friction came out below zero,
+        the other values follow by their covariance, so that forces stay as near as they can.
+        """
+        values, rank = self.values_without_rotors, self.model.base.rank
+        moved = self.consistency is not None and not self.consistency.feasible
+        bodies = self.consistency.base_values if moved and self.consistency else values[:rank]
+        kinds = self.model.kinds
+        known = np.isin(kinds, ("coulomb", "viscous", "stribeck"))
+        if not moved and not (values[known] < 0.0).any():
+            return values
+        positive = np.flatnonzero(known).tolist()
+        return conditional_values(values, self.estimate.covariance, bodies, positive)
+
+    @property
+    def reflected_inertia(self) -> Array:
+        """Inertia of the motors at the joints (n,), kg or kg m^2, as the fit found it.
+
+        Known rotors count, with what the forces say beside them; what joins bodies is theirs.
+        """
+        known = [j * r**2 for j, r in self.rotors] if self.rotors else [0.0] * len(self.robot.legs)
+        beside = self.model.per_joint("rotor", self.file_values)
+        return np.maximum(np.array(known) + (0.0 if beside is None else beside), 0.0)
+
+    @property
     def friction(self) -> tuple[dict[str, Any], ...]:
-        """The friction of each joint as the fit found it, by the fields of `Drive`."""
-        coulomb, viscous, falls = map(self._per_joint, ("coulomb", "viscous", "stribeck"))
-        offset = self._per_joint("offset", least=-np.inf)
+        """The friction of each joint as the fit found it, by the fields of `Drive`.
+
+        It goes with `base_values`: on a guide that gravity pulls along, what rotors add to both is
+        in both. The model file's is in `machine`.
+        """
+        return self._friction(self.estimate.values)
+
+    def _friction(self, values: Array) -> tuple[dict[str, Any], ...]:
+        """Return the friction of each joint by values (p,), by the fields of `Drive`."""
+        coulomb, viscous, falls = (
+            self._per_joint(kind, values) for kind in ("coulomb", "viscous", "stribeck")
+        )
+        offset = self._per_joint("offset", values, least=-np.inf)
         speeds = self.model.stribeck_speeds
         laws = [
             Stribeck(force, speed) if force > 0.0 else None
@@ -153,23 +210,38 @@ class Identification:
             for c, v, o, law in zip(coulomb, viscous, offset, laws, strict=True)
         )
 
-    def _per_joint(self, kind: str, least: float = 0.0) -> Array:
-        """Return a kind of term (n,), 0 where there is none.
+    def _per_joint(self, kind: str, values: Array, least: float = 0.0) -> Array:
+        """Return a kind of term (n,) of values (p,), 0 where there is none.
 
         Friction and inertia below zero are noise: no joint pushes itself.
         """
-        values = self.model.per_joint(kind, self.estimate.values)
-        n = len(self.robot.legs)
-        return np.maximum(np.zeros(n) if values is None else values, least)
+        terms = self.model.per_joint(kind, values)
+        return np.maximum(np.zeros(len(self.robot.legs)) if terms is None else terms, least)
 
     @property
     def base_values(self) -> Array:
         """The identified base parameters (rank,)."""
         return self.estimate.values[: self.model.base.rank]
 
+    @property
+    def _exported(self) -> tuple[Array, Array, Sequence[str]]:
+        """Values (p,), inertia of rotors (n,) and expressions for code from base parameters.
+
+        Values are those of the fit, with the rotors that join them. Where legs share what one rotor
+        joins, others are lighter than that by the fit, and no drive has less inertia than none:
+        then rotors are taken out of the values.
+        """
+        beside = self.model.per_joint("rotor", self.estimate.values)
+        if self.rotors is None or beside is None or not (beside < 0.0).any():
+            inertia = self._per_joint("rotor", self.estimate.values)
+            return self.estimate.values, inertia, self.model.expressions
+        own = [*self.model.base.expressions(), *self.model.names[self.model.base.rank :]]
+        return self.values_without_rotors, self.reflected_inertia, own
+
     def as_dict(self) -> dict[str, Any]:
         """Return everything but samples and residuals as plain data."""
         consistency, base = self.consistency, self.model.base
+        exported, inertia, expressions = self._exported
         bodies = consistency and {
             **picked(consistency, "feasible distance p_value at_border cad_feasible"),
             **picked(consistency, "cad_violations"),
@@ -181,12 +253,13 @@ class Identification:
             "robot": self.robot.name,
             "machine": machine_record(self.robot),
             **picked(self, "verdict"),
-            **picked(self.model, "expressions kinds left_out"),
+            "expressions": [*expressions],
+            **picked(self.model, "kinds left_out"),
             "base_parameters": {
                 "names": list(base.names),
                 "expressions": list(base.expressions(digits=12)),
                 "units": list(self.model.units[: base.rank]),
-                "values": self.base_values.tolist(),
+                "values": exported[: base.rank].tolist(),
                 "shared": sorted({p.legs for p in base.parameters if len(p.legs) > 1}),
             },
             "drives": [
@@ -195,7 +268,7 @@ class Identification:
                     "stribeck": friction["stribeck"] and asdict(friction["stribeck"]),
                     "inertia": float(inertia),
                 }
-                for friction, inertia in zip(self.friction, self._per_joint("rotor"), strict=True)
+                for friction, inertia in zip(self._friction(exported), inertia, strict=True)
             ],
             **picked(self, "estimate unknowns"),
             "essential": picked(self.essential, "names dropped p_value level")
@@ -207,3 +280,8 @@ class Identification:
             "findings": [picked(one, "kind row column message") for one in self.findings],
             **picked(self, "notes"),
         }
+
+
+def reflected_inertia(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:
+    """Return the inertia that rotors (inertia, ratio) add at the joints, J r^2, by name."""
+    return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}

@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.identification.consistency import Consistency
 from pteron.identification.faults import FaultIsolation
+from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction, predict
 from pteron.identification.recordings import Recording
@@ -61,7 +62,7 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "Check each drive's gain by itself, or move more coordinates at once, and faster.",
     ),
     "play": (
-        "These logs cannot show play in the drives: the load of none changes its direction often "
+        "Play in the drives would not be seen: the load of none changes its direction often "
         "enough, four times while the joint moves. While loads stay on one side it does no harm.",
         "To see play, record a motion whose accelerations load the drives both ways.",
     ),
@@ -76,6 +77,12 @@ _STEPS = (
 )
 """Remedies for an error beyond the noise, where friction explains some of it and where little."""
 
+_GENERAL = ("Look at the residuals", "Friction of joints explains")
+"""How advice begins that is of no use beside a cause that is named."""
+
+_CANNOT = "These logs cannot show"
+"""How sentences begin on what logs cannot show."""
+
 _MANY = 100.0
 """Ratio from which only "more than" is printed."""
 
@@ -85,7 +92,11 @@ def verdict_of(
     faults: FaultIsolation | None = None,
     *,
     repeats: bool,
-    limits: Sequence[str] = (),
+    log: Sequence[LogFault] = (),
+    factor: float = 1.0,
+    exchangeable: Sequence[str] = (),
+    followed: frozenset[str] = frozenset(),
+    left: str = "",
 ) -> Verdict:
     """Return the verdict on a model.
 
@@ -97,10 +108,28 @@ def verdict_of(
         The faults that the residuals of the fit show.
     repeats : bool
         Whether what was held out repeats the motion that was fitted.
-    limits : sequence of str
-        Sentences on forces that stay at their limit: then the grade is "usable with care" at best.
+    log : sequence of LogFault
+        Faults of the logs as such. Where forces stay at their limit, or samples are taken at other
+        times than their stamps say, the grade is "usable with care" at best.
+    factor : float
+        Forces of the bodies over those of the drawing; other than 1 it is "usable with care" at
+        best.
+    exchangeable : sequence of str
+        Pairs of legs whose exchange the logs do not show.
+    followed : frozenset of str
+        Options whose advice is followed already, and not given again.
+    left : str
+        How far what the model leaves is above the noise, said where no cause shows.
     """
-    found = Opinion("usable with care" if limits else "trustworthy", list(limits))
+    found = Opinion()
+    if faults is not None:
+        # Beside the drawing a common factor shows, if only to some per cent.
+        hidden = tuple(one for one in faults.hidden if one != "gain" or factor == 1.0)
+        faults = replace(faults, log=tuple(log), factor=factor, hidden=hidden)
+    if any(one.distorts for one in log):
+        found.lower("usable with care")
+    if factor != 1.0:
+        found.lower("usable with care")
     opinions = [_of_prediction(one) for one in held_out]
     if faults is not None:
         opinions.append(_of_faults(faults))
@@ -108,6 +137,13 @@ def verdict_of(
         found.lower(one.grade)
         found.reasons += one.reasons
         found.steps += one.steps
+    if left and found.grade != "trustworthy" and not (faults is not None and faults.causes):
+        found.add(f"{left[0].upper()}{left[1:]}.")
+    if exchangeable:
+        found.add(
+            f"These logs cannot show whether legs {', or '.join(exchangeable)}, are exchanged in "
+            "the file: as mirror images of each other they explain the forces as well."
+        )
     if repeats:
         found.add(
             "What was held out repeats the motion that was fitted: it tells of noise and drift, "
@@ -115,7 +151,19 @@ def verdict_of(
             "Record another motion, such as a pick-and-place cycle, and hold it out (--held-out): "
             "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv.",
         )
+    unwanted = followed if faults is None or not faults.causes else {*followed, *_GENERAL}
+    found.steps = [step for step in found.steps if not any(name in step for name in unwanted)]
     return found.verdict()
+
+
+def with_hidden_first(verdict: Verdict) -> Verdict:
+    """Return the verdict with what its logs cannot show at all in the first sentence."""
+    hidden = [reason for reason in verdict.reasons if reason.startswith(_CANNOT)]
+    rest = [reason for reason in verdict.reasons if not reason.startswith(_CANNOT)]
+    if not hidden:
+        return verdict
+    together = "; ".join(reason.removeprefix(_CANNOT).strip().rstrip(".") for reason in hidden)
+    return replace(verdict, reasons=(f"{_CANNOT} {together}.", *rest))
 
 
 def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
@@ -205,14 +253,14 @@ def _of_prediction(prediction: Prediction) -> Opinion:
 
 
 def _of_faults(shown: FaultIsolation) -> Opinion:
-    found = Opinion(reasons=[one.message for one in shown.faults])
+    found = Opinion(reasons=list(shown.causes))
     if shown.matters:
         found.grade = "usable with care"
     if shown.understates:
         found.add("The stated errors of the values do not allow for that.")
     if not shown.tried:
         found.add(f"Fault isolation was not run: {shown.why_not}.", grade="usable with care")
-    elif not shown.faults:
+    elif not shown.causes:
         found.add(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
     for fault in shown.hidden:
         found.add(*_HIDDEN[fault])

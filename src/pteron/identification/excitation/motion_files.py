@@ -35,7 +35,7 @@ def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, 
         beside = one.with_suffix(".toml")
         if beside.is_dir():
             raise OutputError(f"{beside}: is a folder; name another file")
-        if beside.is_file() and find_description(one) is None:
+        if beside.is_file() and find_description(one) != beside:
             raise OutputError(f"{beside}: describes a machine, and is kept; name another file")
     return first, held_out, slow
 

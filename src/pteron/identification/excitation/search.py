@@ -20,7 +20,7 @@ from pteron.identification.excitation.conditioning import (
     conditioning_of,
     information_root,
 )
-from pteron.identification.excitation.excitation import Excitation, Start
+from pteron.identification.excitation.excitation import IDENTIFIES, Excitation, Start
 from pteron.identification.excitation.fourier import FourierMotion, Space
 from pteron.identification.excitation.improvement import ROUNDS, Improvement, Round, improved
 from pteron.identification.excitation.leads import found_lead
@@ -49,6 +49,12 @@ _SHORT = 0.2
 """Share of a column's length in random motions below which the column counts as short. By columns
 scaled to length 1 alone a motion that all but rests in some direction would be as good as one that
 moves: that of a Delta with a shaft went straight up and down, and left the shaft's values open."""
+
+_FEWEST = 10
+"""Random motions that are drawn whatever the time: the best of one would be no choice."""
+
+_LONGER = 3
+"""Times `seconds`, at most, that the search takes where its motion would not do."""
 
 _SEEN = 0.1
 """The share of the progress that the random motions are."""
@@ -103,8 +109,9 @@ def optimal_excitation(
     seed : int
         Where the random motions come from.
     seconds : float
-        After which the best until then is returned. It holds for the search as a whole; what
-        comes before, such as the base parameters, is not counted.
+        After which the best until then is returned; where that would not identify the machine, by
+        a condition number above 1000, after three times as long. It holds for the search as a
+        whole; what comes before, such as the base parameters, is not counted.
     workers : int, optional
         Processes that improve starts at the same time; 1 keeps to this one. By default as many as
         there are processors, four at most.
@@ -163,7 +170,8 @@ def optimal_excitation(
             rng = np.random.default_rng(seeds)
             search.drawn.append(search.judged(random_excitation(robot, **motion, seed=rng)))
             search.report(_SEEN * (k + 1) / draws)
-            if time.monotonic() - begin > _DRAWING * seconds:
+            late = time.monotonic() - begin > _DRAWING * seconds
+            if late and len(search.drawn) >= _FEWEST:
                 break
         search.short = _SHORT * search.lengths()
         search.setting = Setting(
@@ -172,12 +180,17 @@ def optimal_excitation(
         )
         processes = min(starts, workers or min(os.cpu_count() or 1, _MOST_WORKERS))
         search.choose(starts)
-        left = begin + seconds - time.monotonic()
-        first, second = ROUNDS[criterion]
-        search.improve(search.starts, first, _FIRST * left, processes)
-        best = sorted(search.starts, key=lambda one: search.cost(one.best))
-        left = begin + seconds - time.monotonic()
-        search.improve(best[: math.ceil(starts / _ONE_OF)], second, left, processes)
+        for attempt in range(_LONGER):
+            # At least half the time is for improvements, however long the drawing took.
+            until = max(begin + (attempt + 1) * seconds, time.monotonic() + 0.5 * seconds)
+            first, second = ROUNDS[criterion]
+            left = until - time.monotonic()
+            search.improve(search.starts, first, _FIRST * left, processes)
+            best = sorted(search.starts, key=lambda one: search.cost(one.best))
+            left = until - time.monotonic()
+            search.improve(best[: math.ceil(starts / _ONE_OF)], second, left, processes)
+            if search.identifies or all(one.finished for one in search.starts):
+                break
     except KeyboardInterrupt:
         if not search.drawn:
             raise
@@ -230,6 +243,12 @@ class _Search:
         if self.criterion == "logdet":
             return -one.conditioning.logdet
         return condition_of_long(one.root, self.short)
+
+    @property
+    def identifies(self) -> bool:
+        """Whether the best motion shows all base parameters."""
+        best = min(self.starts, key=lambda one: self.cost(one.best)).best
+        return best.conditioning.scaled <= IDENTIFIES
 
     def choose(self, starts: int) -> None:
         """Choose the best random motions as starts."""

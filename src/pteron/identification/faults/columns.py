@@ -21,6 +21,7 @@ from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
 
 _STRIBECK = (0.05, 0.15, 0.4)
 """Speeds at which friction may fall, over each joint's root mean square: all are tried."""
@@ -146,7 +147,7 @@ _OTHERS = (
         "geometry",
         "m",
         lambda m: [f"leg {leg + 1}" for leg, _ in lengths_of(m.robot)],
-        FittedMotion.by_lengths,
+        lambda m: m.by_lengths,
     ),
     *(
         Family("stribeck", "N", _forces, partial(_stribeck, share), positive=True, speed=share)
@@ -179,7 +180,48 @@ def families_of(model: Model) -> tuple[Family, ...]:
     if not model.terms.rotors:
         own = identification_model(model.robot, with_rotors, base=model.base).kept_terms
         rotors = [_ROTORS] * any(term.kind == "rotor" for term in own)
-    return (DELAY, *map(_scale, range(count)), *_OTHERS, *rotors)
+    drives = (_scale(i) for i in range(count))
+    joints = (one for i in range(count) for one in (_ratio((i,)), _zero(i)))
+    legs = (_leg_geometry(i) for i in range(len(model.robot.legs)))
+    return (DELAY, *drives, _ratio(range(count)), *joints, *legs, *_OTHERS, *rotors)
+
+
+def _ratio(joints: Sequence[int]) -> Family:
+    """Return the fault of joints that move more than the log says, by forces that are less."""
+    some = list(joints)
+
+    def columns(m: FittedMotion) -> Array:
+        force = diagonal(m.forces())[..., some].sum(axis=-1, keepdims=True)
+        return np.asarray(m.by_ratio[..., some].sum(axis=-1, keepdims=True) - force)
+
+    def sizes(model: Model) -> Sequence[str]:
+        names = [model.robot.joint_names[i] for i in some]
+        return names if len(names) == 1 else ["all joints"]
+
+    return Family("ratio", "", sizes, columns, of_machine=False, largest=1.0)
+
+
+def _zero(i: int) -> Family:
+    one = slice(i, i + 1)
+    return Family(
+        "zero",
+        "",
+        lambda model: model.robot.joint_names[one],
+        lambda m: m.by_zeros[..., one],
+        of_machine=False,
+    )
+
+
+def _leg_geometry(i: int) -> Family:
+    def some(robot: Manipulator) -> list[int]:
+        return [k for k, (leg, _) in enumerate(lengths_of(robot)) if leg == i]
+
+    return Family(
+        "geometry",
+        "m",
+        lambda m: [f"leg {i + 1}" for _ in some(m.robot)],
+        lambda m: m.by_lengths[..., some(m.model.robot)],
+    )
 
 
 def _scale(i: int) -> Family:

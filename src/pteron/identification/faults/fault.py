@@ -13,6 +13,8 @@ from pteron.kernels import Array
 FaultName = Literal[
     "delay",
     "scale",
+    "ratio",
+    "zero",
     "gain",
     "gravity",
     "clock",
@@ -25,10 +27,16 @@ FaultName = Literal[
     "rotors",
     "play",
 ]
-"""Faults by name: forces that are late, the scale of one force, that of all forces, the direction
-of gravity, its size or the rate of the clock, lengths, friction that falls with speed, elastic
-drives, drifting friction or offsets, friction that grows with load, friction in passive joints,
-motors' inertia, drives with play."""
+"""Faults by name: forces that are late, the scale of one force, the gear ratio of one joint or of
+all, the zero of one, the scale of all forces, the direction of gravity, its size or the rate of the
+clock, lengths, friction that falls with speed, elastic drives, drifting friction or offsets,
+friction that grows with load, friction in passive joints, motors' inertia, drives with play."""
+
+ORDER: tuple[FaultName, ...] = (
+    *("delay", "clock", "gain", "scale", "ratio", "zero", "gravity", "geometry"),
+    *("play", "elasticity", "rotors", "drift", "stribeck", "load", "passive"),
+)
+"""The order in which faults are mended, and named: what comes first distorts what comes later."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters."""
@@ -52,12 +60,16 @@ _SENTENCES = {
     "delay": "The {late} are {size_ms:.3g} ms (+- {error_ms:.1g}) late for the {early}",
     "sampling": _SAMPLING,
     "scale": "{label} is {percent:.2g} % (+- {error:.1g}) too {more} beside the others",
+    "ratio": "{label_moves} {percent:.2g} % (+- {error:.1g}) {less} than the log says, as where "
+    "a gear ratio, a lead or a pulley is off by that",
+    "zero": "The zero of {label} is off by about {shown_size}",
     "gravity": "Gravity is {tilt:.2g} degrees (+- {tilt_error:.1g}) off the direction in the model",
     "gain": "All forces are {percent:.3g} % (+- {error:.1g}) too {more} for what is known",
     "clock": "The weight is {percent:.2g} % (+- {error:.1g}) too {more} for the inertia, as where "
     "the log's clock runs {clock:.2g} % {pace}",
     "sign": "The weight acts the other way: gravity has the wrong sign",
-    "geometry": "Lengths or points of the geometry are off, most clearly in {clearest}",
+    "geometry": "Lengths or points of the geometry are off, most clearly in {clearest}, by about "
+    "{shown_leg}",
     "stribeck": "Friction falls with speed, most clearly at {clearest}",
     "elasticity": "The drives give, most clearly under {clearest}",
     "drift": "Friction or offset changes during the log, most clearly at {clearest}",
@@ -69,9 +81,30 @@ _SENTENCES = {
 }
 """Sentences on the faults, on a delay of sampling, and on gravity that acts the other way."""
 
+_IN_WORDS: dict[FaultName, str] = {
+    "delay": "a delay",
+    "scale": "the scale of a force",
+    "ratio": "a gear ratio",
+    "zero": "the zero of a joint",
+    "gain": "the gain of all forces",
+    "gravity": "tilted gravity",
+    "clock": "the log's clock",
+    "geometry": "lengths or points of the geometry",
+    "stribeck": "friction that falls with speed",
+    "elasticity": "drives that give",
+    "drift": "friction that changes during the log",
+    "load": "friction that grows with the load",
+    "passive": "friction of passive joints",
+    "rotors": "the motors' inertia",
+    "play": "play of a drive",
+}
+"""Faults as nouns."""
+
 _REMEDY: dict[FaultName, str] = {
     "delay": "--delay auto takes it out",
     "scale": "check that drive's gain, or its torque constant",
+    "ratio": "check the ratio, lead or pulley that positions are computed with",
+    "zero": "home that joint again, or calibrate its zero",
     "gravity": "level the machine, or correct gravity in its file",
     "gain": "check gains, rated torque and gear ratio, and the payload's mass",
     "clock": "check the log's time, and gravity and the unit of lengths in the machine's file",
@@ -86,6 +119,13 @@ _REMEDY: dict[FaultName, str] = {
     "play": "take the play out of that drive, or keep to motions whose load does not change "
     "direction; faults named after it may be its own",
 }
+
+
+def _rounded(size: float, angle: bool = False) -> str:
+    """Return a size in mm, or degrees, with the digits that an estimate has."""
+    number = np.degrees(size) if angle else 1e3 * size
+    text = f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
+    return f"{text} {'degrees' if angle else 'mm'}"
 
 
 def is_half(delay: float, deviation: float, step: float) -> bool:
@@ -127,6 +167,8 @@ class IsolatedFault:
         Speeds of the joints with which Stribeck's friction falls.
     step : float
         From one sample of the log to the next, s.
+    as_well : tuple of str
+        Other faults that explain the residuals as well.
     """
 
     fault: FaultName
@@ -138,6 +180,7 @@ class IsolatedFault:
     cycle: Array
     speeds: Array | None = None
     step: float = 0.0
+    as_well: tuple[FaultName, ...] = ()
 
     @property
     def of_sampling(self) -> bool:
@@ -160,17 +203,33 @@ class IsolatedFault:
     @property
     def message(self) -> str:
         """The fault, and its remedy, in a sentence."""
-        return f"{self._sentence()}; {_REMEDY[self.fault]}."
+        return f"{self._sentence()}{self._others()}; {_REMEDY[self.fault]}."
+
+    @property
+    def beside_another(self) -> str:
+        """The fault without a remedy: another one, which is mended first, may be all there is."""
+        return f"{self._sentence()}{self._others()}, or what is named before looks so: mend that."
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {
             **picked(self, "fault message labels sizes"),
             "standard_deviations": [None if np.isnan(v) else float(v) for v in self.deviations],
-            **picked(self, "chance shift matters"),
+            **picked(self, "chance shift matters as_well"),
             "cycle_percent": [None if np.isnan(v) else float(v) for v in self.cycle],
             **picked(self, "speeds"),
         }
+
+    def _others(self) -> str:
+        """Return, in brackets, the other faults that explain the residuals as well."""
+        if not self.as_well:
+            return ""
+        return f" (as well explained by: {', '.join(_IN_WORDS[name] for name in self.as_well)})"
+
+    def _leg_size(self, label: str) -> float:
+        """Return the size of all errors of one label together."""
+        parts = [size for size, name in zip(self.sizes, self.labels, strict=False) if name == label]
+        return float(np.linalg.norm(parts))
 
     def _sentence(self) -> str:
         first, told = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
@@ -179,6 +238,7 @@ class IsolatedFault:
         size, error = abs(first), float(self.deviations[0])
         late, early = ("forces", "positions")[:: 1 if first > 0.0 else -1]
         clock = max(1.0 + first, 1e-300) ** -0.5 - 1.0
+        whole = self.labels[0] == "all joints"
         clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
         return _SENTENCES[told].format(
             label=self.labels[0],
@@ -192,6 +252,10 @@ class IsolatedFault:
             percent=100.0 * size,
             error=100.0 * error,
             more="large" if first > 0.0 else "small",
+            label_moves="All joints move" if whole else f"{self.labels[0]} moves",
+            less="less" if first > 0.0 else "more",
+            shown_size=_rounded(size, self.labels[0].startswith("theta")),
+            shown_leg=_rounded(self._leg_size(self.labels[clearest])),
             tilt=np.degrees(np.linalg.norm(self.sizes)),
             tilt_error=np.degrees(self.deviations.max()),
             clock=100.0 * abs(clock),

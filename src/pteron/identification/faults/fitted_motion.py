@@ -86,10 +86,24 @@ class FittedMotion:
 
     # How the rigid bodies' forces change with the machine
 
+    @cached_property
     def by_lengths(self) -> Array:
-        """Return slopes (R, n, k) of forces by each of `lengths_of`, the joints being measured."""
+        """Slopes (R, n, k) of forces by each of `lengths_of`, the joints being measured."""
         unit = np.eye(len(self._geometry))
         return self._along(unit[[place for _, place in lengths_of(self.model.robot)]])
+
+    @cached_property
+    def by_zeros(self) -> Array:
+        """Slopes (R, n, n) of forces by the zero of each joint."""
+        still = np.zeros_like(self.states.joints)
+        return self.by_give([still + 1.0, still, still])
+
+    @cached_property
+    def by_ratio(self) -> Array:
+        """Slopes (R, n, n) of forces as each joint moves less than was measured, as a share."""
+        s = self.states
+        middle = s.joints.mean(axis=0)
+        return self.by_give([s.joints - middle, s.joint_rates, s.joint_accelerations])
 
     def by_tilt(self) -> Array:
         """Return slopes (R, n, 2) of forces as gravity tilts about two axes."""

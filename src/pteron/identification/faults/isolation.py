@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
-from pteron.identification.faults.fault import FaultName, IsolatedFault, is_half
+from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
+from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import Record, knocks
 from pteron.identification.faults.search import FoundFault, cannot_be_told, searched
 from pteron.identification.logs import Log
@@ -50,6 +52,13 @@ _MOTION = 0.3
 _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
 
+_OF_FACTOR = (
+    "All forces of the bodies are {factor:.2g} times those of the drawing, as where the gain of "
+    "all torques or the gear ratio is off by that factor: check gains, rated torque and gear "
+    "ratio, or the drawing's masses."
+)
+"""Sentence on forces that have a factor in common beside those of the drawing."""
+
 _NAMED = 0.05
 """Percent of a cycle's forces from which a fault is named: statistics see smaller ones where a log
 has no noise, and the sampling itself makes them."""
@@ -76,9 +85,13 @@ class FaultIsolation:
         Faults that these logs cannot show: by the rank of their equations a common factor of all
         forces, a clock at another rate, a wrong scale of one force; and play, where no drive's load
         changes direction often enough.
-    held : bool
-        Whether forces are half a sample early or late, as where they are held from sample to
-        sample. In a log without noise this changes the values, even if too little to be named.
+    late : bool
+        Whether forces are late for positions, or early; in a log without noise this changes values,
+        even if too little to be named.
+    log : tuple of LogFault
+        Faults of the logs as such.
+    factor : float
+        Forces of the bodies over those of the drawing, where all have that factor in common.
     """
 
     tried: tuple[str, ...]
@@ -87,9 +100,24 @@ class FaultIsolation:
     spoiled: Array
     why_not: str = ""
     hidden: tuple[FaultName, ...] = ()
-    held: bool = False
+    late: bool = False
+    log: tuple[LogFault, ...] = ()
+    factor: float = 1.0
 
     suspicions = former_attribute("suspicions", "faults")
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """All that shows in a sentence each: log, scale, then machine, as to be mended."""
+        distorted = any(one.distorts for one in self.log)
+        of_file = [] if self.factor == 1.0 else [_OF_FACTOR.format(factor=self.factor)]
+        ranked = sorted(self.faults, key=lambda one: ORDER.index(one.fault))
+        # What comes first may look like what comes later: only the first gets a remedy.
+        machine = [
+            one.message if k == 0 and not distorted else one.beside_another
+            for k, one in enumerate(ranked)
+        ]
+        return (*(one.message for one in self.log), *of_file, *machine)
 
     @property
     def off(self) -> Array:
@@ -110,6 +138,7 @@ class FaultIsolation:
         """Return it as plain data."""
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.off}
         return picked(self, "tried why_not cannot_be_told=hidden faults") | {
+            "log": [one.as_dict() for one in self.log],
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
                 for name, values in shares.items()
@@ -133,6 +162,8 @@ def isolate_faults(
     recordings: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
     rotors: Mapping[str, float] | None = None,
+    *,
+    drawn: DrawnValues | None = None,
 ) -> FaultIsolation:
     """Return the faults of logs and machine that a fit's residuals show.
 
@@ -150,12 +181,14 @@ def isolate_faults(
         Preprocessing of each.
     rotors : mapping of str to float, optional
         Inertia that rotors are known to add at the joints, by the name of the value, SI units.
+    drawn : DrawnValues, optional
+        Values that the motion does not show, as drawn; they take part in each fit.
     """
     known, why_not = known_values(model, recordings, rotors or {}), ""
     for rows in (_ROWS, _MORE):
         try:
             parts = _parts(model, estimate, recordings, preprocessing, rows)
-            return _isolated(parts, model, estimate, known)
+            return _isolated(parts, model, estimate, known, drawn)
         except LogError as error:
             why_not = str(error)
         if sum(one.rows for one in recordings) <= rows:
@@ -165,23 +198,31 @@ def isolate_faults(
 
 
 def _isolated(
-    parts: list[_Part], model: Model, estimate: Estimate, known: Mapping[str, float]
+    parts: list[_Part],
+    model: Model,
+    estimate: Estimate,
+    known: Mapping[str, float],
+    drawn: DrawnValues | None,
 ) -> FaultIsolation:
     nothing = np.full(model.robot.joint_count, np.nan)
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
 
     # Which faults the residuals show
-    observations = _observed(parts)
+    def observed(some: Sequence[_Part]) -> Observations:
+        rows = _observed(some)
+        return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
+
+    observations = observed(parts)
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
     left_open = cannot_be_told(columns, observations, noise)
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
-    plain, found = searched(columns, observations, () if exact else None)
+    plain, found = searched(columns, observations, () if exact else None, noise)
     if any(one.family is DELAY for one in found):
         # Columns hold for small delays: other faults are sought after a long one is corrected.
-        late, shifted = _delay(parts)
+        late, shifted = _delay(parts, observed)
         rest = tuple(one for one in columns.families if one is not DELAY)
-        fit, found = _searched_for(rest, shifted)
+        fit, found = _searched_for(rest, shifted, observed)
         if late is not None:
             found.insert(0, replace(late, fit=fit))
 
@@ -219,7 +260,7 @@ def _isolated(
             family, seen = one.family, (one.sizes, one.deviations, one.chance, shift, spoils)
             speeds = None if family.speed is None else family.speed * columns.usual
             labels = tuple(family.sizes(model))
-            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step))
+            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, one.as_well))
 
     # Play, which no column has
     play, looked = _play(parts, estimate.values, step)
@@ -247,9 +288,8 @@ def _isolated(
         left_open.insert(0, "gain")
     shown = {one.fault for one in faults}
     hidden = tuple(fault for fault in left_open if fault not in shown)
-    delays = [one for one in found if one.family is DELAY]
-    half = any(is_half(float(one.sizes[0]), float(one.deviations[0]), step) for one in delays)
-    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, held=half)
+    delayed = any(one.family is DELAY for one in found)
+    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, late=delayed)
 
 
 def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:
@@ -291,7 +331,7 @@ def delay_of(
 ) -> float:
     """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
     parts = _parts(model, estimate, recordings, preprocessing)
-    _, shifted = _delay(parts)
+    _, shifted = _delay(parts, _observed)
     return shifted[0].how.delay - parts[0].how.delay
 
 
@@ -362,18 +402,23 @@ def _observed(parts: Sequence[_Part]) -> Observations:
 
 
 def _searched_for(
-    families: tuple[Family, ...], parts: Sequence[_Part]
+    families: tuple[Family, ...],
+    parts: Sequence[_Part],
+    observed: Callable[[Sequence[_Part]], Observations],
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
-    return searched(some[0].model, _observed(some))
+    noise = np.mean([part.how.force_noise for part in parts], axis=0)
+    return searched(some[0].model, observed(some), noise=noise)
 
 
-def _delay(parts: Sequence[_Part]) -> tuple[FoundFault | None, list[_Part]]:
+def _delay(
+    parts: Sequence[_Part], observed: Callable[[Sequence[_Part]], Observations]
+) -> tuple[FoundFault | None, list[_Part]]:
     """Return the whole delay of the logs' forces, None if none shows, and the parts without it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
-        _, found = _searched_for((DELAY,), shifted)
+        _, found = _searched_for((DELAY,), shifted, observed)
         if not found:
             break
         first, late = late or found[0], found[0]

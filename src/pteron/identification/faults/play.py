@@ -91,6 +91,8 @@ def _windows(records: Sequence[Record], band: float, joint: int) -> tuple[Array,
     near, far = [], []
     covered, samples = 0, 0
     for record in records:
+        if len(record.time) < 2:  # a stretch between lost samples
+            continue
         length = max(int(_LENGTH / band / float(np.median(np.diff(record.time)))), 2)
         square, moving = record.residual[:, joint] ** 2, record.moving[:, joint]
         turned = np.flatnonzero(np.diff(np.sign(record.load[:, joint])) != 0) + 1
@@ -107,4 +109,4 @@ def _windows(records: Sequence[Record], band: float, joint: int) -> tuple[Array,
             if free[at : at + length].all():
                 far.append(float(square[at : at + length].mean()))
         samples += len(square)
-    return np.array(near), np.array(far), covered / samples
+    return np.array(near), np.array(far), covered / max(samples, 1)

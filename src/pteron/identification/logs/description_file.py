@@ -29,19 +29,28 @@ _MOST = 8
 """Refusals of a log, at most, whose advice is followed in turn to complete its file."""
 
 
+OF_FOLDER = "logs.toml"
+"""Name of the description of all logs in a folder that have none of their own."""
+
+
 def find_description(log_path: str | Path) -> Path | None:
-    """Return the TOML file beside a log, of the same stem, or None where there is none.
+    """Return the TOML file beside a log, of the same stem, else the folder's `logs.toml`, or None.
 
     A manipulator's file is no description of a log, whatever it is called.
     """
-    path = Path(log_path).with_suffix(".toml")
+    own = Path(log_path).with_suffix(".toml")
+    return next((path for path in (own, own.with_name(OF_FOLDER)) if _describes_log(path)), None)
+
+
+def _describes_log(path: Path) -> bool:
+    """Say whether a file is there, and describes no manipulator."""
     if not path.is_file():
-        return None
+        return False
     try:
         document = read_toml(path, DataError, _ABSENT)
     except DataError:
-        return path  # what is wrong with it is told where it is read
-    return None if document.keys() >= _OF_A_MANIPULATOR else path
+        return True  # what is wrong with it is told where it is read
+    return not document.keys() >= _OF_A_MANIPULATOR
 
 
 def read_description(path: str | Path) -> Description:
@@ -143,7 +152,8 @@ def told_at_once(
     lines = description_text(about).partition("\n\n")[2]
     return DataError(
         f"{source}: {len(reasons)} things are not told: {numbered}. Check these lines, their "
-        f"units too, and put them into its TOML file:\n{lines}"
+        f"units too, and put them into its TOML file, or into {OF_FOLDER} for all logs of its "
+        f"folder:\n{lines}"
     )
 
 

@@ -248,7 +248,7 @@ class Log(OfLog):
 
     def without(self, rows: NDArray[np.bool_]) -> Log:
         """Return the samples without some, (T,): where they were is a gap."""
-        return replace(self, rows_in_file=_rows_of(self))._taken(np.flatnonzero(~rows))
+        return replace(self, rows_in_file=rows_of(self))._taken(np.flatnonzero(~rows))
 
     def _taken(self, rows: slice | NDArray[np.int64]) -> Log:
         held = {name: getattr(self, name) for name in _ARRAYS}
@@ -261,7 +261,7 @@ class Log(OfLog):
 def joined(pieces: Sequence[Log]) -> Log:
     """Return pieces that follow each other as one log, with what is said of the first."""
     if len(pieces) > 1 and any(piece.rows_in_file is not None for piece in pieces):
-        pieces = [replace(piece, rows_in_file=_rows_of(piece)) for piece in pieces]
+        pieces = [replace(piece, rows_in_file=rows_of(piece)) for piece in pieces]
     first = pieces[0]
     if len(pieces) == 1:
         return first
@@ -273,7 +273,7 @@ def joined(pieces: Sequence[Log]) -> Log:
     return replace(first, **changed)
 
 
-def _rows_of(log: Log) -> NDArray[np.int64]:
+def rows_of(log: Log) -> NDArray[np.int64]:
     """Return the index of each sample among the data rows of its file."""
     if log.rows_in_file is not None:
         return log.rows_in_file

@@ -18,7 +18,7 @@ MEDIAN_SIZE = 0.6744897501960817
 SETTLING = 6.0
 """Time that a filter needs at a block's ends, in periods of the cut-off: 1e-6 of a step is left."""
 
-_DIFFERENCE = 8
+DIFFERENCE = 8
 """Order of the differences that show noise: what a smooth motion leaves in them falls with this
 power of its sampling."""
 
@@ -77,8 +77,8 @@ def white_noise(signal: Array) -> Array:
     >>> bool(abs(white_noise(np.sin(t) + noise)[0] / 1e-6 - 1.0) < 0.05)
     True
     """
-    rough = np.abs(np.diff(signal, n=_DIFFERENCE, axis=0)) / np.sqrt(
-        comb(2 * _DIFFERENCE, _DIFFERENCE)
+    rough = np.abs(np.diff(signal, n=DIFFERENCE, axis=0)) / np.sqrt(
+        comb(2 * DIFFERENCE, DIFFERENCE)
     )
     # The median forgives jumps, such as those of Coulomb friction.
     spread = np.median(rough, axis=0) / MEDIAN_SIZE
@@ -120,6 +120,11 @@ def _grid(signal: Array) -> Array:
         if np.abs(multiples - np.round(multiples)).max() < _ON_GRID:
             steps[k] = step
     return steps
+
+
+def force_steps(forces: Array) -> Array:
+    """Return the step (n,) of the grid that forces' values stand on; 0 where there is none."""
+    return _grid(forces)
 
 
 def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:

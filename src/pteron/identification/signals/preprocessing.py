@@ -100,9 +100,9 @@ class Processing:
         not used: dry friction holds a joint at rest with any force, and turns in no time.
     delay : float or "auto", optional
         By how much the log's forces are late for its positions, s: they belong to the motion of so
-        much before; negative where positions are late. "auto" lets `identify` find it. By default
-        it finds and takes out the half sample by which forces that are held from sample to sample
-        are early or late, where the residuals show that, and else takes out none.
+        much before; negative where positions are late. By default `identify` finds it and takes it
+        out where the residuals show one, half the sample by which forces are held among them; 0.0
+        leaves it in. "auto" fits one in any case, and intervals allow for it.
     """
 
     derivatives: Derivatives | None = None

@@ -1,0 +1,53 @@
+"""Values of a fit where some of them are set otherwise: the others move with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pteron.kernels import Array
+
+_ROUNDS = 5
+"""Times, at most, that values below zero are set to zero and the others follow."""
+
+_ROUNDING = 1e-12
+"""Singular values of a correlation matrix, relative, that are rounding."""
+
+
+def conditional_shift(covariance: Array, places: Sequence[int], shift: Array) -> Array:
+    """Return the shift of all values (p,) of least cost by which some move by `shift`.
+
+    By a fit's covariance C (p, p) the others move by their regression on those: C_ab C_bb^-1 shift.
+    """
+    chosen = list(places)
+    if not chosen or not np.any(shift):
+        return np.zeros(len(covariance))
+    size = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    correlation = covariance / np.outer(size, size)
+    block = correlation[np.ix_(chosen, chosen)]
+    pull = np.linalg.lstsq(block, shift / size[chosen], rcond=_ROUNDING)[0]
+    moved = size * (correlation[:, chosen] @ pull)
+    moved[chosen] = shift
+    return np.asarray(moved)
+
+
+def conditional_values(
+    values: Array, covariance: Array, bodies: Array, positive: Sequence[int]
+) -> Array:
+    """Return values (p,) whose first ones are those of real `bodies` (rank,), none below zero.
+
+    Those at `positive` places that would be below zero are zero, and the others follow.
+    """
+    rank = len(bodies)
+    fixed, targets = list(range(rank)), bodies.tolist()
+    found = values
+    for _ in range(_ROUNDS):
+        shift = np.array(targets) - values[fixed]
+        found = values + conditional_shift(covariance, fixed, shift)
+        below = [k for k in positive if found[k] < 0.0 and k not in fixed]
+        if not below:
+            break
+        fixed += below
+        targets += [0.0] * len(below)
+    return np.asarray(found)

@@ -1,0 +1,114 @@
+"""Values that a motion does not show, left near the machine's drawing: a prior in the fit.
+
+A base parameter whose standard deviation exceeds its usual size is not measured. It gets a normal
+prior: its drawn value, with a deviation of its usual size. What the forces show of it stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.identification.estimators import Estimate
+from pteron.identification.estimators.estimate import residuals_of, whiteness
+from pteron.identification.model import Model
+from pteron.identification.observation import Observations
+from pteron.identification.plausibility import unseen, usual_sizes
+from pteron.kernels import Array
+from pteron.manipulator import parameters
+
+_LITTLE = 0.5
+"""Deviation after a fit, over that of the drawing, from which a value is called not shown."""
+
+
+@dataclass(frozen=True)
+class DrawnValues:
+    """Values of a drawing that stand for those that a motion does not show.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The base parameters that are told to be not shown: all K, or fewer.
+    places : array of int, shape (K,)
+        Their places among the values.
+    values, deviations : array, shape (K,)
+        Drawn values, and the deviations that they are given, SI units.
+    """
+
+    names: tuple[str, ...]
+    places: NDArray[np.int64]
+    values: Array
+    deviations: Array
+
+    @classmethod
+    def of(cls, model: Model, estimate: Estimate, known: Array) -> DrawnValues:
+        """Return those that a fit leaves open; `known` (p,) is the rotors' part of the values."""
+        names = unseen(model, estimate.deviations)
+        places = np.array([model.names.index(name) for name in names], dtype=np.int64)
+        drawn = parameters(model.robot)
+        values = (model.base.grouping @ drawn + known[: model.base.rank])[places]
+        return cls(names, places, values, usual_sizes(model.base, drawn)[places])
+
+    @classmethod
+    def of_all(cls, model: Model, known: Array) -> DrawnValues:
+        """Return the drawn values of all base parameters, for a log that does not determine them.
+
+        `known` (p,) is the rotors' part of the values.
+        """
+        drawn = parameters(model.robot)
+        values = model.base.grouping @ drawn + known[: model.base.rank]
+        places = np.arange(model.base.rank)
+        return cls(model.base.names, places, values, usual_sizes(model.base, drawn))
+
+    def told_of(self, estimate: Estimate) -> DrawnValues:
+        """Return it with the names of those only that are little better known after a fit."""
+        share = estimate.deviations[self.places] / self.deviations
+        names = zip(self.names, share.tolist(), strict=True)
+        return replace(self, names=tuple(name for name, s in names if s > _LITTLE))
+
+    def added_to(self, estimate: Estimate, observations: Observations) -> Estimate:
+        """Return the estimate with the drawn values as further measurements."""
+        if not len(self.places):
+            return estimate
+        size = np.maximum(estimate.deviations, np.finfo(float).tiny)
+        covariance = estimate.covariance / np.outer(size, size)
+        rows, own = covariance[self.places], self.deviations / size[self.places]
+        gain = np.linalg.solve(rows[:, self.places] + np.diag(own**2), rows).T
+        shift = gain @ ((self.values - estimate.values[self.places]) / size[self.places])
+        left = np.eye(len(size))
+        left[:, self.places] -= gain
+        # Joseph's form, which stays positive where deviations differ by many orders.
+        covariance = left @ covariance @ left.T + gain @ np.diag(own**2) @ gain.T
+        values = estimate.values + size * shift
+        rest = residuals_of(observations, values)
+        return replace(
+            estimate,
+            values=values,
+            covariance=0.5 * (covariance + covariance.T) * np.outer(size, size),
+            residuals=rest,
+            whiteness=whiteness(rest, observations.gain > 0.0),
+        )
+
+    def rows_beside(self, observations: Observations, noise: Array) -> Observations:
+        """Return observations with a row for each drawn value, weighted by forces' `noise` (n,)."""
+        count = len(self.places)
+        if not count:
+            return observations
+        n, p = observations.matrix.shape[1:]
+        matrix, forces = np.zeros((count, n, p)), np.zeros((count, n))
+        weights = noise[0] / self.deviations
+        matrix[np.arange(count), 0, self.places] = weights
+        forces[:, 0] = weights * self.values
+        gain = np.zeros((count, n))
+        gain[:, 0] = 1.0
+        step = float(np.median(np.diff(observations.time))) if len(observations.time) > 1 else 1.0
+        return replace(
+            observations,
+            matrix=np.concatenate([observations.matrix, matrix]),
+            forces=np.concatenate([observations.forces, forces]),
+            time=np.r_[observations.time, observations.time[-1] + step * np.arange(1, count + 1)],
+            gain=np.concatenate([observations.gain, gain]),
+            payload=np.r_[observations.payload, np.zeros(count, dtype=np.int64)],
+        )

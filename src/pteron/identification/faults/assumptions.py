@@ -1,0 +1,291 @@
+"""Assumptions of the machine's file that a log contradicts, tried one by one, discrete ones.
+
+Gear ratio or lead by a factor, gravity along another axis, another working mode, another order or
+sign of columns: none of these is small, so that no slope tells it. Each is tried on a few hundred
+samples, with all inertial parameters and friction free; what is left of the forces decides.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from pteron.equations.machine import closure_of
+from pteron.errors import PteronError, UnlikelyValue
+from pteron.identification.logs import Log
+from pteron.identification.observation import scaled
+from pteron.identification.signals import Preprocessing
+from pteron.json_values import picked
+from pteron.kernels import Array
+from pteron.kinematics import assembly_modes, direct_kinematics, follow
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
+from pteron.manipulator.variants import working_modes
+
+_LOOK = 12_000
+"""Rows of the log, at most, that these samples are from."""
+
+_SAMPLES = 400
+"""Samples that each assumption is tried on: 800 equations or more for some 40 values."""
+
+_DECISIVE = 3.0
+"""Factor by which another assumption must lower what is left of the forces."""
+
+_EXPLAINED = 0.03
+"""Share of the forces that may be left for them to count as explained, or three times their noise:
+with all parameters free other machines' logs leave 10 % or more."""
+
+_AS_GOOD = 1.3
+"""What is left, over the least, up to which the assumption that comes first is taken."""
+
+_FACTORS = (0.5, 2.0)
+"""Factors of gear ratios: double and half leads and counts. With smaller ones joints hardly move,
+and free parameters explain the forces of any log."""
+
+_MOST_LOST = 0.02
+"""Share of the samples, at most, that an assumption may leave without a pose."""
+
+_MODES = 16
+"""Working modes that are tried, those of fewest other elbows first."""
+
+_FEW_LEGS = 4
+"""Legs up to which exchanges of two are all that symmetry allows."""
+
+AssumptionName = Literal["ratio", "gravity", "mode"]
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """What the log says instead of the machine's file.
+
+    Attributes
+    ----------
+    fault : {"ratio", "gravity", "mode"}
+        Gear ratio, direction of gravity, working mode.
+    message : str
+        The fault and its remedy, in a sentence.
+    before, after : float
+        What is left of the forces, over them, as the file says, and so.
+    """
+
+    fault: AssumptionName
+    message: str
+    before: float
+    after: float
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it as plain data."""
+        return picked(self, "fault message before after")
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Samples of a log: joints, rates, accelerations and forces (R, n), the pose of the start."""
+
+    joints: Array
+    rates: Array
+    accelerations: Array
+    forces: Array
+    start: tuple[float, ...]
+
+
+def contradicted(
+    robot: Manipulator, log: Log, how: Preprocessing, rotors: Array
+) -> Assumption | None:
+    """Return the assumption that explains a log's forces far better than the file does.
+
+    `rotors` (n,) is the inertia that motors are known to add at the joints. None where none makes
+    what is left three times smaller.
+    """
+    samples = _samples(log, how, rotors)
+    if samples is None:
+        return None
+    before = _left(robot, samples)
+    noise = how.force_noise / np.maximum(samples.forces.std(axis=0), 1e-300)
+    explained = max(_EXPLAINED, 3.0 * float(noise.max()))
+    if before < explained:
+        return None
+    tried: list[Assumption] = []
+    for fault, message, other, changed in _tried(robot, samples):
+        after = _left(other, changed)
+        if after < explained and after * _DECISIVE < before:
+            tried.append(Assumption(fault, _sentence(message, before, after), before, after))
+    if not tried:
+        return None
+    least = min(one.after for one in tried)
+    first = next(one.fault for one in tried if one.after <= _AS_GOOD * least)
+    return min((one for one in tried if one.fault == first), key=lambda one: one.after)
+
+
+def exchangeable_legs(robot: Manipulator, log: Log, how: Preprocessing) -> tuple[str, ...]:
+    """Return pairs of legs, as words, whose exchange in the machine's file a log does not show.
+
+    Mirror images of each other, for instance: another machine, mirrored, explains the forces as
+    well. Machines of more than four legs have more exchanges than are tried.
+    """
+    count = len(robot.legs)
+    samples = _samples(log, how, np.zeros(count))
+    if samples is None or count > _FEW_LEGS:
+        return ()
+    before, pairs = _left(robot, samples), []
+    for i, j in combinations(range(count), 2):
+        order = list(range(count))
+        order[i], order[j] = j, i
+        parts = {k: v[:, order] for k, v in vars(samples).items() if k != "start"}
+        if _left(robot, replace(samples, **parts)) <= _AS_GOOD * before:
+            pairs.append(f"{i + 1} and {j + 1}")
+    return tuple(pairs)
+
+
+def _sentence(message: tuple[str, str], before: float, after: float) -> str:
+    fault, remedy = message
+    was = f"{100.0 * before:.2g} % of the forces is left"
+    if not np.isfinite(before):
+        was = "the joints have no poses"
+    return f"{fault}: as the file has it {was}, so {100.0 * after:.2g} %; {remedy}."
+
+
+def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
+    longest = max(log.segments, key=lambda part: part.stop - part.start)
+    part = log.part(longest.start, min(longest.stop, longest.start + _LOOK))
+    edge = how.differentiator.edge
+    if part.rows <= 2 * edge + _SAMPLES // 4:
+        return None
+    moved = how.differentiator.differentiated(part, edge)
+    q, rates, accelerations = moved.motion
+    rows = np.unique(np.linspace(0, len(q) - 1, _SAMPLES).astype(int))
+    forces = moved.forces - rotors * accelerations
+    return _Samples(q[rows], rates[rows], accelerations[rows], forces[rows], how.start)
+
+
+def _tried(
+    robot: Manipulator, s: _Samples
+) -> Iterator[tuple[Literal["ratio", "gravity", "mode"], tuple[str, str], Manipulator, _Samples]]:
+    """Yield assumptions: gear ratios, gravity along other axes, working modes."""
+    at_home = unchecked(robot, "joint_coordinates", np.array(s.start))
+    for factor in _FACTORS:
+        for middle, where in ((at_home, "home"), (np.zeros_like(at_home), "zero")):
+            moved = replace(
+                s,
+                joints=middle + factor * (s.joints - middle),
+                rates=factor * s.rates,
+                accelerations=factor * s.accelerations,
+            )
+            what = (
+                f"All joints move {factor:g} times as far from their {where} as the log says, as "
+                "where a gear ratio, a lead or a number of counts is off by that factor"
+            )
+            remedy = "check the ratio, lead or counts that positions are computed with"
+            yield "ratio", (what, remedy), robot, moved
+    yield from _turned_gravity(robot, s)
+    yield from _other_modes(robot, s)
+
+
+def _turned_gravity(
+    robot: Manipulator, s: _Samples
+) -> Iterator[tuple[Literal["gravity"], tuple[str, str], Manipulator, _Samples]]:
+    g = np.array(robot.gravity)
+    size = float(np.linalg.norm(g)) or 9.81
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            turned = np.zeros(3)
+            turned[axis] = sign * size
+            x, y, z = turned.tolist()
+            if np.abs(turned - g).max() < 1e-3 * size:
+                continue
+            name = f"{'-' if sign < 0.0 else ''}{'xyz'[axis]}"
+            message = (
+                f"Gravity is along {name}, not as in the machine's file",
+                f"write gravity = [{', '.join(f'{v:g}' for v in turned)}] into the file",
+            )
+            yield "gravity", message, replace(robot, gravity=(x, y, z)), s
+
+
+def _other_modes(
+    robot: Manipulator, s: _Samples
+) -> Iterator[tuple[Literal["mode"], tuple[str, str], Manipulator, _Samples]]:
+    count = len(robot.legs)
+    modes: list[tuple[list[int], Manipulator]] = []
+    for mode in working_modes(robot):
+        pairs = zip(mode.legs, robot.legs, strict=True)
+        changed = [i for i, (other, drawn) in enumerate(pairs) if other != drawn]
+        if changed:
+            modes.append((changed, mode))
+    # One leg is most often wrong, or all of them.
+    most = max((len(changed) for changed, _ in modes), default=count)
+    modes.sort(key=lambda pair: (len(pair[0]) not in (1, most), len(pair[0]), pair[0]))
+    for chosen, other in modes[:_MODES]:
+        names = ", ".join(str(i + 1) for i in chosen)
+        plural = "s" if len(chosen) > 1 else ""
+        message = (
+            f"The machine works in another working mode: the elbow{plural} of leg{plural} {names} "
+            f"{'are' if plural else 'is'} on the other side",
+            f"change the sign of elbow in leg{plural} {names} of the file",
+        )
+        yield "mode", message, other, s
+
+
+def _left(robot: Manipulator, s: _Samples) -> float:
+    """Return what is left of the forces, over their deviation, with all parameters free.
+
+    Infinite where the joints have no poses.
+    """
+    try:
+        with warnings.catch_warnings():
+            # Coordinates that look like degrees are one of the things that are tried.
+            warnings.simplefilter("ignore", UnlikelyValue)
+            paths = list(_paths(robot, s))
+    except PteronError:
+        return np.inf
+    return min((_residual(robot, pose, s) for pose in paths), default=np.inf)
+
+
+def _paths(robot: Manipulator, s: _Samples) -> Iterator[Array]:
+    """Yield the poses (R, m) of joints in each of the assembly modes that have them."""
+    if closure_of(robot).closed_form:
+        modes = assembly_modes(robot, s.joints)
+        for k in range(modes.shape[1]):
+            yield np.ascontiguousarray(modes[:, k])
+        return
+    starts: Sequence[Array] = [np.array(s.start)]
+    first = direct_kinematics(robot, s.joints[0], on_failure="nan")
+    starts = [*starts, *(pose for pose in np.atleast_2d(first) if np.isfinite(pose).all())]
+    for start in starts[:3]:
+        yield follow(robot, s.joints, start, on_failure="nan")
+
+
+def _residual(robot: Manipulator, pose: Array, s: _Samples) -> float:
+    good = np.isfinite(pose).all(axis=1)
+    if good.mean() < 1.0 - _MOST_LOST:
+        return np.inf
+    pose = np.ascontiguousarray(pose[good])
+    joints = unchecked(robot, "joint_coordinates", pose)
+    # Modes that direct kinematics does not tell apart have other joints.
+    if not np.abs(joints - s.joints[good]).max() < 1e-3 * max(1.0, np.abs(s.joints).max()):
+        return np.inf
+    velocity, acceleration = unchecked(
+        robot, "platform_motion", pose, s.rates[good], s.accelerations[good]
+    )
+    rigid = unchecked(robot, "regressor", pose, velocity, acceleration)
+    rates, n = s.rates[good], s.rates.shape[1]
+    diagonal = np.eye(n)
+    friction = [part[..., None] * diagonal for part in (np.sign(rates), rates, np.ones_like(rates))]
+    matrix = np.concatenate([rigid, *friction], axis=-1)
+    spread = np.maximum(s.forces[good].std(axis=0), 1e-300)
+    used = np.abs(rates) > 0.05 * np.sqrt((rates**2).mean(axis=0))
+    used &= np.isfinite(matrix).all(axis=-1)
+    flat, forces = (matrix / spread[:, None])[used], (s.forces[good] / spread)[used]
+    if len(flat) < 2 * flat.shape[1]:
+        return np.inf
+    columns = scaled(flat)[0]
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    basis = basis[:, sizes > 1e-9 * sizes[0]]
+    rest = forces - basis @ (basis.T @ forces)
+    means = (s.forces[good] / spread).mean(axis=0)
+    centred = forces - np.broadcast_to(means, used.shape)[used]
+    return float(np.linalg.norm(rest) / max(float(np.linalg.norm(centred)), 1e-300))

@@ -1,0 +1,133 @@
+"""Lost samples bridged, where one or a few are missing here and there.
+
+A filter loses its edges at each gap. Where gaps are rare that is little, and nothing is bridged;
+where they come every few rows nothing would be left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+
+from pteron.identification.logs.log import Finding, Log, gaps, rows_of, stretches
+from pteron.kernels import Array
+
+_LONGEST = 3
+"""Samples, at most, that are bridged: a gap of four steps is short for any motion that the sampling
+resolves (ten samples a period of its fastest part), and polynomials do not swing in it."""
+
+_OFTEN = 1e-3
+"""Gaps a row from which they are bridged: each costs a filter's edges, some hundred rows, so that
+fewer take less than a tenth of the log."""
+
+_SIDES = (8, 5, 3)
+"""Rows on each side of a gap that a polynomial is fitted to: those that predict known rows best."""
+
+_AROUND = 40
+"""Rows of a stretch, at least, that is filled: shorter ones are left to the filters' edges."""
+
+
+def bridged(log: Log) -> Log:
+    """Return a log with short gaps filled and a finding; unchanged if they are rare.
+
+    Positions get polynomials of degree 5, forces of degree 3, which passes on less noise.
+    """
+    if log.rows < 2:
+        return log
+    step = 1.0 / log.rate
+    apart = gaps(log.time, step)
+    missing = np.where(apart, np.rint(np.diff(log.time) / step).astype(int) - 1, 0)
+    short = (missing >= 1) & (missing <= _LONGEST)
+    if log.payload is not None:
+        short &= np.diff(log.payload) == 0
+    if short.sum() <= _OFTEN * log.rows:
+        return log
+    parts = []
+    for start, stop in stretches(apart & ~short):
+        part = log.part(start, stop)
+        lost = (missing * short)[start : stop - 1]
+        parts.append(part if part.rows < _AROUND else _filled(part, lost))
+    if any(part.rows_in_file is not None for part in parts):
+        parts = [replace(part, rows_in_file=rows_of(part)) for part in parts]
+    count = int(missing[short].sum())
+    message = (
+        f"{log.source}: {count} samples that are missing ({100.0 * count / (log.rows + count):.2g} "
+        f"%), at most {int(missing[short].max())} one after the other, are bridged by polynomials"
+    )
+    names = ("time", "joints", "forces", "pose", "payload", "rows_in_file")
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in names
+        if getattr(parts[0], name) is not None
+    }
+    finding = Finding("gap", message, count=count)
+    return replace(log, **joined, findings=(*log.findings, finding), step=step)
+
+
+def _filled(log: Log, missing: NDArray[np.int64]) -> Log:
+    """Return a stretch with `missing` (T - 1,) samples put in between its rows."""
+    places = np.repeat(np.arange(log.rows - 1), missing)
+    nth = np.concatenate([np.arange(1, k + 1) for k in missing[missing > 0]] or [np.zeros(0)])
+    share = nth / (missing[places] + 1.0)
+    instants = log.time[places] + share * (log.time[places + 1] - log.time[places])
+    time = np.concatenate([log.time, instants])
+    order = np.argsort(time, kind="stable")
+    rows = rows_of(log)
+
+    def between(values: Array, degree: int) -> Array:
+        filled = _fitted(log.time, values, places, instants, degree)
+        return np.asarray(np.concatenate([values, filled])[order])
+
+    return replace(
+        log,
+        time=time[order],
+        joints=between(log.joints, 5),
+        forces=between(log.forces, 3),
+        pose=None if log.pose is None else between(log.pose, 5),
+        payload=None if log.payload is None else np.r_[log.payload, log.payload[places]][order],
+        rows_in_file=np.concatenate([rows, rows[places]])[order],
+    )
+
+
+def _fitted(
+    time: Array, values: Array, places: NDArray[np.int64], instants: Array, degree: int
+) -> Array:
+    """Return values (K, n) at instants behind rows `places` (K,), of polynomials fitted around.
+
+    Through more rows than they have coefficients: an interpolated noise is no white one, and
+    filters and their cut-offs are made for white noise.
+    """
+    step = float(np.median(np.diff(time)))
+    side = _side(time / step, values, degree)
+    found = np.empty((len(places), values.shape[1]))
+    for k, (row, at) in enumerate(zip(places.tolist(), instants.tolist(), strict=True)):
+        start = min(max(row + 1 - side, 0), max(len(time) - 2 * side, 0))
+        rows = slice(start, start + 2 * side)
+        powers = np.vander((time[rows] - at) / step, degree + 1, increasing=True)
+        found[k] = np.linalg.lstsq(powers, values[rows], rcond=None)[0][0]
+    return found
+
+
+def _side(ticks: Array, values: Array, degree: int) -> int:
+    """Return how many rows on each side predict a row best, by polynomials of a degree.
+
+    Many rows make less of the noise, few follow a motion that is fast for its sampling.
+    """
+    errors = {}
+    for side in _SIDES:
+        offsets = np.r_[-side:0, 1 : side + 1].astype(float)
+        weights = np.linalg.pinv(np.vander(offsets, degree + 1, increasing=True))[0]
+        kernel = np.insert(weights, side, 0.0)
+        predicted = scipy.ndimage.correlate1d(values, kernel, axis=0)[side:-side]
+        whole = ticks[2 * side :] - ticks[: -2 * side] < 2 * side + 0.5
+        if whole.any():
+            errors[side] = np.median(np.abs(predicted - values[side:-side])[whole], axis=0)
+    if not errors:
+        return _SIDES[-1]
+    least = np.min([*errors.values()], axis=0)
+    tiny = np.finfo(float).tiny
+    return min(errors, key=lambda side: float((errors[side] / np.maximum(least, tiny)).max()))
