@@ -13,6 +13,7 @@ from mechanisms import CATALOG
 
 import pteron
 from pteron.errors import DataError
+from pteron.identification import identify
 from pteron.identification.logs import (
     Description,
     KnownPayload,
@@ -561,6 +562,23 @@ def test_arrays_of_a_log_fit_together(changed, told):
     with pytest.raises(DataError, match=told) as caught:
         Log("arrays", **arrays | changed)
     assert str(caught.value).startswith("arrays: ")
+
+
+@pytest.mark.parametrize("rows", [1, 5, 10, 15, 30])
+def test_a_log_of_a_few_rows_is_refused_in_words(rows):
+    rng = np.random.default_rng(0)
+    log = Log("log", 1e-3 * np.arange(rows), *rng.normal(size=(2, rows, 3)))
+    with pytest.raises(DataError, match="record longer"):
+        identify("linear-delta", log)
+
+
+def test_no_log_and_logs_of_other_machines_are_refused_in_words():
+    with pytest.raises(DataError, match="logs: none given"):
+        identify("linear-delta", [])
+    for legs in (2, 4):
+        log = Log("log", 1e-3 * np.arange(500), *np.zeros((2, 500, legs)))
+        with pytest.raises(DataError, match=f"{legs} legs"):
+            identify("linear-delta", log)
 
 
 def test_a_name_with_thousands_of_digits_is_no_joint():

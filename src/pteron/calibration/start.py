@@ -27,8 +27,8 @@ _TURNED = 0.5
 _OTHER_MODE = 0.05
 """Height residual, as a share of the machine's size, from which another assembly mode is tried.
 
-Assembly modes lie apart by a good part of the size, tolerances move a height by less than 1 % of
-it: between a half and twice this share no catalog machine starts in another mode."""
+Assembly modes lie apart by a good part of the size, tolerances of millimetres move a
+height by less than 1 % of it."""
 
 _PLANE = 3
 """Least heights that fix a plane's normal."""

@@ -15,14 +15,13 @@ is stated, twice that noise takes its place."""
 FINE_SHARE = 0.5
 """Share of the ordinary error up to which a calibration may be trustworthy.
 
-Chosen: half of what nobody needs to measure for. Errors of good calibrations are 0.02 to 0.2 mm,
-those with a fault above 1 mm, so that no grade of the tests changes between 0.3 and 0.8."""
+Chosen: half of what nobody needs to measure for."""
 
 FALLEN_SHARE = 0.5
 """Error after a fit, as a share of that before, above which it did not fall.
 
 It counts for errors that are not fine alone: a machine as good as its drawing has nothing to lose.
-A fit that explains a fault of the geometry takes away more than nine tenths of it."""
+Chosen: a fit that leaves half of an error explains another part of it than its cause."""
 
 STATED_NOISE = 2.0
 """Times of a stated noise that a held-out error may be: 99.7 % of six or more normal values."""
@@ -67,8 +66,8 @@ Five tolerances of a zero, 2 mm, on a travel of 0.5 m."""
 FAR_ROW = 30.0
 """Residual of a row on the drawing, over noise and tolerances, from which it is first set aside.
 
-No row of the tests' machines that are off by their tolerances exceeds 5; a row in another unit or
-assembly mode exceeds 100."""
+Chosen: far beyond what noise and tolerances make of a row, where sums of squares are no measure of
+it any more. A sound row that is set aside is taken back after the first fit."""
 
 
 def ordinary_error(kind: str, stated_noise: float | None) -> float:

@@ -43,6 +43,9 @@ where those of the log have no pose."""
 NO_COLUMN = "no payload column; declare one that is 0 without payload and 1 with it"
 """The fault of a log that does not tell when a payload is carried."""
 
+_FEWEST = 20
+"""Rows of a log from which a spectrum can be computed; the filters' edges take more."""
+
 _LOOK = 12_000
 """Rows, at most, in which other orders of joints are tried."""
 
@@ -61,12 +64,16 @@ def in_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
 def check_recordings(
     robot: Manipulator, whole: Sequence[Recording], others: Sequence[Recording], wanted: Processing
 ) -> None:
-    """Refuse recordings of currents, of values that are no forces, and what is given twice."""
+    """Refuse recordings that are none, too short, of currents, of no forces, or given twice."""
+    if not whole:
+        raise DataError("logs: none given, one or more expected")
     for one in (*whole, *others):
         # What is no force at all would hide how much the others change.
         if isinstance(one.log, Log):
             check_forces(one.log.forces, one.log.force_names, one.source, one.log.first_row)
         check_recorded(one.head())
+        if isinstance(one.log, Log) and one.rows < _FEWEST:
+            raise DataError(f"{one.source}: {one.rows} rows are too few to identify; record longer")
         unit = one.head().description.force_unit
         if unit != "N":
             other = f", {per_cent_advice(robot)}" if unit == "%" else ""

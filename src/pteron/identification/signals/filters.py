@@ -175,7 +175,8 @@ def cutoff_of(
     # What the noise makes of the accelerations' power, over what the motion makes of it
     passed = (fourth * gains**2).mean(axis=0)
     motion = (fourth * gains[:, [best]] ** 2 * power).mean(axis=0) - noise**2 * passed[best]
-    share = np.outer(passed, noise**2 / np.maximum(motion, np.finfo(float).tiny)).max(axis=1)
+    with np.errstate(over="ignore"):  # infinite where nothing of a motion is left
+        share = np.outer(passed, noise**2 / np.maximum(motion, np.finfo(float).tiny)).max(axis=1)
     below = 2.0 * candidates / rate
     near = candidates <= _REPEATED * candidates[best]
     allowed = (share <= harmless**2 * below) | (near & (share <= tolerable**2 * below))
