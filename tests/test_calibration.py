@@ -576,3 +576,26 @@ def test_wrong_names_and_numbers_are_one_line():
             calibrate(robot, given, free=given_free, prior=prior)
     with pytest.raises(DataError, match=r"readings: shape \(60, 2\) given"):
         calibrate(robot, replace(given, readings=given.readings[:, :2]))
+
+
+def test_measurements_from_arrays_and_tables_fit_together():
+    robot = pteron.load("delta")
+    poses = pteron.random_poses(robot, 6, seed=1)
+    read = pteron.inverse_kinematics(robot, poses)
+    names = [*robot.joint_names[::-1], "z", "x", "y"]
+    table = dict(zip(names, np.hstack([read[:, ::-1], poses[:, [2, 0, 1]]]).T, strict=True))
+    named = Measurements.of(robot, table, poses=table)
+    np.testing.assert_array_equal(named.readings, read)
+    np.testing.assert_array_equal(named.positions, poses)
+    np.testing.assert_array_equal(Measurements.of(robot, table, positions=table).positions, poses)
+    for wrong in (
+        {"poses": poses[:1]},
+        {"poses": poses[:, :2]},
+        {"positions": poses[:4]},
+        {"heights": poses},
+        {"heights": poses[:3, 0]},
+    ):
+        with pytest.raises(DataError, match=r"shape .* given, .* expected"):
+            Measurements.of(robot, read, **wrong)
+    with pytest.raises(DataError, match=r"readings: shape \(6, 2\) given, \(\.\.\., 3\) expected"):
+        Measurements.of(robot, read[:, :2])

@@ -6,7 +6,7 @@ NaN. `Setup` has what they refer to: marks on the platform, planes, anchors, the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,7 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.bodies.vectors import Vector
+from pteron.errors import DataError
+from pteron.kernels import as_array
 from pteron.manipulator import Manipulator
+from pteron.shapes import JointsLike, PoseLike
 
 KINDS = ("position", "angle", "height", "distance")
 """Kinds of measurements, each with a noise of its own."""
@@ -102,6 +105,22 @@ def position_axes(robot: Manipulator) -> Array:
     return np.eye(3) if whole else np.array(robot.platform.frame)
 
 
+def _rows_of(values: PoseLike | None, name: str, rows: int, columns: Sequence[str] = ()) -> Array:
+    """Return values as an array (rows, len(columns)), or (rows,) without; NaN where there are none.
+
+    Of a table they are the columns of these names.
+    """
+    shape = (rows, *([len(columns)] if columns else []))
+    if values is None:
+        return np.full(shape, np.nan)
+    numbers = as_array(values, name, shape[1:], columns=columns)
+    if numbers.shape != shape:
+        raise DataError(
+            f"{name}: shape {numbers.shape} given, {shape} expected: a row for each of the readings"
+        )
+    return numbers
+
+
 @dataclass(frozen=True)
 class Measurements:
     """N rows of measurements.
@@ -149,10 +168,10 @@ class Measurements:
     def of(
         cls,
         robot: Manipulator,
-        readings: ArrayLike,
+        readings: JointsLike,
         *,
-        poses: ArrayLike | None = None,
-        positions: ArrayLike | None = None,
+        poses: PoseLike | None = None,
+        positions: PoseLike | None = None,
         heights: ArrayLike | None = None,
         setup: Setup | None = None,
     ) -> Measurements:
@@ -172,20 +191,26 @@ class Measurements:
             Of the tool over the plane, m.
         setup : Setup, optional
             What they refer to; by default the base frame and the plane z = 0.
+
+        Raises
+        ------
+        DataError
+            If an array has another shape: a row for each row of readings.
         """
-        read = np.asarray(readings, dtype=float)
+        read = as_array(readings, "readings", (robot.joint_count,), columns=robot.joint_names)
+        read = read.reshape(-1, robot.joint_count)
         n, angular = len(read), robot.platform.angular
-        given = np.full((n, robot.freedom), np.nan) if poses is None else np.asarray(poses, float)
+        given = _rows_of(poses, "poses", n, robot.coordinates)
         at = np.full((n, 3), np.nan)
         at[:, length_columns(robot)] = given[:, ~angular]
         if positions is not None:
-            at = np.asarray(positions, dtype=float)
+            at = _rows_of(positions, "positions", n, ("x", "y", "z"))
         unnamed = (TOOL,) * n
         return cls(
             readings=read,
             positions=at,
             angles=given[:, angular],
-            heights=np.full(n, np.nan) if heights is None else np.asarray(heights, dtype=float),
+            heights=_rows_of(heights, "heights", n),
             distances=np.full(n, np.nan),
             origins=np.full(n, -1),
             marks=unnamed,
