@@ -62,6 +62,10 @@ def jerk_limited(
     Returns
     -------
     Motion
+        Its samples are on the planned motion, whose jerk keeps the limit everywhere. Between two
+        samples `Motion.at` is a polynomial of the pose: in a step in which the planned jerk jumps,
+        that of the polynomial overshoots, by up to some 60 %. A shorter `step` makes these parts
+        of the motion shorter, not lower.
 
     Raises
     ------
