@@ -363,7 +363,7 @@ def test_an_unreal_file_names_itself_and_the_body(tmp_path):
     text = path.read_text()
     assert text.count("inertia = 0.0021\n") == 1
     path.write_text(text.replace("inertia = 0.0021\n", "inertia = 0.00001\n"))
-    with pytest.raises(pteron.ModelError, match=r"unreal\.toml.*platform.*must be above"):
+    with pytest.raises(pteron.ModelError, match=r"unreal\.toml.*platform.*too far out"):
         pteron.load(path)
 
 

@@ -20,6 +20,7 @@ from mechanisms import CLIENTS
 
 import pteron
 from pteron.kernels import numeric
+from pteron.kernels.choice import Tier
 
 SURFACE = {
     "load",
@@ -387,7 +388,7 @@ def test_a_fork_while_code_is_compiled_goes_on():
 
 def test_an_interrupt_while_a_compilation_begins_leaves_the_way_free(monkeypatch):
     monkeypatch.delenv("PTERON_KERNELS")
-    kernel = numeric(pteron.load("five-bar"), "reach")
+    code = numeric(pteron.load("five-bar"), "room").tier.code
 
     class Interrupted:
         """Code whose source is interrupted."""
@@ -396,15 +397,11 @@ def test_an_interrupt_while_a_compilation_begins_leaves_the_way_free(monkeypatch
         def source(self):
             raise KeyboardInterrupt
 
-    code, kernel.tier.code = kernel.tier.code, Interrupted()
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            kernel.tier.missed(1.0)
-    finally:
-        kernel.tier.code = code
+    with pytest.raises(KeyboardInterrupt):
+        Tier(Interrupted(), 0.1).missed(1.0)
     # Another function is compiled without waiting for ever.
-    other = numeric(pteron.load("five-bar"), "room")
-    worker = threading.Thread(target=other.tier.fetch, kwargs={"at_any_cost": True}, daemon=True)
+    other = Tier(code, 0.1)
+    worker = threading.Thread(target=other.fetch, kwargs={"at_any_cost": True}, daemon=True)
     worker.start()
     worker.join(60.0)
     assert not worker.is_alive()

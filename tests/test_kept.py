@@ -27,6 +27,7 @@ PLAIN = {
         "renamed",
         "shapes",
         "templates",
+        "thresholds",
         "toml",
     ),
 }

@@ -549,7 +549,7 @@ def test_escape_codes_in_a_name_do_not_reach_the_terminal(tmp_path):
         ({"time": np.zeros((10, 1))}, r"time of shape \(10, 1\) given, \(T,\) expected"),
         ({"time": [0.1 * i for i in range(9)] + [np.nan]}, "row 10, time: a finite number"),
         ({"time": np.zeros(10)}, "row 2: the time does not rise here"),
-        ({"forces": [[0.0, 0.0]] * 4 + [[0.0, np.nan]] + [[0.0, 0.0]] * 5}, "row 5, forces: a fin"),
+        ({"joints": [[0.0, 0.0]] * 4 + [[0.0, np.nan]] + [[0.0, 0.0]] * 5}, "row 5, joints: a fin"),
         ({"payload": np.zeros(3, int)}, r"payload of shape \(3,\) given, \(10,\) expected"),
         ({"joints": "abc"}, "joints: not an array of real numbers"),
     ],

@@ -282,9 +282,9 @@ def _periodic(
 
     def regressor(part: slice) -> Array:
         phases = None if log.payload is None else np.full(len(time[part]), log.payload[0])
-        first_row = log.first_row + part.start
-        at = replace(log, time=time[part], payload=phases, first_row=first_row)
-        states = States.of_log(model.robot, at, series.at(time[part]), preprocessing.start)
+        about: dict[str, Any] = {"source": log.source, "first_row": log.first_row + part.start}
+        motion, start = series.at(time[part]), preprocessing.start
+        states = States.of_joints(model.robot, motion, time[part], start, payload=phases, **about)
         return np.asarray(shown[part][..., None] * model.matrix(states)).reshape(len(states), -1)
 
     n, p = used.shape[1], len(model.names)

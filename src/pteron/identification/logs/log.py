@@ -112,8 +112,8 @@ class Log(OfLog):
     Raises
     ------
     DataError
-        If values of an array are masked, have another shape, or are not finite; or if the time does
-        not rise.
+        If values of an array are masked or have another shape, if joints or times are not finite,
+        or if the time does not rise.
     """
 
     source: str
@@ -168,7 +168,8 @@ class Log(OfLog):
             raise DataError(
                 f"{self.source}: {name} of shape {found.shape} given, ({expected}) expected"
             )
-        if not np.isfinite(found).all() and name != "pose":
+        # Forces that are none are told where they count, and poses may be missing.
+        if name not in ("pose", "forces") and not np.isfinite(found).all():
             row = int(np.flatnonzero(~np.isfinite(found.reshape(rows, -1)).all(axis=1))[0])
             raise DataError(
                 f"{self.place(row)}, {name}: a finite number expected; leave the row out, a gap in "
