@@ -60,8 +60,8 @@ def export_c(
     radians; matrices by rows) and returns a status: 0, or 1 where a leg does not reach (or the pose
     is NaN), or 2 where a result is not finite (singular, or an input was not). The outputs are
     always defined: what cannot be computed is NaN. Roots and divisions are guarded, so that no
-    floating-point trap is set off by a pose out of reach or singular; infinities and numbers beyond
-    1e30 may overflow.
+    floating-point trap is set off by a pose out of reach or singular; infinities and numbers
+    whose powers leave the range of the type may overflow.
 
     Parameters
     ----------
