@@ -450,4 +450,4 @@ def test_forces_that_are_not_finite_end_a_simulation_and_are_named():
     for value in (np.nan, np.inf):
         controller = Returning((np.full(3, value), ()))
         result = simulate("tripteron", None, controller, start=(rest, rest), duration=0.01)
-        assert "the controller asks for forces that are not finite numbers" in result.stopped
+        assert "the controller returns some that are not finite numbers" in result.stopped

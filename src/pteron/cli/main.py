@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from io import StringIO
+from traceback import walk_tb
 from typing import Any
 
 from typer import Abort, Context, Exit, Typer, echo
@@ -78,7 +79,7 @@ class CommandGroup(TyperGroup):
             _close_standard_output()
             status = _PIPE_CLOSED
         except OSError as error:
-            where = error.filename or ("standard output" if _output_fails() else "")
+            where = error.filename or ("standard output" if _by_output(error) else "")
             complain(f"{where}{': ' * bool(where)}{error.strerror or error}")
             _close_standard_output()
             status = _USER_ERROR
@@ -105,13 +106,10 @@ def _noted(message: Warning | str, category: type[Warning], *place: Any, **_: An
         sys.stderr.write(warnings.formatwarning(message, category, *place[:2]))
 
 
-def _output_fails() -> bool:
-    """Return whether nothing more can be written to standard output, as on a full disk."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        return True
-    return False
+def _by_output(error: OSError) -> bool:
+    """Return whether an error was raised by what writes to standard output, as on a full disk."""
+    modules = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)]
+    return "pteron.cli.terminal" in modules or modules[-1].partition(".")[0] in ("rich", "click")
 
 
 def _open_closed_streams() -> None:

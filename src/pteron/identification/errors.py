@@ -12,6 +12,7 @@ Reason = Literal[
     "contradicted",
     "currents",
     "gap",
+    "left over",
     "no payload",
     "no period",
     "no pose",

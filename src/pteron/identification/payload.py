@@ -28,7 +28,7 @@ from pteron.identification.fitting import (
 from pteron.identification.logs import Finding, Log
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
-from pteron.identification.plausibility import CHANCE, left_over, unphysical
+from pteron.identification.plausibility import CHANCE, left_over, unphysical, unseen
 from pteron.identification.recordings import Recording, recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.json_values import picked
@@ -40,6 +40,9 @@ from pteron.renamed import former_attribute
 
 if TYPE_CHECKING:
     from pteron.identification.result import Identification
+
+_MOST_UNSEEN = 0.5
+"""Share of base parameters that residuals may hide before a payload is refused: chosen."""
 
 _BOTH = frozenset(f"{name}_L" for name in LENGTH_POWERS)
 """Names of a payload's values: m_L, mgx_L, mgy_L, I_L, and those under a platform that tilts."""
@@ -274,6 +277,9 @@ def identify_payload(
         if unphysical(model, observations, estimate) or left_over(estimate, plans):
             check_columns(model, fit[0], plans[0])
         check_motion(model, estimate, plans, fit[0])
+        hidden, cause = unseen(model, estimate.deviations), left_over(estimate, plans)
+        if cause and len(hidden) > _MOST_UNSEEN * model.base.rank:
+            raise fit[0].log.fault("left over", cause)  # no verdict of a payload could say so
     return _payload(
         model, estimate, isolate_faults(model, estimate, fit, plans), [one.findings for one in fit]
     )

@@ -17,8 +17,10 @@ def template_masses(robot: Manipulator) -> str:
     """Return a sentence on masses that are those of a machine of the catalog, "" where none is.
 
     All links of the first leg have its masses or its sections (kg/m), and perhaps the platform.
-    The catalog's machines themselves, with their own legs, have none.
+    The catalog's machines themselves, in any working mode, have none.
     """
+    if robot.name in catalog():
+        return ""
     kinds = [leg.type for leg in robot.legs]
     motion = f'motion = "{robot.platform.motion}"'.encode()
     templates = [load(name) for name in catalog() if motion in contents(name)[0]]

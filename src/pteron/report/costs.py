@@ -28,10 +28,10 @@ Documents, notebook and report quote it; a test holds its figures against the co
 """
 
 _NAMES = {
-    "dense": "Eq. (15) as dense matrices",
-    "virtual work": "Eq. (13) as one graph",
-    "regressor": "Eq. (15) as one graph, J^-T [...] P",
-    "regressor, J^-T last": "Eq. (15) as one graph, J^-T last",
+    "dense": "Eq. (15), dense matrices",
+    "virtual work": "Eq. (13), one graph",
+    "regressor": "Eq. (15), graph, J^-T [...] P",
+    "regressor, J^-T last": "Eq. (15), graph, J^-T last",
     "factored": "factored inverse dynamics",
 }
 """Names of the forms on the page."""
@@ -63,12 +63,12 @@ def costs(base: BaseParameters) -> tuple[Cost, ...]:
     table = []
     for form in ("dense", *FORMS):
         complete, reduced = counts[form, "complete"], counts[form, "reduced"]
-        name, note = _NAMES[form], f"{fewer(reduced, complete)} operations"
+        name, note = _NAMES[form], fewer(reduced, complete)
         table.append(Cost(f"{name}, {len(every)} parameters", complete, ""))
         table.append(Cost(f"{name}, {base.rank} parameters", reduced, note))
     cheapest, complete = (counts["factored", which] for which in ("cheapest", "complete"))
-    name = f"{_NAMES['factored']}, {base.rank} parameters chosen for least cost"
-    table.append(Cost(name, cheapest, f"{fewer(cheapest, complete)} operations than complete"))
+    name = f"{_NAMES['factored']}, {base.rank} of least cost"
+    table.append(Cost(name, cheapest, f"{fewer(cheapest, complete)} than complete"))
     return tuple(table)
 
 

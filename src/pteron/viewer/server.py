@@ -33,6 +33,13 @@ _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 _LARGEST = (100 << 20) + (1 << 16)
 """Largest message, bytes: a file with a motion."""
 
+_FRAMES = "frame-ancestors 'self' " + " ".join(
+    f"{scheme}://{name}:*"
+    for scheme in ("http", "https")
+    for name in ("localhost", "127.0.0.1", "[::1]")
+)
+"""Who may show the page in a frame: servers of this machine, as a notebook's."""
+
 _GONE = 2.0
 """Time, s, for which closing waits for a tab that does not answer."""
 
@@ -150,7 +157,7 @@ class Server:
         del found.headers["Content-Type"]
         found.headers["Content-Type"] = "text/html; charset=utf-8"
         found.headers["Cache-Control"] = "no-store"
-        found.headers["Content-Security-Policy"] = "frame-ancestors 'self'"
+        found.headers["Content-Security-Policy"] = _FRAMES
         return found
 
     def _handle(self, connection: ServerConnection) -> None:

@@ -32,6 +32,10 @@ _FELT = 0.5
 """Position errors of jitter, over the positions' other noise, from which it is named: below it adds
 less than an eighth to the noise."""
 
+_UNEVEN = 0.05
+"""Jitter, over the time step, from which it is named. Chosen: 1 %, as of a usual clock, leaves the
+forces of a cycle within 0.2 %."""
+
 _COARSE = 0.02
 """Step of forces' values, over their deviation, from which it is named: rounding by 0.6 % of the
 deviation, more than usual noise of 0.5 %."""
@@ -101,7 +105,7 @@ def log_faults(
         found.append(LogFault("lost", f"{message}.", share, False))
     for log, how in zip(logs, preprocessing, strict=True):
         jitter, clear, noise = sampling_jitter(log, how)
-        if clear > _SURE and noise > _FELT:
+        if clear > _SURE and noise > _FELT and jitter * log.rate > _UNEVEN:
             message = (
                 f"Samples of {log.source} are taken {1e3 * jitter:.2g} ms (rms) off their time "
                 "stamps, at random (jitter): record with stamps of the drives' own clock, or at "

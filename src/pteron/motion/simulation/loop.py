@@ -188,7 +188,7 @@ def run(
     )
     why = None
     if fault == _ASKED and ask is not None:
-        why = "the controller asks for forces that are not finite numbers"
+        why = "no forces are asked for: the controller returns some that are not finite numbers"
     elif fault == _ASKED:
         why = (
             f"no forces are asked for at the joints {told_pose(columns['joints'][-1])}: they have "
