@@ -327,6 +327,7 @@ def test_a_mass_edited_beside_its_first_moment_is_explained(tmp_path):
 
 def test_masses_of_the_template_are_named_again_until_they_are_edited(tmp_path):
     robot = with_dimensions("delta", base_radius=0.18, platform_radius=0.05, crank=0.2, rod=0.42)
+    robot = replace(robot, name="my delta")
     assert template_masses(robot).startswith(
         "masses are still those of delta: upper 1.76 kg (its section), lower 0.418 kg (its section)"
     )

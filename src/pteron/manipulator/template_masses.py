@@ -17,7 +17,7 @@ def template_masses(robot: Manipulator) -> str:
     """Return a sentence on masses that are those of a machine of the catalog, "" where none is.
 
     All links of the first leg have its masses or its sections (kg/m), and perhaps the platform.
-    The catalog's machines themselves, in any working mode, have none.
+    Machines with a name of the catalog are taken for these; `pteron new` gives others.
     """
     if robot.name in catalog():
         return ""
