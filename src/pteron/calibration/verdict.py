@@ -38,7 +38,7 @@ _ROD_ADVICE = (
 
 
 class Evidence(NamedTuple):
-    """What a verdict rests on."""
+    """The results from which a verdict is derived."""
 
     measurements: Measurements
     fit: Fit

@@ -23,8 +23,8 @@ class UnitRows(NamedTuple):
     """The rows of the legs at poses, in one unit."""
 
     rows: Array
-    """Of unit forces against the platform's motion, lengths and angles times L, (K, n, m); NaN
-    where a leg does not reach."""
+    """Wrench of each leg's unit force, moments divided by L, (K, n, m); NaN where a leg does not
+    reach."""
     sizes: Array
     """Joint rates over the unit rows' rates (K, n): force of the joint = force of the row / size,
     1/m for a crank and 1 for a ram or a slider along its row."""

@@ -22,7 +22,7 @@ PAPER_CLAIM = (  # Section 5 (d), Section 6
     "no regressor, the reduced regressor takes more operations, not fewer. No reading that we "
     "tried gives the second statement."
 )
-"""What the paper says of the speed of its reduced model, and which readings our figures support.
+"""The paper's statements on the speed of its reduced model, and the readings that figures support.
 
 Documents, notebook and report quote it; a test holds its figures against the counts.
 """

@@ -21,7 +21,7 @@ _TURNS = 12
 """Directions that the platform is turned to on that axis, where it turns about it."""
 
 _COARSE = 4
-"""Of those but the first, only every fourth of the poses along the axis is looked at."""
+"""Spacing, in steps along the axis, of the poses that all searches but the first take."""
 
 _GRID = {2: 41, 3: 11}
 """Level poses along each length of a grid, by the number of lengths: 1300 to 1700 in all."""

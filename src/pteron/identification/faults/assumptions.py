@@ -41,7 +41,7 @@ _EXPLAINED = 0.03
 with all parameters free other machines' logs leave 10 % or more."""
 
 _AS_GOOD = 1.3
-"""What is left, over the least, up to which the assumption that comes first is taken."""
+"""Residual, over the least one, up to which the assumption that comes first is taken."""
 
 _FACTORS = (0.5, 2.0)
 """Factors of gear ratios: double and half leads and counts. With smaller ones joints hardly move,
@@ -61,7 +61,7 @@ AssumptionName = Literal["ratio", "gravity", "mode"]
 
 @dataclass(frozen=True)
 class Assumption:
-    """What the log says instead of the machine's file.
+    """An assumption that explains the log better than that of the machine's file.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ _COARSE = 0.02
 deviation, more than usual noise of 0.5 %."""
 
 _EXTREME, _SHARE, _LEVEL = 0.01, 0.06, 5.0
-"""Of plateaus: the share of samples at which the extreme value is taken, the least share of samples
+"""Criteria of a plateau: the share of samples with the extreme value, the least share of samples
 within six deviations of it, and how many times as many they are as the next six. A sine has 2.4
 times as many, random motions without limits up to 0.1 and 4.8 (own plants), with limits 0.07 and 5
 or more."""

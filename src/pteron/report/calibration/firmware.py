@@ -14,7 +14,7 @@ from pteron.report.calibration.values import Row
 from pteron.report.typeset import measured
 
 _FREE = ("radius", "legs[1].angle", "legs[2].angle", "zeros")
-"""What Klipper, Marlin and RepRapFirmware fit: the third tower's angle fixes the others'."""
+"""Values that Klipper, Marlin and RepRapFirmware fit: the third tower's angle is the reference."""
 
 _QUANTILE = 1.96
 """Standard deviations of a 95 % interval."""
