@@ -34,7 +34,7 @@ _ODD = (
 
 def damaged_text(data: bytes, chance: Chance) -> bytes:
     """Return a text with a fault, or with two; one that has grown long has no second."""
-    longest = len(data) + 100_000
+    longest = len(data) + 2_000
     for _ in range(int(chance.integers(1, 3))):
         if len(data) > longest:
             break  # the patterns of numbers and keys here are slow on it
