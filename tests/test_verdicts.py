@@ -18,6 +18,7 @@ from pteron.cli.main import app
 from pteron.kinematics.singular_distance import coordinate_distances
 from pteron.manipulator import with_dimensions
 from pteron.manipulator.explained import explained
+from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.template_masses import template_masses
 from pteron.thresholds import (
     CROSSING,
@@ -181,6 +182,16 @@ def hexagons(shift, digits):
     return replace(robot, legs=tuple(legs))
 
 
+@pytest.mark.parametrize(
+    "command", [["report", "--out", "page"], ["size"], ["export", "--mjcf", "."]]
+)
+def test_no_command_goes_on_with_similar_hexagons(command):
+    name, *options = command
+    result = CliRunner().invoke(app, [name, str(BUILT / "rounded-hexagons.toml"), *options])
+    assert result.exit_code == 2
+    assert "singular everywhere within 0.15 um of these coordinates" in result.stderr
+
+
 @pytest.mark.parametrize("digits", [4, 5, 6])
 def test_the_verdict_on_similar_hexagons_survives_rounding(digits):
     robot = hexagons(0.0, digits)
@@ -276,6 +287,25 @@ def test_shifted_legs_of_a_delta_are_doubted():
     assert "legs 1, 2 and 3: look swapped" in layout_warnings(robot, home_pose(robot))[0]
 
 
+@pytest.mark.parametrize("key", ["tool", "center_of_mass"])
+def test_what_stands_beside_the_pin_of_a_five_bar_is_doubted(key):
+    """A pen on an extended link turns with the link; `check` said "Fine"."""
+    robot = pteron.load("five-bar")
+    if key == "tool":
+        platform = replace(robot.platform, tool=(0.03, 0.0, 0.0))
+    else:
+        inertia = replace(robot.platform.inertia, first_moment=(0.0, 0.03 * 0.03), inertia=3e-5)
+        platform = replace(robot.platform, inertia=inertia)
+    (warning,) = machine_warnings(replace(robot, platform=platform))
+    assert warning.startswith(f"platform: {key}: 30 mm beside the pin where the links meet")
+
+
+def test_a_tool_above_the_pin_or_on_a_platform_that_is_kept_parallel_is_not():
+    for name, tool in (("five-bar", (0.0, 0.0, -0.05)), ("delta", (0.03, 0.0, -0.05))):
+        robot = pteron.load(name)
+        assert machine_warnings(replace(robot, platform=replace(robot.platform, tool=tool))) == ()
+
+
 def check_of_a_built_machine(sort, seed):
     path = Path("robot.toml")
     path.write_text(machine_text(sort, seed), "utf-8")
@@ -299,6 +329,35 @@ def check_of_a_built_machine(sort, seed):
 @pytest.mark.parametrize("sort", SORTS)
 def test_machines_as_they_are_built_are_answered_at_once(sort, seed):
     check_of_a_built_machine(sort, seed)
+
+
+@pytest.mark.parametrize("seed", gated(range(30), {0}))
+@pytest.mark.parametrize("sort", SORTS)
+@CLIENTS
+def test_machines_as_they_are_built_are_reported_and_exported(sort, seed):
+    """The report's page and the files of engines and controllers, all at the pose of `check`."""
+    path = Path("robot.toml")
+    path.write_text(machine_text(sort, seed), "utf-8")
+    answer, _ = check(path)
+    commands = [["report", "--out", "page"]]
+    commands += [
+        ["export", f"--{kind}", kind] for kind in ("c", "mjcf", "urdf", "sdf", "pinocchio")
+    ]
+    for name, *options in commands:
+        result = CliRunner().invoke(app, [name, str(path), *options])
+        assert result.exit_code == 0, result.stderr
+    page = json.loads(Path("page/report.json").read_text("utf-8"))
+    assert page["home"]["pose"] == pytest.approx(answer["home_pose"])
+    assert page["doubts"][: len(answer["doubts"])] == answer["doubts"]
+    mujoco = pytest.importorskip("mujoco")
+    (name,) = Path("mjcf").iterdir()
+    model = mujoco.MjModel.from_xml_path(str(name))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    assert np.abs(data.efc_pos[data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]).max() < 1e-9
+    for file in (file for file in Path().rglob("*") if file.suffix in {".xml", ".urdf", ".sdf"}):
+        assert not re.search(r"\bnan\b|\binf\b", file.read_text("utf-8")), file
 
 
 def test_templates_keep_their_centres_of_mass_where_mass_is_edited(tmp_path):

@@ -23,12 +23,6 @@ if TYPE_CHECKING:
     from pteron.legs import LegKind
     from pteron.manipulator import Manipulator
 
-_LOOSE = (
-    "legs: parallel rods whose bars turn on hinges of their own leave the platform free to tilt in "
-    "every pose (constraint singularity): do legs share their hinges?"
-)
-"""A warning of `pteron check`."""
-
 _LIMITS = "LOW:HIGH expected, such as -0.3:0.3"
 """The form of `--limits`."""
 
@@ -177,35 +171,26 @@ def check(file: str, *, elbows: str | None = None) -> Result:
     warn(unlikely, f"{file}: ")
     try:
         with spinner(f"Looking where {robot.name} can work"):
-            found = _findings(robot, unlikely)
+            found = _findings(robot)
         warn(found["doubts"][len(unlikely) :], f"{file}: ")
     except PteronError as error:
         raise ModelError(error.message, subject=file) from None
     return Result(found, partial(_show, robot, found))
 
 
-def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
+def _findings(robot: Manipulator) -> dict[str, Any]:
     import numpy as np
 
-    from pteron.kinematics import architecture, inverse_kinematics, singular_orientations
+    from pteron.kinematics import inverse_kinematics, singular_orientations
     from pteron.manipulator.template_masses import template_masses
     from pteron.workspace import home_poses, limited_joints, pose_margins
-    from pteron.workspace.holding import holding, holding_warnings, singular_within_rounding
-    from pteron.workspace.leg_layout import layout_warnings
-    from pteron.workspace.load_warnings import load_warnings
-    from pteron.workspace.mode_places import elbow_warnings, mode_places
-    from pteron.workspace.screw_lengths import screw_warnings
+    from pteron.workspace.examination import examine
 
     # Refuses a singular layout, and one without a common reach with by how much legs miss it
     both = home_poses(robot)
     home = np.array(both.pose)
-    held = holding(robot, home)
-    if reason := singular_within_rounding(robot, held):
-        raise ModelError(reason)
-    layout = architecture(robot)
-    loose = () if layout.holds is not False else (_LOOSE,)
+    examination = examine(robot, home)
     position = home[: len(robot.platform.lengths)]
-    modes = mode_places(robot, home)
     return {
         **_machine(robot),
         "gravity": list(robot.gravity),
@@ -220,18 +205,16 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "home_reserve": float(pose_margins(robot, home).least),
         "home_named": both.named,
         "mirror_pose": None if both.mirror is None else list(both.mirror),
-        "holding": asdict(held),
+        "holding": asdict(examination.holding),
         "working_modes": [
-            picked(mode, "elbows=signs place depth pose margin named likely") for mode in modes
+            picked(mode, "elbows=signs place depth pose margin named likely")
+            for mode in examination.modes
         ],
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
-        "holds_orientation": layout.holds,
-        "self_motions": list(layout.self_motions),
+        "holds_orientation": examination.architecture.holds,
+        "self_motions": list(examination.architecture.self_motions),
         "template_masses": template_masses(robot),
-        "doubts": [
-            *(*unlikely, *loose, *layout_warnings(robot, home), *holding_warnings(held)),
-            *(*elbow_warnings(modes), *load_warnings(robot, home), *screw_warnings(robot)),
-        ],
+        "doubts": list(examination.warnings),
     }
 
 

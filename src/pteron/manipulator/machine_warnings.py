@@ -12,7 +12,7 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.vectors import Vector, cross
 from pteron.legs import LegKind
 from pteron.legs.drive_warnings import drive_warnings
-from pteron.manipulator.manipulator import Manipulator, told_legs
+from pteron.manipulator.manipulator import Manipulator, told_legs, unheld_axes
 from pteron.platforms import Platform
 from pteron.thresholds import STOUT_LINK
 
@@ -83,7 +83,32 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     if axis is not None:
         found += _turning_offsets(robot.legs, axis, platform.angles[0])
     found += _odd_one(robot)
+    found += _beside_the_pin(robot)
     return tuple(found)
+
+
+def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
+    """Yield what stands beside the pin where both legs of a five-bar meet."""
+    platform = robot.platform
+    if platform.tilts:
+        return
+    axes = unheld_axes(platform, robot.legs)
+    if len(axes) != 1:
+        return
+    to_base = np.array(platform.frame).T
+    pin = to_base @ robot.legs[0].platform_point + robot.legs[0].fixed_offset
+    places = {"tool": platform.tool, "center_of_mass": platform.inertia.center_of_mass}
+    places |= {f"point of tools item {i}": t.point for i, t in enumerate(robot.tools, start=1)}
+    for key, place in places.items():
+        # A planar body's centre of mass has two coordinates.
+        point = to_base @ np.array([*place, 0.0][:3])
+        beside = hypot(*np.cross(axes[0], point - pin))
+        if beside > _SAME:
+            yield (
+                f"platform: {key}: {1e3 * beside:.4g} mm beside the pin where the links meet, but "
+                "no leg keeps the platform from turning about that pin; on an extended link it "
+                "turns with the link, which this model does not: put it on the pin (0)"
+            )
 
 
 def _odd_one(robot: Manipulator) -> Iterator[str]:

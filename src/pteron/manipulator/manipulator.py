@@ -330,6 +330,17 @@ def _held(platform: Platform, legs: Sequence[LegKind]) -> Platform:
     return replace(platform, planes=tuple(planes))
 
 
+def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float64]:
+    """Return axes (k, 3) about which no leg keeps a platform that does not tilt from turning.
+
+    Only the points where both legs meet may carry anything there, as of a five-bar.
+    """
+    axis = platform.axis if platform.turns and not platform.slides else None
+    # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
+    withheld = [complement(leg.free_axes(axis)) for leg in legs]
+    return complement(np.vstack([*withheld, *([axis] if axis else [])]))
+
+
 def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
     """Return which freedom the legs leave the platform that its motion has not."""
     turning = [i for i, leg in enumerate(legs, start=1) if leg.follows_angle]
@@ -338,9 +349,8 @@ def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
     if platform.planar and all(leg.plane_normal is None for leg in legs):
         return [f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"]
     axis = platform.axis if platform.turns and not platform.slides else None
-    # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
     withheld = [complement(leg.free_axes(axis)) for leg in legs]
-    free = complement(np.vstack([*withheld, *([axis] if axis else [])]))
+    free = unheld_axes(platform, legs)
     if not len(free):
         return []
     if platform.motion == "2T":

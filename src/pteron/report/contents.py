@@ -17,7 +17,6 @@ from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.template_masses import template_masses
 from pteron.motion import (
     Motion,
@@ -46,9 +45,8 @@ from pteron.workspace import (
     reach_slice,
     reach_volume,
 )
-from pteron.workspace.load_warnings import load_warnings
+from pteron.workspace.examination import examine
 from pteron.workspace.reach_slices import Plane, reached, slice_planes
-from pteron.workspace.screw_lengths import screw_warnings
 from pteron.workspace.tilts import largest_tilt
 
 _ANGLES = 361
@@ -185,7 +183,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     return Report(
         robot=robot,
         doubts=(
-            *(machine_warnings(robot) + load_warnings(robot, home) + screw_warnings(robot)),
+            *examine(robot, home).warnings,
             *([masses] if (masses := template_masses(robot)) else []),
             *(() if motion is None else force_doubts(robot, motion)),
         ),

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from pteron.dynamics import inverse_dynamics
+from pteron.errors import ModelError
 from pteron.kernels import Array, bare
 from pteron.kinematics.ram_figures import similarity
 from pteron.kinematics.sampling import drawn_poses
@@ -68,9 +70,7 @@ class Holding:
 def holding(robot: Manipulator, home: Array) -> Holding:
     """Return how the drives hold the platform at home (m,) and about it."""
     poses = home[None]
-    length = unit_rows(robot, poses).length
-    drawn = drawn_poses(bare(robot), _POSES, np.random.default_rng(0), limits=False)
-    distances = coordinate_distances(robot, np.vstack([poses, drawn]))
+    length, distance, everywhere = _singular_distances(bare(robot), tuple(home.tolist()))
     near = _about(robot, home)
     weight = _weight(robot)
     forces = (
@@ -79,13 +79,23 @@ def holding(robot: Manipulator, home: Array) -> Holding:
     return Holding(
         length,
         float(least_singular_values(robot, poses)[0]),
-        float(distances[0]),
-        float(np.nanmax(distances)),
+        distance,
+        everywhere,
         rounding_of(length),
         weight,
         float(forces[0]),
         float(np.nanmax(forces)) if weight > 0.0 else np.nan,
     )
+
+
+@lru_cache(maxsize=256)
+def _singular_distances(robot: Manipulator, home: tuple[float, ...]) -> tuple[float, float, float]:
+    """Return L, the changes of coordinates that make home and any pose at all singular, m."""
+    poses = np.array([home])
+    drawn = drawn_poses(robot, _POSES, np.random.default_rng(0), limits=False)
+    distances = coordinate_distances(robot, np.vstack([poses, drawn]))
+    length = unit_rows(robot, poses).length
+    return length, float(distances[0]), float(np.nanmax(distances))
 
 
 def _about(robot: Manipulator, home: Array) -> Array:
@@ -110,22 +120,32 @@ def _forces(robot: Manipulator, poses: Array) -> Array:
     return np.asarray(np.abs(forces * unit_rows(robot, poses).sizes).max(axis=-1))
 
 
-def singular_within_rounding(robot: Manipulator, of: Holding) -> str:
-    """Return why a machine counts as singular everywhere: rounding of its file decides; else ""."""
-    if of.everywhere > of.rounding:
-        return ""
+def expect_regular(robot: Manipulator, home: Array) -> None:
+    """Refuse a machine that rounding of its file makes singular in every pose.
+
+    Raises
+    ------
+    ModelError
+        If no pose is farther from singular coordinates than files are rounded to.
+    """
+    length, _, everywhere = _singular_distances(bare(robot), tuple(home.tolist()))
+    rounding = rounding_of(length)
+    if everywhere > rounding:
+        return
     similar = similarity(robot)
     figures = ""
-    if similar is not None and similar[1] <= of.rounding:
+    if similar is not None and similar[1] <= rounding:
         figures = (
             f"guide points and platform points are similar figures within {_length(similar[1])}, "
             f"the latter {similar[0]:.4g} times the former; "
         )
-    return (
-        f"singular everywhere within {_length(of.everywhere)} of these coordinates (type II), less "
-        f"than the {_length(of.rounding)} that files are rounded to: {figures}a load takes leg "
-        f"forces up to {1.0 / of.least_singular_value:.2g} times as great at the best pose found; "
-        "change the figure of the platform points or that of the guide points"
+    least = float(least_singular_values(robot, home[None])[0])
+    raise ModelError(
+        f"singular everywhere within {_length(everywhere)} of these coordinates (type II), less "
+        f"than the {_length(rounding)} that files are rounded to: {figures}a load takes leg "
+        f"forces up to {1.0 / least:.2g} times as great at the best pose found; "
+        "change the figure of the platform points or that of the guide points",
+        subject=robot.name,
     )
 
 

@@ -22,6 +22,7 @@ from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.workspace.holding import expect_regular
 from pteron.workspace.home_starts import (
     axis_poses,
     grid_poses,
@@ -175,6 +176,7 @@ def home_poses(robot: RobotLike) -> HomePoses:
     robot = as_manipulator(robot)
     if robot.home is not None:
         expect_usable(robot, np.array(robot.home))
+        expect_regular(robot, np.array(robot.home))
         return HomePoses(robot.home, None, named=True)
     # Neither bodies nor drives matter; a refusal tells the name.
     return HomePoses(*_stored(replace(bare(robot), name=robot.name)))
@@ -220,12 +222,15 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
         raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
     side = sides(robot, refined)
     if not _are_mirrored(robot, refined, margins, side):
-        return tuple(_simplest(robot, refined, candidates).tolist()), None
+        home = _simplest(robot, refined, candidates)
+        expect_regular(robot, home)
+        return tuple(home.tolist()), None
     beside = sides(robot, candidates)
     pose, mirror = (
         tuple(_simplest(robot, refined[side == sign], candidates[beside == sign]).tolist())
         for sign in (1.0, -1.0)
     )
+    expect_regular(robot, np.array(pose))
     return pose, mirror
 
 

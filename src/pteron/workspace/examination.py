@@ -1,0 +1,61 @@
+"""A machine at its home pose, and all that is possible but unlikely of it.
+
+`pteron check` and the report state the same warnings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pteron.kernels import Array
+from pteron.kinematics.architecture import Architecture, architecture
+from pteron.manipulator import Manipulator
+from pteron.manipulator.machine_warnings import machine_warnings
+from pteron.workspace.holding import Holding, holding, holding_warnings
+from pteron.workspace.leg_layout import layout_warnings
+from pteron.workspace.load_warnings import load_warnings
+from pteron.workspace.mode_places import ModePlace, elbow_warnings, mode_places
+from pteron.workspace.screw_lengths import screw_warnings
+
+_TILTS = (
+    "legs: parallel rods whose bars turn on hinges of their own leave the platform free to tilt in "
+    "every pose (constraint singularity): do legs share their hinges?"
+)
+
+
+@dataclass(frozen=True)
+class Examination:
+    """A machine's measures at its home pose, its working modes, and warnings.
+
+    Attributes
+    ----------
+    holding : Holding
+        How the drives hold the platform.
+    architecture : Architecture
+        Whether the legs hold the platform's orientation, and its self-motions.
+    modes : tuple of ModePlace
+        Where the platform is in each working mode.
+    warnings : tuple of str
+        What is possible but unlikely, a line each.
+    """
+
+    holding: Holding
+    architecture: Architecture
+    modes: tuple[ModePlace, ...]
+    warnings: tuple[str, ...]
+
+
+def examine(robot: Manipulator, home: Array) -> Examination:
+    """Return a machine's measures, working modes and warnings at its home pose (m,)."""
+    measures, layout = holding(robot, home), architecture(robot)
+    modes = mode_places(robot, home)
+    warnings = (
+        *machine_warnings(robot),
+        *((_TILTS,) if layout.holds is False else ()),
+        *layout_warnings(robot, home),
+        *holding_warnings(measures),
+        *elbow_warnings(modes),
+        *load_warnings(robot, home),
+        *screw_warnings(robot),
+    )
+    return Examination(measures, layout, modes, warnings)
