@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
@@ -247,6 +248,25 @@ def test_standard_input_is_csv(monkeypatch: pytest.MonkeyPatch):
     table = read_table("-")
     assert table.source == "standard input"
     assert table.numbers(["y"]).tolist() == [[2.0]]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="FIFOs of POSIX")
+def test_a_fifo_and_a_device_are_refused_before_they_are_opened(tmp_path: Path):
+    """A FIFO without a writer waits for ever, and /dev/zero never ends."""
+    fifo = tmp_path / "poses.csv"
+    os.mkfifo(fifo)
+    for path in (fifo, "/dev/zero"):
+        with pytest.raises(DataError, match="it is a pipe or a device, not a file; pipe its text"):
+            read_table(path)
+
+
+@pytest.mark.skipif(not Path("/dev/fd").exists(), reason="open files by name")
+def test_a_pipe_that_a_shell_has_opened_is_csv():
+    out, into = os.pipe()
+    os.write(into, b"x,y\n1,2\n")
+    os.close(into)
+    assert read_table(f"/dev/fd/{out}").numbers(["y"]).tolist() == [[2.0]]
+    os.close(out)
 
 
 NOTES = b"n,note,x\n" + b"".join(

@@ -22,6 +22,9 @@ from pteron.tables.table import Table, listed, typed
 STANDARD_INPUT = "-"
 """The path that stands for CSV on standard input."""
 
+_OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
+"""Where a shell keeps the pipes that it has opened: they have a writer, and so an end."""
+
 _LONGEST_PATH = 1000
 """Characters of a path that a message shows."""
 
@@ -74,7 +77,8 @@ def read_table(path: str | Path) -> Table:
     Parameters
     ----------
     path : str or path
-        Its ending says which it is; what is no regular file, such as a pipe, is read as CSV.
+        Its ending says which it is. A pipe that the shell has opened, as ``<(...)`` does, is read
+        as CSV; a FIFO or a device by its name is refused: reading it may never end.
 
     Returns
     -------
@@ -95,8 +99,12 @@ def read_table(path: str | Path) -> Table:
             if sys.stdin is None:
                 raise DataError(f"{source}: is closed; give it a table, or name a file")
             file = CsvFile(sys.stdin.buffer.read(), source)
-        elif special.is_fifo() or special.is_char_device():
+        elif special.is_fifo() and str(path).startswith(_OPENED):
             file = CsvFile(special.read_bytes(), source)
+        elif special.exists() and not special.is_file() and not special.is_dir():
+            raise DataError(
+                f"{source}: it is a pipe or a device, not a file; pipe its text into - instead"
+            )
         else:
             file = open_table(path)
         return whole_table(file)
