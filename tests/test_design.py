@@ -41,6 +41,7 @@ from pteron.design.variables import geometry_slopes
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.indices import Elasticity, Tolerances, evaluate, pose_error, stiffness
+from pteron.manipulator.machine_record import expect_machine
 from pteron.manipulator.stretched_links import stretched
 from pteron.motion import Motor, choose, pick_and_place, size, with_payload
 from pteron.workspace import Box, conditions, largest_cube, prove
@@ -408,6 +409,10 @@ def test_the_command_writes_what_it_finds(tmp_path):
     assert best.name == "five-bar-best-links"
     chosen = next(one for name, one in data["chosen"].items() if "best-links" in name)
     assert chosen["workspace_proved"] == [True]
+    expect_machine(chosen["machine"], best, "design.json")
+    expect_machine(data["machine"], pteron.load("five-bar"), "design.json")
+    with pytest.raises(DataError, match="dimensions differ from those of five-bar-best-links"):
+        expect_machine(data["machine"], best, "design.json")
     assert chosen["links"] == pytest.approx(rows["links (m)"].min())
     again = run(line)
     assert json.loads(again.stdout) == data

@@ -20,6 +20,7 @@ from pteron.design.proofs import Proved, place_words, proved, workspace_share
 from pteron.design.spec import asked_words
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
+from pteron.manipulator.machine_record import machine_record
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
 from pteron.motion import Fit
@@ -146,6 +147,7 @@ class Summary:
         front = self.front
         return {
             "robot": front.task.robot.name,
+            "machine": machine_record(front.task.robot),
             "evaluated": front.evaluated,
             "kept": front.kept,
             "variables": [
@@ -210,7 +212,8 @@ def _lines(one: ReportedDesign) -> list[str]:
 
 def _data(one: ReportedDesign) -> dict[str, Any]:
     task = one.design.task
-    found: dict[str, Any] = {name: one.design.quantity(name) for name in task.asked}
+    found: dict[str, Any] = {"machine": machine_record(one.design.robot)}
+    found |= {name: one.design.quantity(name) for name in task.asked}
     found["known"] = {name: one.design.lack(name) or one.design.cover(name) for name in task.asked}
     if task.floats:
         found["workspace_center"] = one.design.cube.center.tolist() if one.workspace else None
