@@ -346,6 +346,34 @@ def test_a_tree_without_sources_works(tmp_path):
     assert done.stdout.startswith(str(len(pteron.__all__)))
 
 
+@CLIENTS
+def test_an_application_of_pyinstaller_has_all_modules_and_files(tmp_path):
+    """Its hook is the package's: modules that are imported lazily, catalog, templates, versions."""
+    pytest.importorskip("PyInstaller")
+    program = tmp_path / "app.py"
+    program.write_text(
+        "import sys, pteron\n"
+        "rest = [0.0, 0.0, 0.0]\n"
+        "print(pteron.inverse_dynamics('delta', [0, 0, -1], rest, rest))\n"
+        "from pteron.cli.main import app\n"
+        "app(['report', 'five-bar', '--out', sys.argv[1]])\n"
+    )
+    # Optional packages beside pteron's own, which make the application ten times as large.
+    left_out = "mujoco pinocchio jax pydrake gymnasium zarr xarray distributed dask numba pandas"
+    left_out += " codac sphinx IPython playwright pymoo clarabel toppra hypothesis pytest sdformat"
+    excluded = [word for name in left_out.split() for word in ("--exclude-module", name)]
+    build = [sys.executable, "-m", "PyInstaller", "--log-level", "ERROR", "app.py", *excluded]
+    subprocess.run(build, check=True, cwd=tmp_path, timeout=900)
+    page = tmp_path / "page"
+    done = subprocess.run(
+        [tmp_path / "dist" / "app" / "app", page], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("[18.04")
+    assert (page / "report.html").stat().st_size > 100_000
+    shutil.rmtree(tmp_path / "dist")  # 0.7 GB
+
+
 def test_without_gymnasium_all_of_the_package_can_be_looked_at():
     script = (
         "import sys; sys.modules['gymnasium'] = None\n"
