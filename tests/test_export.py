@@ -2,10 +2,12 @@
 
 import ctypes
 import json
+import platform
 import re
 import shutil
 import subprocess
 import textwrap
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -459,22 +461,28 @@ def test_a_file_that_is_no_identification_of_the_machine_is_refused(tmp_path):
     assert not (tmp_path / "c").exists()
 
 
+def exported_functions(robot, names):
+    """Return those of the functions that the machine has, as they are exported."""
+    functions = []
+    for name in names:
+        with suppress(ModelError):  # the machine has no such function
+            functions += chosen(
+                robot, name, specialised=False, wrench=False, output="force", base=None
+            )
+    return functions
+
+
 @pytest.mark.parametrize(
     "name", gated(["tripteron", "quadrupteron", "delta-4", "five-bar"], ["tripteron"], CLIENTS)
 )
 def test_no_function_is_well_where_a_pose_or_a_joint_is_no_number(name, tmp_path):
     """Not even where the outputs do not depend on it; and no output that is well is NaN."""
     robot = pteron.load(name)
-    exported = []
-    for what in FUNCTIONS:
-        try:
-            (item,) = chosen(
-                robot, what, specialised=False, wrench=False, output="force", base=None
-            )
-        except ModelError:  # the machine has no such function
-            continue
-        if {"pose", "joints"} & {port.name for port in item.inputs}:
-            exported.append(item)
+    exported = [
+        item
+        for item in exported_functions(robot, FUNCTIONS)
+        if {"pose", "joints"} & {port.name for port in item.inputs}
+    ]
     call, _ = compiled(robot, [item.name for item in exported], tmp_path)
     pose = states(robot, 1)[0][0]
     given = {
@@ -610,6 +618,31 @@ def test_no_pose_sets_off_a_floating_point_trap(tmp_path):
         assert found[0] == "0000000"
         assert found[1][0] == "1"
         assert found[1][2:6] == "1111"
+
+
+@CLIENTS
+@pytest.mark.parametrize(("real", "size"), [("double", 1e19), ("float", 1e3)])
+def test_large_numbers_overflow_no_sooner_than_the_documents_say(real, size, tmp_path):
+    """Gains, motions and poses all as large; flags tell as traps do."""
+    fenv = ctypes.CDLL(None)
+    flags = 0x0D  # FE_INVALID, FE_DIVBYZERO and FE_OVERFLOW of x86
+    if platform.machine() not in ("x86_64", "AMD64") or not hasattr(fenv, "fetestexcept"):
+        pytest.skip("flags of another processor")
+    robot, rng = CATALOG["delta"], np.random.default_rng(0)
+    names = [name for name in pteron.kernels.FUNCTIONS if name not in ("base_regressor", *LARGE)]
+    functions = exported_functions(robot, names)
+    call, _ = compiled(robot, [item.name for item in functions], tmp_path, real=real)
+    known = {"parameters": pteron.parameters(robot), "drives": drive_numbers(robot)}
+    for item in functions:
+        inputs = [
+            np.array(known[p.name])
+            if p.name in known
+            else size * rng.choice([-1.0, 1.0], size=p.shape) * rng.uniform(0.3, 1.0, size=p.shape)
+            for p in item.inputs
+        ]
+        fenv.feclearexcept(flags)
+        call(item.name, *inputs, sizes=[port.size for port in item.outputs])
+        assert fenv.fetestexcept(flags) == 0, item.name
 
 
 def test_the_code_is_what_a_controller_asks_for_and_a_person_can_read(tmp_path):
