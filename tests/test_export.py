@@ -25,7 +25,7 @@ from pteron.cli.main import app
 from pteron.equations.drives import drive_numbers
 from pteron.errors import DataError, ModelError, OutputError, UnlikelyValue
 from pteron.export import FUNCTIONS
-from pteron.export.functions import chosen
+from pteron.export.functions import exported_functions as exported
 from pteron.identification import Terms, identify
 from pteron.identification.signals import States
 from pteron.kernels.vm import VirtualMachine
@@ -466,9 +466,7 @@ def exported_functions(robot, names):
     functions = []
     for name in names:
         with suppress(ModelError):  # the machine has no such function
-            functions += chosen(
-                robot, name, specialised=False, wrench=False, output="force", base=None
-            )
+            functions += exported(robot, name, specialised=False)
     return functions
 
 

@@ -79,21 +79,21 @@ def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
     >>> regrouped(["robot", "--to", "0", "b", "-1", "--json"], [])
     ['robot', '--to=0,b,-1', '--json']
     """
-    kept: list[str] = []
+    options: list[str] = []
     free: list[str] = []
-    rest = deque(args)
-    while rest:
-        word = rest.popleft()
+    words = deque(args)
+    while words:
+        word = words.popleft()
         if word == "--":
-            free += rest
+            free += words
             break
-        if word in VECTORS and (count := _meant_for_vector(rest)):
-            kept.append(f"{word}={','.join(rest.popleft() for _ in range(count))}")
-        elif word in valued and rest:
-            kept += [word, rest.popleft()]
+        if word in VECTORS and (count := _meant_for_vector(words)):
+            options.append(f"{word}={','.join(words.popleft() for _ in range(count))}")
+        elif word in valued and words:
+            options += [word, words.popleft()]
         else:
-            (free if _numeric(word) else kept).append(word)
-    return [*kept, "--", *free] if free else kept
+            (free if _numeric(word) else options).append(word)
+    return [*options, "--", *free] if free else options
 
 
 def _meant_for_vector(words: Sequence[str]) -> int:
@@ -158,12 +158,12 @@ def split_numbers(
         If it has others, or none: it says what is expected.
     """
     try:
-        found = tuple(float(part) for part in text.split(between))
+        numbers = tuple(float(part) for part in text.split(between))
     except ValueError:
-        found = ()
-    if not found or (count is not None and len(found) != count):
+        numbers = ()
+    if not numbers or (count is not None and len(numbers) != count):
         raise DataError(f"{option}: {text!r} given, {expected}")
-    return found
+    return numbers
 
 
 def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = False) -> Manipulator:

@@ -58,69 +58,71 @@ def base(
         from pteron.reduction import base_parameters
 
         names = None if keep is None else [name.strip() for name in keep.split(",")]
-        found = base_parameters(machine, method, names, shared=shared)
-    data = found.as_dict()
+        parameters = base_parameters(machine, method, names, shared=shared)
+    data = parameters.as_dict()
     if written:
-        data["symbolic"] = list(found.expressions(symbols=written))
-        data["geometry"] = _geometry(found, written)
-        data["shared_symbols"] = {} if written == "leg" else found.shared_symbols
+        data["symbolic"] = list(parameters.expressions(symbols=written))
+        data["geometry"] = _geometry(parameters, written)
+        data["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
     if format_ == "json":
         return Result(data, partial(show_json, data))
     if format_ == "text":
-        return Result(data, partial(_show, found, written))
-    return Result(data, partial(_write, found, written, format_))
+        return Result(data, partial(_show, parameters, written))
+    return Result(data, partial(_write, parameters, written, format_))
 
 
 def _write(
-    found: BaseParameters, symbols: Symbols, form: Literal["sympy", "latex", "booktabs"]
+    parameters: BaseParameters, symbols: Symbols, form: Literal["sympy", "latex", "booktabs"]
 ) -> None:
     if form == "booktabs":
-        echo(found.to_latex(symbols=symbols))
+        echo(parameters.to_latex(symbols=symbols))
     else:
-        echo("\n".join(map(str, found.expressions(form, symbols=symbols))))
-    for line in _closing(found, symbols):
+        echo("\n".join(map(str, parameters.expressions(form, symbols=symbols))))
+    for line in _closing(parameters, symbols):
         echo(f"{_COMMENTS[form]} {line}")
 
 
-def _show(found: BaseParameters, symbols: Symbols) -> None:
-    expressions = found.expressions(symbols=symbols)
-    closing = [plain(line) for line in _closing(found, symbols)]
+def _show(parameters: BaseParameters, symbols: Symbols) -> None:
+    expressions = parameters.expressions(symbols=symbols)
+    closing = [plain(line) for line in _closing(parameters, symbols)]
     if not is_terminal():
         show(*(plain(line) for line in expressions), "", *closing)
         return
-    units = [found.parameters[column].unit for column in found.kept]
-    columns = zip(expressions, found.values(), units, strict=True)
+    units = [parameters.parameters[column].unit for column in parameters.kept]
+    columns = zip(expressions, parameters.values(), units, strict=True)
     rows = ((str(i), plain(e), f"{v:.5g}", u) for i, (e, v, u) in enumerate(columns, start=1))
     show(
-        f"[bold]{plain(found.robot.name)}[/bold]: {found.rank} base parameters of "
-        f"{len(found.columns)} inertial parameters",
+        f"[bold]{plain(parameters.robot.name)}[/bold]: {parameters.rank} base parameters of "
+        f"{len(parameters.columns)} inertial parameters",
         table("", "base parameter", "value", "unit", rows=rows, numbers=("", "value")),
         *closing,
     )
 
 
-def _geometry(found: BaseParameters, symbols: Symbols) -> dict[str, float]:
-    return found.leg_geometry_values if symbols == "leg" else found.geometry_values
+def _geometry(parameters: BaseParameters, symbols: Symbols) -> dict[str, float]:
+    return parameters.leg_geometry_values if symbols == "leg" else parameters.geometry_values
 
 
-def _closing(found: BaseParameters, symbols: Symbols) -> list[str]:
+def _closing(parameters: BaseParameters, symbols: Symbols) -> list[str]:
     """Return the values of the symbols, if there are any, and the proof."""
     lines = []
     if symbols:
-        given = _geometry(found, symbols)
-        lengths = ", ".join(f"{name} = {v:g}" for name, v in given.items())
+        geometry = _geometry(parameters, symbols)
+        lengths = ", ".join(f"{name} = {v:g}" for name, v in geometry.items())
         lines.append(f"In metres: {lengths}.")
-        shared = found.shared_symbols.items()
+        shared = parameters.shared_symbols.items()
         if shared and symbols == "leg":
-            text = "; ".join(", ".join((one, *others)) for one, others in shared)
+            text = "; ".join(", ".join((symbol, *others)) for symbol, others in shared)
             lines.append(f"Equal but for their sign, each with its symbol: {text}.")
         elif shared:
-            text = "; ".join(f"{one} stands for {', '.join(others)} too" for one, others in shared)
+            text = "; ".join(
+                f"{symbol} stands for {', '.join(others)} too" for symbol, others in shared
+            )
             lines.append(
                 f"Values that are equal but for their sign share a symbol: {text}. With "
                 "--leg-symbols each leg has its own."
             )
-    return [*lines, *found.certificate.summary().splitlines()]
+    return [*lines, *parameters.certificate.summary().splitlines()]
 
 
 def table1() -> Result:
@@ -133,20 +135,20 @@ def table1() -> Result:
     with spinner("Computing Table 1"):
         from pteron.report.table1 import rows as computed
 
-        found = computed()
-    wrong = sum(not row.agrees for row in found)
-    data = [picked(r, "parameter kept printed computed agrees restored") for r in found]
+        computed_rows = computed()
+    wrong = sum(not row.agrees for row in computed_rows)
+    data = [picked(r, "parameter kept printed computed agrees restored") for r in computed_rows]
     verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
     rows = (
         (r.parameter, plain(r.printed), plain(r.computed), verdicts[r.agrees] + " *" * r.restored)
-        for r in found
+        for r in computed_rows
     )
-    restored = [r.parameter for r in found if r.restored]
-    agree = f"{len(found) - wrong} of {len(found)} rows agree."
+    restored = [r.parameter for r in computed_rows if r.restored]
+    agree = f"{len(computed_rows) - wrong} of {len(computed_rows)} rows agree."
     if restored:
         agree += (
             f" Cells of {', '.join(restored)} (*) are damaged in our text of the paper and "
             "restored from its other rows."
         )
-    told = [table("", "printed", "computed", "agrees", rows=rows), agree]
-    return Result(data, told, code=1 if wrong else 0)
+    lines = [table("", "printed", "computed", "agrees", rows=rows), agree]
+    return Result(data, lines, code=1 if wrong else 0)

@@ -93,10 +93,10 @@ def calibrate(
         sources = [path for path in given_files if Path(path).is_file()]
         checked_apart(checked_folder(out) / "robot.toml", sources)
         tolerances = None if prior is None else _prior(prior)
-        given = read_measurements(machine, *(log or ()))
+        measurements = read_measurements(machine, *(log or ()))
         check = read_measurements(machine, *held_out) if held_out else None
-    with spinner(f"Calibrating {machine.name} from {len(given)} rows"):
-        result = calibrated(machine, given, free=free, prior=tolerances, held_out=check)
+    with spinner(f"Calibrating {machine.name} from {len(measurements)} rows"):
+        result = calibrated(machine, measurements, free=free, prior=tolerances, held_out=check)
     with spinner("Drawing the report"):
         firmware = firmware_fit(result)
         files = write_calibration(result, out, sources=sources, anyway=anyway, firmware=firmware)
@@ -107,15 +107,15 @@ def calibrate(
 def _prior(path: str) -> dict[str, float]:
     from pteron.toml import read_toml
 
-    found: dict[str, float] = {}
+    tolerances: dict[str, float] = {}
     for name, value in read_toml(path, DataError, f"{path}: there is no such file").items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise DataError(
                 f"{path}: {name} = {value!r}: a standard deviation in m or rad expected; a value's "
                 'name stands in quotes, as in "zeros[2]" = 0.0001'
             )
-        found[name] = float(value)
-    return found
+        tolerances[name] = float(value)
+    return tolerances
 
 
 def _plan(
@@ -137,24 +137,24 @@ def _plan(
 
         from pteron.calibration import plan
 
-        found = plan(machine, count, measure, setup=setup, free=free, prior=prior)
-        path = write_table(pl.DataFrame(found.columns()), out)
-    box = {name: list(side) for name, side in zip(("low", "high"), found.region.box, strict=True)}
-    expected = {"before": found.before, "after": found.after}
+        poses = plan(machine, count, measure, setup=setup, free=free, prior=prior)
+        path = write_table(pl.DataFrame(poses.columns()), out)
+    box = {name: list(side) for name, side in zip(("low", "high"), poses.region.box, strict=True)}
+    expected = {"before": poses.before, "after": poses.after}
     what, unit = ("tool's place", "mm") if machine.platform.lengths else ("angles", "mrad")
     off = "is" if unit == "mm" else "are"
     few = (
-        f"From {found.checked} poses on, some are held out to check the calibration by; with "
+        f"From {poses.checked} poses on, some are held out to check the calibration by; with "
         "fewer give a second log (--held-out)."
     )
-    told = [
-        f"{plain(machine.name)}: {count} poses at which to measure {measure}{_over(found)}, in a "
-        f"{_region(found)}; every pose of it is proved to serve",
-        f"The {what} {off} off by up to {1e3 * found.before:.3g} {unit} as drawn (one standard "
-        f"deviation of the tolerances); {1e3 * found.after:.3g} {unit} are expected to be left.",
-        *([few] if count < found.checked else []),
+    lines = [
+        f"{plain(machine.name)}: {count} poses at which to measure {measure}{_over(poses)}, in a "
+        f"{_region(poses)}; every pose of it is proved to serve",
+        f"The {what} {off} off by up to {1e3 * poses.before:.3g} {unit} as drawn (one standard "
+        f"deviation of the tolerances); {1e3 * poses.after:.3g} {unit} are expected to be left.",
+        *([few] if count < poses.checked else []),
     ]
-    return Result({"file": str(path), "expected": expected, "region": box}, told, [path])
+    return Result({"file": str(path), "expected": expected, "region": box}, lines, [path])
 
 
 def _level(text: str) -> Setup:
@@ -162,10 +162,10 @@ def _level(text: str) -> Setup:
     from pteron.calibration import Plane, Setup
     from pteron.cli.pose_ranges import pose_ranges
 
-    held, ranges = pose_ranges(text, "--plane")
-    if set(held) != {"z"} or ranges:
+    constants, ranges = pose_ranges(text, "--plane")
+    if set(constants) != {"z"} or ranges:
         raise DataError(f"--plane: {text!r} given; z=HEIGHT expected, in m, such as z=0")
-    return Setup(planes={"": Plane(offset=held["z"])})
+    return Setup(planes={"": Plane(offset=constants["z"])})
 
 
 def _over(planned: Plan) -> str:
@@ -222,10 +222,10 @@ def _values(result: Calibration) -> Table:
     from pteron.report.calibration import value_rows
 
     rows = value_rows(result)
-    more = len(rows) - _MOST
+    omitted = len(rows) - _MOST
     return _table(
         rows[:_MOST],
-        f"{more} more, which changed less, are on the page." if more > 0 else None,
+        f"{omitted} more, which changed less, are on the page." if omitted > 0 else None,
     )
 
 
@@ -249,16 +249,16 @@ def _table(rows: Sequence[Row], caption: str | None = None) -> Table:
 
 
 def _errors(result: Calibration) -> list[Table]:
-    held = result.held_out
-    if held is None:
+    held_out = result.held_out
+    if held_out is None:
         return []
     from pteron.report.typeset import significant
 
     numbers = ("before", "after", "expected")
     rows = []
-    for kind in held.after:
-        values = (held.before[kind], held.after[kind], held.expected[kind])
+    for kind in held_out.after:
+        values = (held_out.before[kind], held_out.after[kind], held_out.expected[kind])
         unit = "mrad" if kind == "angle" else "mm"
         rows.append((kind, *(ascii_number(significant(1e3 * value)) for value in values), unit))
-    caption = f"Errors at {held.rows} rows that were not fitted."
+    caption = f"Errors at {held_out.rows} rows that were not fitted."
     return [table("held out", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]

@@ -69,15 +69,15 @@ class Proofs:
 
     def check(self, maps: Mapping[str, object], slice_: str | None) -> None:
         """Refuse options that have no effect together, and numbers out of range."""
-        own = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
+        numbers = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
         if self.prove is not None:
             _expect_none({**maps, "slice": slice_, "certify": self.certify or None}, "--prove")
             _expect_none({"tolerance": self.tolerance}, "--prove, but with --certify")
         elif self.certify:
             _expect_none(maps, "--certify")
         else:
-            _expect_none(own, "a map, but with --certify or --prove")
-        for name, value in own.items():
+            _expect_none(numbers, "a map, but with --certify or --prove")
+        for name, value in numbers.items():
             least = "above 0" if name == "tolerance" else "of 0 or more"
             if value is not None and not (value > 0.0 or (value == 0.0 and name != "tolerance")):
                 raise DataError(f"--{name}: {value:g} given, a number {least} expected")
@@ -93,11 +93,11 @@ class Proofs:
         region = _region(robot, self.prove)
         warn(warnings)
         with spinner(f"Proving a region for {robot.name}"):
-            found = prove(robot, region, type_i=self.type_i or 0.0, type_ii=self.type_ii or 0.0)
-        told = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(found))]
-        told += self._unsure if found.holds else []
-        data = _proof(found, self.floors) | {"warnings": warnings}
-        return Result(data, told, code=0 if found.holds else _NOT_PROVED)
+            proof = prove(robot, region, type_i=self.type_i or 0.0, type_ii=self.type_ii or 0.0)
+        lines = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(proof))]
+        lines += self._unsure if proof.holds else []
+        data = _proof(proof, self.floors) | {"warnings": warnings}
+        return Result(data, lines, code=0 if proof.holds else _NOT_PROVED)
 
     @property
     def _unsure(self) -> list[str]:
@@ -110,34 +110,34 @@ class Proofs:
         with spinner(f"Proving how far {robot.name} leans"):
             leans = largest_tilt(robot, pose, given=conditions(robot, **self.floors))
         data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
-        told = [
+        lines = [
             _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),
             f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.",
         ]
-        return Result(data | {"proved": True, "warnings": warnings}, told + self._unsure)
+        return Result(data | {"proved": True, "warnings": warnings}, lines + self._unsure)
 
     def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> Result:
         from pteron.workspace import conditions, largest_cube, paving
 
         warn(warnings)
         tolerance = TOLERANCE if self.tolerance is None else self.tolerance
-        asked = conditions(robot, **self.floors)
+        required = conditions(robot, **self.floors)
         with spinner(f"Proving the workspace of {robot.name}"):
-            found = paving(robot, pose, tolerance=tolerance, given=asked)
-            _ = found.boundary_shares  # takes time, too
+            paved = paving(robot, pose, tolerance=tolerance, given=required)
+            _ = paved.boundary_shares  # takes time, too
             try:
-                cube = largest_cube(robot, pose, given=asked)
+                cube = largest_cube(robot, pose, given=required)
             except ModelError:
                 cube = None
-        if not found.complete:
+        if not paved.complete:
             note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
-        given = found, pose, self.floors, cube
-        return Result(_certified(*given) | {"warnings": warnings}, partial(_show, *given))
+        contents = paved, pose, self.floors, cube
+        return Result(_certified(*contents) | {"warnings": warnings}, partial(_show, *contents))
 
 
-def _expect_none(given: Mapping[str, object], what: str) -> None:
+def _expect_none(options: Mapping[str, object], what: str) -> None:
     """Refuse options that have no effect beside `what`."""
-    for name, value in given.items():
+    for name, value in options.items():
         if value is not None and value != []:
             raise DataError(f"--{name}: does not go with {what}")
 
@@ -149,14 +149,14 @@ def _orientation(robot: Manipulator, slice_: str | None) -> Array:
     from pteron.maps.grid import expect_coordinates
     from pteron.workspace import home_pose
 
-    held, ranges = pose_ranges(slice_, "--slice")
-    expect_coordinates(robot, held, ranges)
+    constants, ranges = pose_ranges(slice_, "--slice")
+    expect_coordinates(robot, constants, ranges)
     angles = robot.platform.angles or ("phi",)
-    if set(held) - set(angles) or ranges:
+    if set(constants) - set(angles) or ranges:
         expected = ",".join(f"{name}=VALUE" for name in angles)
         raise DataError(f"--slice: with --certify only {expected}, the orientation, is expected")
-    given = np.array([held.get(name, 0.0) for name in robot.coordinates])
-    return given if held else home_pose(robot)
+    pose = np.array([constants.get(name, 0.0) for name in robot.coordinates])
+    return pose if constants else home_pose(robot)
 
 
 def _region(robot: Manipulator, text: str) -> Box:
@@ -169,59 +169,59 @@ def _region(robot: Manipulator, text: str) -> Box:
 
 
 def _certified(
-    found: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None
+    paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None
 ) -> dict[str, Any]:
     return {
-        "robot": found.robot.name,
-        "held": _angles(found.robot, pose),
+        "robot": paved.robot.name,
+        "held": _angles(paved.robot, pose),
         "floors": floors,
-        **picked(found, "inner=inner_volume outer=outer_volume unit"),
-        "gap": found.gap if found.inner_volume else None,
-        "complete": found.complete,
-        "boxes": {"inner": len(found.inner), "undecided": len(found.boundary)},
-        "boundary": found.boundary_shares,
+        **picked(paved, "inner=inner_volume outer=outer_volume unit"),
+        "gap": paved.gap if paved.inner_volume else None,
+        "complete": paved.complete,
+        "boxes": {"inner": len(paved.inner), "undecided": len(paved.boundary)},
+        "boundary": paved.boundary_shares,
         "cube": cube and {**picked(cube, "edge center"), "proved": True},
     }
 
 
-def _proof(found: Proof, floors: dict[str, float]) -> dict[str, Any]:
-    pose, undecided = found.counterexample, found.undecided
-    low, high = found.region.box.tolist()
+def _proof(proof: Proof, floors: dict[str, float]) -> dict[str, Any]:
+    pose, undecided = proof.counterexample, proof.undecided
+    low, high = proof.region.box.tolist()
     return {
-        "robot": found.robot.name,
-        "region": dict(zip(found.robot.coordinates, zip(low, high, strict=True), strict=True)),
+        "robot": proof.robot.name,
+        "region": dict(zip(proof.robot.coordinates, zip(low, high, strict=True), strict=True)),
         "floors": floors,
-        "proved": found.holds,
+        "proved": proof.holds,
         "pose": None if pose is None else pose.tolist(),
         "undecided": None if undecided is None else undecided.tolist(),
-        "causes": [str(condition) for condition in found.causes],
-        "why": found.why or None,
-        "conditions": [str(condition) for condition in found.conditions],
-        "boxes": found.boxes,
+        "causes": [str(condition) for condition in proof.causes],
+        "why": proof.why or None,
+        "conditions": [str(condition) for condition in proof.conditions],
+        "boxes": proof.boxes,
     }
 
 
-def _show(found: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None) -> None:
-    robot, shares, (noun, shape) = found.robot, found.boundary_shares, _SHAPES[len(found.axes)]
+def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None) -> None:
+    robot, shares, (noun, shape) = paved.robot, paved.boundary_shares, _SHAPES[len(paved.axes)]
     show(_heading(robot, _angles(robot, pose), floors))
-    if not found.outer_volume:
+    if not paved.outer_volume:
         show("Proved: no position serves.")
         return
     show(
-        f"Proved {noun}: {found.inner_volume:.5g} to {found.outer_volume:.5g} {found.unit}, "
-        f"gap {percent(found.gap)} ({len(found.inner)} boxes inside, "
-        f"{len(found.boundary)} undecided)"
+        f"Proved {noun}: {paved.inner_volume:.5g} to {paved.outer_volume:.5g} {paved.unit}, "
+        f"gap {percent(paved.gap)} ({len(paved.inner)} boxes inside, "
+        f"{len(paved.boundary)} undecided)"
     )
     if cube is None:
         show(f"No {shape} of any size was found in it.")
     else:
         center = zip(robot.coordinates, cube.center.round(6).tolist(), strict=True)
         lengths = robot.platform.lengths
-        told = ", ".join(pose_text(name, value) for name, value in center if name in lengths)
-        show(f"Largest {shape} that was found, proved: edge {cube.edge:.4g} m about {told}")
-    rest = 1.0 - sum(shares.values())
+        coordinates = ", ".join(pose_text(name, value) for name, value in center if name in lengths)
+        show(f"Largest {shape} that was found, proved: edge {cube.edge:.4g} m about {coordinates}")
+    undistinguished = 1.0 - sum(shares.values())
     causes = {plain(cause): share for cause, share in shares.items()}
-    causes |= {"several, not told apart": rest} if rest > 0.0 else {}
+    causes |= {"several, not told apart": undistinguished} if undistinguished > 0.0 else {}
     rows = ((cause, percent(share)) for cause, share in causes.items())
     number = "share of the boundary"
     show(table("what ends it", number, rows=rows, numbers=(number,)))
@@ -231,9 +231,9 @@ def _show(found: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
 
 def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, float]) -> str:
     where = ", ".join(pose_text(name, angle) for name, angle in angles.items())
-    kept = ", ".join(f"{name} {value:g}" for name, value in floors.items() if value)
+    minimums = ", ".join(f"{name} {value:g}" for name, value in floors.items() if value)
     text = f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
-    return f"{text}, with floors {kept}" if kept else text
+    return f"{text}, with floors {minimums}" if minimums else text
 
 
 def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:

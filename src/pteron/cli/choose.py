@@ -56,16 +56,16 @@ def choose(
 
     if workers < 1:
         raise DataError(f"--workers: {workers} given, 1 or more expected")
-    asked = read_job(job)
+    requirements = read_job(job)
     if out is not None:
         from pteron.report.write import checked_folder
 
         checked_folder(out)
-    log = _Log(asked.search.evaluations, out)
+    log = _Log(requirements.search.evaluations, out)
     try:
         with progress_bar("Choosing") as bar:
-            found = choose_machine(
-                asked,
+            choice = choose_machine(
+                requirements,
                 folder=out,
                 workers=workers,
                 progress=lambda share, _: bar(share),
@@ -80,9 +80,9 @@ def choose(
     if out is not None:
         from pteron.report.choice.write import write_choice
 
-        files = write_choice(found, out)
-    data = found.data() | ({"files": [str(file) for file in files]} if files else {})
-    return Result(data, partial(_show, found), files, _NONE if found.best is None else 0)
+        files = write_choice(choice, out)
+    data = choice.data() | ({"files": [str(file) for file in files]} if files else {})
+    return Result(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
 
 
 class _Log:
@@ -105,35 +105,37 @@ class _Log:
                 f"proved: {', '.join(kinds)}"
             )
 
-    def finish(self, one: Candidate) -> None:
+    def finish(self, candidate: Candidate) -> None:
         """Tell what became of a kind."""
         self._done += 1
-        found = f"{one.kept} of {one.evaluated} designs keep all that is asked"
-        verdict = found if one.serves else f"falls out; {found}"
-        note(f"{self._done} of {self._count}: {one.kind}: {verdict}")
+        feasible = f"{candidate.kept} of {candidate.evaluated} designs keep all that is asked"
+        verdict = feasible if candidate.serves else f"falls out; {feasible}"
+        note(f"{self._done} of {self._count}: {candidate.kind}: {verdict}")
 
 
-def _show(found: Choice) -> None:
+def _show(choice: Choice) -> None:
     from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
 
-    show("[bold]Asked[/bold]: " + plain("; ".join(asked(found.job))))
-    serving = [one for one in found.candidates if one.serves]
-    rows = {one.kind: cells(one) for one in serving}
+    show("[bold]Asked[/bold]: " + plain("; ".join(asked(choice.job))))
+    serving = [candidate for candidate in choice.candidates if candidate.serves]
+    rows = {candidate.kind: cells(candidate) for candidate in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
     if serving:
-        made = ((kind, *(plain(row.get(n, "-")) for n in shown)) for kind, row in rows.items())
-        show(table("kind", *shown, rows=made, numbers=tuple(shown), names=("kind",)))
-    for one in serving:
-        show(
-            f"[bold]{one.kind}[/bold]: {plain(drives(one))}",
-            f"  mm: {dimensions(one)}",
-            f"  {plain(one.proved)}",
-            f"  {plain(one.clear)}",
-            f"  margins: {plain(margins(one))}",
+        table_rows = (
+            (kind, *(plain(row.get(n, "-")) for n in shown)) for kind, row in rows.items()
         )
-    for one in found.candidates:
-        if not one.serves:
-            near = plain("; ".join(one.why))
-            show(f"[bold]{one.kind}[/bold] falls out: the nearest design has {near}")
+        show(table("kind", *shown, rows=table_rows, numbers=tuple(shown), names=("kind",)))
+    for candidate in serving:
+        show(
+            f"[bold]{candidate.kind}[/bold]: {plain(drives(candidate))}",
+            f"  mm: {dimensions(candidate)}",
+            f"  {plain(candidate.proved)}",
+            f"  {plain(candidate.clear)}",
+            f"  margins: {plain(margins(candidate))}",
+        )
+    for candidate in choice.candidates:
+        if not candidate.serves:
+            near = plain("; ".join(candidate.why))
+            show(f"[bold]{candidate.kind}[/bold] falls out: the nearest design has {near}")
     if serving:
-        show(*(f"[dim]{plain(line)}[/dim]" for line in assumed(found)))
+        show(*(f"[dim]{plain(line)}[/dim]" for line in assumed(choice)))

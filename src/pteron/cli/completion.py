@@ -23,8 +23,8 @@ def machines(incomplete: str) -> list[str]:
         files = sorted(path.name for path in Path(head or ".").glob("*.toml"))
     except (OSError, ValueError):
         files = []
-    found = [*catalog(), *(f"{head}{name}" for name in files)]
-    return [name for name in found if name.startswith(incomplete)]
+    names = [*catalog(), *(f"{head}{name}" for name in files)]
+    return [name for name in names if name.startswith(incomplete)]
 
 
 def functions(incomplete: str) -> list[str]:
@@ -56,5 +56,5 @@ def parameters(ctx: Context, incomplete: str) -> list[str]:
         names = parameter_names(load(robot))
     except PteronError:
         return []
-    given = done.split(",")
-    return [f"{done}{comma}{n}" for n in names if n.startswith(last) and n not in given]
+    listed = done.split(",")
+    return [f"{done}{comma}{n}" for n in names if n.startswith(last) and n not in listed]

@@ -73,32 +73,32 @@ def cue(
         from pteron.report.write import checked_page
 
         checked_page(page)
-    given = scale, translation, return_speed, tilting, tilt_rate, rotation, smoothing
-    named = zip((field.name for field in fields(Washout)), given, strict=True)
+    options = scale, translation, return_speed, tilting, tilt_rate, rotation, smoothing
+    named = zip((field.name for field in fields(Washout)), options, strict=True)
     washout = Washout(**{name: value for name, value in named if value is not None})
     with spinner(f"Showing {motion} with {machine.name}"):
-        found = shown(machine, motion, washout=washout, type_ii=type_ii)
-        largest = peaks(machine, found.pose, found.velocity, found.acceleration, limits_of(machine))
+        cued = shown(machine, motion, washout=washout, type_ii=type_ii)
+        largest = peaks(machine, cued.pose, cued.velocity, cued.acceleration, limits_of(machine))
         files = []
         if out is not None:
-            write_table(motion_frame(machine, found), out)
+            write_table(motion_frame(machine, cued), out)
             files.append(out)
         if page is not None:
             from pteron.report.write import write_motion_page
 
-            files.append(str(write_motion_page(machine, found, page)))
+            files.append(str(write_motion_page(machine, cued, page)))
     for peak in largest:
         if peak.share > 1.0:
             note(f"Note: {peak.told()}; a smaller --scale asks less")
-    low, high = found.region.box
+    low, high = cued.region.box
     box = np.stack([low, high], axis=-1).tolist()
     data = {
         "robot": machine.name,
-        "duration": found.duration,
-        "samples": len(found.time),
+        "duration": cued.duration,
+        "samples": len(cued.time),
         "box": dict(zip(machine.coordinates, box, strict=True)),
-        "proved": bool(found.proof.holds),
-        "pressed": found.pressed,
+        "proved": bool(cued.proof.holds),
+        "pressed": cued.pressed,
         "files": files,
     }
     units = (machine.platform.units, low, high)
@@ -108,10 +108,10 @@ def cue(
         else f"{name} {57.29578 * a:.4g} to {57.29578 * b:.4g} deg"
         for name, unit, a, b in zip(machine.coordinates, *units, strict=True)
     )
-    length = f"{found.duration:.4g} s, {len(found.time)} samples"
-    told = [
+    length = f"{cued.duration:.4g} s, {len(cued.time)} samples"
+    lines = [
         f"{length}, within a box that is proved: {sides}",
-        f"pressed together by at most {found.pressed:.0%}",
+        f"pressed together by at most {cued.pressed:.0%}",
         peaks_table(largest),
     ]
-    return Result(data, told, files)
+    return Result(data, lines, files)

@@ -161,9 +161,9 @@ def cycle(
     return _result(machine, way, motion, limits, carried, out)
 
 
-def _expect_fitting(way: str, given: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
+def _expect_fitting(way: str, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
     """Refuse options of another kind of motion."""
-    for name, (value, kinds) in given.items():
+    for name, (value, kinds) in options.items():
         if value not in (None, False, 0.0) and way not in kinds:
             raise DataError(
                 f"--{name}: has no use in a motion of kind {way}; leave it out, or give --kind "
@@ -188,8 +188,8 @@ def _result(
         note(f"Note: {text}")
     count = _DENSE * (len(motion.time) - 1) + 1
     fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
-    found = peaks(machine, *motion.at(fine), limits)
-    for peak in found:
+    largest = peaks(machine, *motion.at(fine), limits)
+    for peak in largest:
         if peak.share > 1.0 + _ROUNDING:  # of a motion that came in a table
             note(f"Note: {peak.told()}")
     if out is not None:
@@ -209,17 +209,17 @@ def _result(
         "scale": getattr(motion, "scale", None),
         "peaks": [
             picked(p, "quantity=name leg size unit limit share") | {"leg": p.leg or None}
-            for p in found
+            for p in largest
         ],
         "file": out,
     }
     text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
     if bound is not None:
         text += f"; a polynomial in time along the same path takes {bound:.4g} s"
-    return Result(data, partial(_show, [text, peaks_table(found)], out), [out] if out else [])
+    return Result(data, partial(_show, [text, peaks_table(largest)], out), [out] if out else [])
 
 
-def _show(told: list[str | Table], out: str | None) -> None:
-    show(*told)
+def _show(lines: list[str | Table], out: str | None) -> None:
+    show(*lines)
     if out is None:
         note("Note: no file is written; to have the motion, add --out FILE.csv")

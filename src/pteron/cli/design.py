@@ -68,19 +68,19 @@ def design(
     expect_extra("design", "pymoo", "a search needs pymoo")
     from pteron.design import Summary, read_spec
 
-    asked = read_spec(spec)
+    requirements = read_spec(spec)
     if sweep is not None and out is None:
         raise DataError("--sweep: needs --out, a folder for what is evaluated")
     if seed is not None and seed < 0:
         raise DataError(f"--seed: {seed} given, 0 or more expected")
     if seed is not None:
-        asked = asked.with_seed(seed)
+        requirements = requirements.with_seed(seed)
     if out is not None:
         from pteron.report.write import checked_folder
 
         checked_folder(out)
         _tell_resumed(Path(out))
-    front = _found(asked, out, sweep, workers, scheduler)
+    front = _found(requirements, out, sweep, workers, scheduler)
     summary = Summary(front)
     files = [] if out is None else _write(summary, Path(out))
     data = summary.data() | ({"files": [str(file) for file in files]} if files else {})
@@ -157,11 +157,13 @@ def _show(summary: Summary) -> None:
     lines = (*summary.start.proofs, *summary.start.lacking)
     show(*(f"To begin with: {plain(line)}" for line in lines))
     numbers = ("to begin with", "now", "change")
-    for told in summary.chosen:
-        rows = ((plain(c.what), c.shown(c.before), c.shown(c.after), c.by) for c in told.changes)
+    for reported in summary.chosen:
+        rows = (
+            (plain(c.what), c.shown(c.before), c.shown(c.after), c.by) for c in reported.changes
+        )
         show(
             "",
-            f"[bold]{plain(told.name.replace('-', ' '))}[/bold]",
+            f"[bold]{plain(reported.name.replace('-', ' '))}[/bold]",
             table("what", *numbers, rows=rows, numbers=numbers),
-            *(plain(line) for line in (*told.proofs, *told.covers)),
+            *(plain(line) for line in (*reported.proofs, *reported.covers)),
         )

@@ -51,7 +51,7 @@ class Destination:
         self,
         table: pl.DataFrame,
         data: dict[str, Any],
-        more: Callable[[], dict[str, str]],
+        further_files: Callable[[], dict[str, str]],
         person: Callable[[], None],
         code: int = 0,
     ) -> Result:
@@ -70,6 +70,6 @@ class Destination:
             from pteron.json_values import json_text
 
             texts = {f"{self.name}.csv": table.write_csv(), f"{self.name}.json": json_text(data)}
-            files = write_texts(self.out, texts | more())
-        told = {"files": [str(file) for file in files]} if files else {}
-        return Result(data | told, person, files, code)
+            files = write_texts(self.out, texts | further_files())
+        written = {"files": [str(file) for file in files]} if files else {}
+        return Result(data | written, person, files, code)

@@ -218,18 +218,18 @@ def excite(
     return Result(data, told, files)
 
 
-def _held_out(found: Excitation, rate: float) -> RepeatedCycle | None:
+def _held_out(excitation: Excitation, rate: float) -> RepeatedCycle | None:
     """Return the motion to be held out; None, with a note, where there is none."""
     try:
-        return found.held_out(rate)
+        return excitation.held_out(rate)
     except ModelError as error:
         note(f"Note: no motion to hold out: {error}")
         return None
 
 
-def _quality(found: Excitation) -> Table:
-    headings = ("optimised", f"best of {found.draws} random", "ratio")
-    best, random = found.conditioning, found.random
+def _quality(excitation: Excitation) -> Table:
+    headings = ("optimised", f"best of {excitation.draws} random", "ratio")
+    best, random = excitation.conditioning, excitation.random
     caption = None
     if not math.isfinite(best.nominal):
         caption = "-: no number, as a base parameter's nominal value is 0"
@@ -247,35 +247,42 @@ def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
-def _kept_off(machine: Manipulator, limits: Limits, left: dict[str, Margins]) -> list[str]:
+def _kept_off(
+    machine: Manipulator, limits: Limits, margins_by_motion: dict[str, Margins]
+) -> list[str]:
     """Return the distance that the joints keep from their limits, in a sentence, if they have any.
 
     A least margin is what is left beyond what was asked for, which is not what a person looks for.
     """
     from pteron.identification.excitation.limits import joint_clearances
 
-    tightest = [one for margins in left.values() for one in margins if one.limit == _CLEARANCE]
+    tightest = [
+        margin
+        for margins in margins_by_motion.values()
+        for margin in margins
+        if margin.limit == _CLEARANCE
+    ]
     if not tightest:
         return []
-    least = min(tightest, key=lambda one: one.least)
-    asked = float(joint_clearances(limits, machine)[(least.leg or 1) - 1])
+    least = min(tightest, key=lambda margin: margin.least)
+    clearance = float(joint_clearances(limits, machine)[(least.leg or 1) - 1])
     return [
-        f"Leg {least.leg} comes nearest to its joint's limits: {asked + least.least:.3g} "
-        f"{least.unit}, where {asked:.3g} was to be kept (--keep-off, --clearance)."
+        f"Leg {least.leg} comes nearest to its joint's limits: {clearance + least.least:.3g} "
+        f"{least.unit}, where {clearance:.3g} was to be kept (--keep-off, --clearance)."
     ]
 
 
-def _margins(left: dict[str, Margins]) -> Table:
+def _margins(margins_by_motion: dict[str, Margins]) -> Table:
     headings = ("least margin", "leg", "at (s)")
-    others = list(left)[1:]
-    made = table("limit", *headings, *others, numbers=(*headings, *others))
-    for margin in left["motion"]:
+    others = list(margins_by_motion)[1:]
+    margin_table = table("limit", *headings, *others, numbers=(*headings, *others))
+    for margin in margins_by_motion["motion"]:
         name = _MEASURES.get(margin.limit, margin.limit.replace("_", " "))
-        made.add_row(
+        margin_table.add_row(
             f"{name} ({margin.unit})" if margin.unit else name,
             f"{margin.least:.4g}",
             "-" if margin.leg is None else str(margin.leg),
             f"{margin.time:.3f}",
-            *(f"{left[other][margin.limit].least:.4g}" for other in others),
+            *(f"{margins_by_motion[other][margin.limit].least:.4g}" for other in others),
         )
-    return made
+    return margin_table

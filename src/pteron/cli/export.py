@@ -96,7 +96,7 @@ def export(
     pteron export robot.toml --tool gripper --c controller
     """
     folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
-    asked = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
+    targets = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
     options = {
         "function": function,
         "float": float_,
@@ -106,7 +106,7 @@ def export(
         "base": base,
         "gains": gains,
     }
-    _check(asked, [name for name, given in options.items() if given])
+    _check(targets, [name for name, is_set in options.items() if is_set])
     if tool is not None and base is not None:
         raise DataError(
             f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "
@@ -131,7 +131,7 @@ def export(
             )
         if st is not None:
             files += export_st(machine, asked_for, st, wrench=wrench, output=output, base=base)
-        for name, folder in asked.items():
+        for name, folder in targets.items():
             if name not in ("c", "st"):
                 files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
     if grade != _TRUSTED:
@@ -139,17 +139,17 @@ def export(
     return Result({"robot": machine.name, "files": [str(path) for path in files]}, files=files)
 
 
-def _check(asked: dict[str, str], options: list[str]) -> None:
+def _check(targets: dict[str, str], options: list[str]) -> None:
     """Refuse no target, or several (but C with Structured Text), and options of another target."""
-    if not asked:
+    if not targets:
         names = ", ".join(f"--{name}" for name in _TARGETS)
         raise DataError(f"{names}: none given; say what to write, such as --c controller")
-    others = [name for name in asked if name not in ("c", "st")]
-    if others and len(asked) > 1:
-        names = ", ".join(f"--{name}" for name in asked)
+    others = [name for name in targets if name not in ("c", "st")]
+    if others and len(targets) > 1:
+        names = ", ".join(f"--{name}" for name in targets)
         raise DataError(f"{names}: give one at a time; only --c and --st go together")
     if others and options:
         names = ", ".join(f"--{name}" for name in options)
         raise DataError(f"{names}: goes with --c and --st, not with --{others[0]}; leave it out")
-    if "float" in options and "c" not in asked:
+    if "float" in options and "c" not in targets:
         raise DataError("--float: goes with --c; Structured Text has LREAL alone")

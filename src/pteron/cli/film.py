@@ -62,23 +62,23 @@ def film(
         drawn = drive_forces(carrying, *state, smooth=True) if forces else None
     look: dict[str, Any] = {"fps": fps, "speed": speed, "size": sides, "turns": turns}
     with progress_bar(f"Filming {machine.name}") as tell:
-        made = filmed(machine, motion, out, **look, forces=drawn, progress=tell)
+        written = filmed(machine, motion, out, **look, forces=drawn, progress=tell)
     data = {
         "robot": machine.name,
         "cycle": cycle,
-        **picked(made, "duration speed frames fps size"),
-        "file": str(made.path),
+        **picked(written, "duration speed frames fps size"),
+        "file": str(written.path),
     }
-    pace = "in real time" if made.speed == 1.0 else f"at {made.speed:.3g} times its speed"
-    told = (
-        f"{motion.duration:.4g} s of {plain(machine.name)} {pace}: {made.duration:.3g} s, "
-        f"{made.frames} frames of {made.size[0]}x{made.size[1]}"
+    pace = "in real time" if written.speed == 1.0 else f"at {written.speed:.3g} times its speed"
+    summary = (
+        f"{motion.duration:.4g} s of {plain(machine.name)} {pace}: {written.duration:.3g} s, "
+        f"{written.frames} frames of {written.size[0]}x{written.size[1]}"
     )
-    return Result(data, [told], [made.path])
+    return Result(data, [summary], [written.path])
 
 
-def _expect_ffmpeg(given: dict[str, Any]) -> None:
-    if given["out"].lower().endswith(".mp4"):
+def _expect_ffmpeg(options: dict[str, Any]) -> None:
+    if options["out"].lower().endswith(".mp4"):
         expect_extra("film", "imageio_ffmpeg", "MP4 films need FFmpeg (a .gif does not)")
 
 

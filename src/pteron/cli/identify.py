@@ -209,7 +209,7 @@ def _show(result: Identification) -> None:
         _values(result),
         *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
         *_payload(result),
-        *(f"[yellow]Note:[/yellow] {plain(one.message)}" for one in result.findings),
+        *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in result.findings),
     )
 
 
@@ -240,28 +240,28 @@ def _values(result: Identification) -> Table:
         caption += f" A sum may be below zero, as {negative[0]}: in it masses are subtracted."
     if short:
         caption += " (!) Too short: they do not allow for the faults that are named."
-    made = table(*columns, numbers=numbers, caption=caption)
+    value_table = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
     for row in parameter_rows(result):
         value, half = map(ascii_number, measured(row.value, row.half))
         relative = (
             ">999" if row.relative >= 9.995 else ascii_number(significant(100.0 * row.relative, 2))
         )
-        rest = () if _narrow() else (relative, row.unit)
-        made.add_row(plain(row.name), value, half, *rest, marks[row.status])
-    return made
+        further_cells = () if _narrow() else (relative, row.unit)
+        value_table.add_row(plain(row.name), value, half, *further_cells, marks[row.status])
+    return value_table
 
 
 def _payload(result: Identification) -> list[str]:
     """Return the lines that give the payload to a controller and to other commands."""
     from pteron.identification.payload import payload_in
 
-    found = payload_in(result)
-    if found is None:
+    payload = payload_in(result)
+    if payload is None:
         return []
-    if not (found.real and found.felt):
+    if not (payload.real and payload.felt):
         return ["The payload is no real body's, or is not felt: record it longer, or faster."]
-    return [plain(f"The payload: {found.call(result.robot)}")]
+    return [plain(f"The payload: {payload.call(result.robot)}")]
 
 
 def _narrow() -> bool:
@@ -269,14 +269,14 @@ def _narrow() -> bool:
 
 
 def _bodies(result: Identification) -> tuple[str, ...]:
-    found = result.consistency
-    if found is None:
+    consistency = result.consistency
+    if consistency is None:
         return result.notes
-    border = f"; at the border: {', '.join(found.at_border)}" if found.at_border else ""
+    border = f"; at the border: {', '.join(consistency.at_border)}" if consistency.at_border else ""
     lines = [f"Real bodies have exactly these base parameters{border}."]
-    if not found.feasible:
-        away = f"the nearest are {found.distance:.2g} standard deviations away{border}."
+    if not consistency.feasible:
+        away = f"the nearest are {consistency.distance:.2g} standard deviations away{border}."
         lines = [f"No real bodies have exactly these base parameters; {away}"]
-    if not found.cad_feasible:
-        lines.append(f"The CAD model itself is not real: {'; '.join(found.cad_violations)}.")
+    if not consistency.cad_feasible:
+        lines.append(f"The CAD model itself is not real: {'; '.join(consistency.cad_violations)}.")
     return (*lines, *result.notes)

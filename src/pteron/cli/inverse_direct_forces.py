@@ -128,16 +128,20 @@ def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
     """Say which joint coordinates (B, n) are beyond limits: the numbers stand."""
     import numpy as np
 
-    told = []
-    for name, leg, own in zip(machine.joint_names, machine.legs, joints.T, strict=True):
+    violations = []
+    for name, leg, coordinates in zip(machine.joint_names, machine.legs, joints.T, strict=True):
         low, high = leg.limits or (-np.inf, np.inf)
-        beyond = np.nan_to_num(np.maximum(low - own, own - high), nan=-np.inf)
+        beyond = np.nan_to_num(np.maximum(low - coordinates, coordinates - high), nan=-np.inf)
         if beyond.max(initial=0.0) > _ROUNDING:
-            rows = f"in {(beyond > _ROUNDING).sum()} of {len(own)} rows, " if len(own) > 1 else ""
+            rows = (
+                f"in {(beyond > _ROUNDING).sum()} of {len(coordinates)} rows, "
+                if len(coordinates) > 1
+                else ""
+            )
             limits = f"{low:g} to {high:g} {leg.joint.unit}"
-            told.append(f"{name} ({rows}{own[beyond.argmax()]:.4g} for {limits})")
-    if told:
-        note(f"Note: beyond the joints' limits: {', '.join(told)}")
+            violations.append(f"{name} ({rows}{coordinates[beyond.argmax()]:.4g} for {limits})")
+    if violations:
+        note(f"Note: beyond the joints' limits: {', '.join(violations)}")
 
 
 def _modes(
@@ -154,17 +158,17 @@ def _modes(
     lost = ~real.any(axis=-1)
     real[lost, 0] = True
     row, mode = np.nonzero(real)
-    found = dict(zip(coordinates, poses[row, mode].T, strict=True))
+    columns = dict(zip(coordinates, poses[row, mode].T, strict=True))
     if isinstance(table, TypedRow):
         numbers = [None] if lost.any() else (mode + 1).tolist()
-        return table.repeated(numbers, coordinates).extended(found)
+        return table.repeated(numbers, coordinates).extended(columns)
     import polars as pl
 
     frame = table.frame.drop("row", "mode", *coordinates, strict=False)[row]
     frame.insert_column(0, pl.Series("row", row + 1))
     modes = pl.Series("mode", mode + 1, dtype=pl.Int64)
     frame = frame.hstack([modes.zip_with(~pl.Series(lost[row]), pl.Series([None], dtype=pl.Int64))])
-    return replace(table, frame=frame).extended(found)
+    return replace(table, frame=frame).extended(columns)
 
 
 def forces(
@@ -234,17 +238,17 @@ def forces(
         if not (drives or limited):
             return inverse_dynamics(machine, *parts, on_failure=on_failure)
         driven = drive_forces(machine, *parts, on_failure=on_failure)
-        given = driven if drives else inverse_dynamics(machine, *parts, on_failure=on_failure)
+        requested = driven if drives else inverse_dynamics(machine, *parts, on_failure=on_failure)
         rates = joint_rates(machine, *parts[:2], on_failure=on_failure).actuated
-        return np.concatenate([given, driven, rates], axis=-1)
+        return np.concatenate([requested, driven, rates], axis=-1)
 
     served = rows.served(machine, serve, columns, on_failure)
-    found = served[:, :n] * reading_scales(machine)
+    delivered = served[:, :n] * reading_scales(machine)
     poses = rows.table.numbers(columns[:m], on_failure)
     _note_limits(machine, inverse_kinematics(machine, poses, on_failure="nan"))
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
-    result = rows.table.extended(dict(zip(added, found.T, strict=True)))
+    result = rows.table.extended(dict(zip(added, delivered.T, strict=True)))
     deliver(machine, result, added, out=out, as_json=json, single=rows.single)
 
 
@@ -255,9 +259,9 @@ def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...
     names: list[str] = []
     values: list[float] = []
     parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
-    for name, given, own in zip(MOTION, typed, parts, strict=True):
-        if given is None and name == "--wrench":
+    for name, text, part in zip(MOTION, typed, parts, strict=True):
+        if text is None and name == "--wrench":
             continue
-        names += own
-        values += [0.0] * len(own) if given is None else parsed_numbers([given], own, name)
+        names += part
+        values += [0.0] * len(part) if text is None else parsed_numbers([text], part, name)
     return single_row(names, values)

@@ -27,5 +27,5 @@ def kept_machine(name_or_path: str) -> tuple[Manipulator, tuple[str, ...]]:
         ("machine", data.decode("latin-1"), source, name_or_path, VERSION),
         _READING,
         lambda: read_machine(data, source, name_or_path),
-        keeps=lambda found: name_of(found[0]) is not None,
+        keeps=lambda machine: name_of(machine[0]) is not None,
     )

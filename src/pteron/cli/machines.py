@@ -40,15 +40,15 @@ def catalog() -> Result:
     from pteron.cli.kept_machines import kept_machine
     from pteron.manipulator.files import descriptions
 
-    found = [
+    machines = [
         {**_machine(robot), "legs": len(robot.legs), "description": text}
         for robot, text in ((kept_machine(name)[0], text) for name, text in descriptions().items())
     ]
     keys = ("name", "motion", "types", "description")
-    cells = ((one[key] for key in keys) for one in found)
+    cells = ((machine[key] for key in keys) for machine in machines)
     rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
-    made = table("name", "motion", "legs", "machine", rows=rows, names=("name",))
-    return Result(found, [made])
+    machine_table = table("name", "motion", "legs", "machine", rows=rows, names=("name",))
+    return Result(machines, [machine_table])
 
 
 def new(
@@ -98,7 +98,7 @@ def new(
     from pteron.manipulator import load
     from pteron.manipulator.explained import explained, kept
 
-    given = {
+    dimensions = {
         "base_radius": base_radius,
         "platform_radius": platform_radius,
         "crank": crank,
@@ -107,26 +107,26 @@ def new(
         "stock": _stocks(mass_from),
         "platform_mass": platform_mass,
     }
-    given = {key: value for key, value in given.items() if value not in (None, {})}
+    dimensions = {key: value for key, value in dimensions.items() if value not in (None, {})}
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
-    text = explained(kind, given)
+    text = explained(kind, dimensions)
     if out is not None:
         write_text(out, text)
     data = {"kind": kind, "file": out, "text": text}
     if out is None:
         return Result(data, partial(write, text))
-    told = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
-    return Result(data, [told, *map(plain, kept(load(kind), given))])
+    written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
+    return Result(data, [written, *map(plain, kept(load(kind), dimensions))])
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
     """Return what links are cut from, by their key; without a key it is for both."""
-    found: dict[str, str] = {}
+    stocks: dict[str, str] = {}
     for text in texts or ():
         key, _, stock = text.rpartition("=")
-        found |= {key: stock} if key else dict.fromkeys(("upper", "lower"), stock)
-    return found
+        stocks |= {key: stock} if key else dict.fromkeys(("upper", "lower"), stock)
+    return stocks
 
 
 def _machine(robot: Manipulator) -> dict[str, Any]:
@@ -171,11 +171,11 @@ def check(file: str, *, elbows: str | None = None) -> Result:
     warn(unlikely, f"{file}: ")
     try:
         with spinner(f"Looking where {robot.name} can work"):
-            found = _findings(robot)
-        warn(found["doubts"][len(unlikely) :], f"{file}: ")
+            findings = _findings(robot)
+        warn(findings["doubts"][len(unlikely) :], f"{file}: ")
     except PteronError as error:
         raise ModelError(error.message, subject=file) from None
-    return Result(found, partial(_show, robot, found))
+    return Result(findings, partial(_show, robot, findings))
 
 
 def _findings(robot: Manipulator) -> dict[str, Any]:
@@ -230,7 +230,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     }
 
 
-def _show(robot: Manipulator, found: dict[str, Any]) -> None:
+def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
     from pteron.manipulator.explained import pointing
 
     rows = (
@@ -240,17 +240,17 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
             "{:g} to {:g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
             f"{leg['at_home']:.4g} {leg['unit']}",
         )
-        for i, leg in enumerate(found["legs"], start=1)
+        for i, leg in enumerate(findings["legs"], start=1)
     )
     headings = ("leg", "type", "joint's axis", "lengths (m)", "limits", "at home")
-    angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
-    where = "" if found["singular_at_every_position"] or not angles else " at the home position"
+    angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in findings["singular_orientations"])
+    where = "" if findings["singular_at_every_position"] or not angles else " at the home position"
     singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
     singular = singular if robot.platform.angles and not robot.platform.tilts else []
-    tool = [f"Tool: {_vector(found['tool'])} m from P, in the platform frame"]
-    tool = tool if any(found["tool"]) else []
+    tool = [f"Tool: {_vector(findings['tool'])} m from P, in the platform frame"]
+    tool = tool if any(findings["tool"]) else []
     work = "[green]Fine: the file is valid. This machine can work.[/green]"
-    if doubts := len(found["doubts"]):
+    if doubts := len(findings["doubts"]):
         warnings = "the warning" if doubts == 1 else f"the {doubts} warnings"
         work = f"[yellow]This machine can work, if {warnings} above can be left as is.[/yellow]"
     joints = dict.fromkeys(leg.joint for leg in robot.legs)
@@ -263,41 +263,41 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         *([f"At 0 cranks point {zero}."] if (zero := pointing(robot)) else []),
         *_drives(robot),
         *singular,
-        *_home_lines(robot, found),
-        *_modes(found["working_modes"]),
-        *_passive(found["limited_joints"]),
+        *_home_lines(robot, findings),
+        *_modes(findings["working_modes"]),
+        *_passive(findings["limited_joints"]),
         *tool,
-        *([f"Note: {text}"] if (text := found["template_masses"]) else []),
-        *(f"The platform can move with its rams held {text}" for text in found["self_motions"]),
+        *([f"Note: {text}"] if (text := findings["template_masses"]) else []),
+        *(f"The platform can move with its rams held {text}" for text in findings["self_motions"]),
         work,
     )
 
 
-def _home_lines(robot: Manipulator, found: dict[str, Any]) -> list[str]:
+def _home_lines(robot: Manipulator, findings: dict[str, Any]) -> list[str]:
     """Return lines on the home pose, its mirror image, and how the drives hold the platform."""
     import numpy as np
 
     from pteron.workspace.margins import least_margin_text
 
-    margin = least_margin_text(robot, np.array(found["home_pose"]))
-    source = ", from the file" if found["home_named"] else ""
-    lines = [f"Home pose: {_vector(found['home_pose'])}{source}; least margin {margin}"]
-    if found["mirror_pose"] is not None:
+    margin = least_margin_text(robot, np.array(findings["home_pose"]))
+    source = ", from the file" if findings["home_named"] else ""
+    lines = [f"Home pose: {_vector(findings['home_pose'])}{source}; least margin {margin}"]
+    if findings["mirror_pose"] is not None:
         lines.append(
-            f"Its mirror image on the other side of the base: {_vector(found['mirror_pose'])}; "
+            f"Its mirror image on the other side of the base: {_vector(findings['mirror_pose'])}; "
             "home is the one along the platform's axis. \\[home] pose in the file names another"
         )
-    held = found["holding"]
-    distance = "none" if held["distance"] == math.inf else f"{1e3 * held['distance']:.3g} mm"
-    moments = f" (moments over {held['length']:.3g} m)" if robot.platform.angles else ""
+    hold = findings["holding"]
+    distance = "none" if hold["distance"] == math.inf else f"{1e3 * hold['distance']:.3g} mm"
+    moments = f" (moments over {hold['length']:.3g} m)" if robot.platform.angles else ""
     lines.append(
-        f"At home: least singular value {held['least_singular_value']:.2g} of unit rows{moments}; "
+        f"At home: least singular value {hold['least_singular_value']:.2g} of unit rows{moments}; "
         f"coordinates off by {distance} make it singular"
     )
-    if held["weight"] > 0.0:
+    if hold["weight"] > 0.0:
         lines.append(
-            f"Weight of all bodies: {held['weight']:.3g} N; a leg holds at most "
-            f"{held['force']:.2g} times as much at home, {held['force_near']:.2g} about it"
+            f"Weight of all bodies: {hold['weight']:.3g} N; a leg holds at most "
+            f"{hold['force']:.2g} times as much at home, {hold['force_near']:.2g} about it"
         )
     return lines
 

@@ -54,8 +54,8 @@ _PIPE_CLOSED = 1
 class CommandGroup(TyperGroup):
     """All subcommands; errors become lines on standard error and exit codes."""
 
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given | {"commands": Commands()})
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options | {"commands": Commands()})
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, flags without a type in the help."""
@@ -170,9 +170,9 @@ class Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._made:
             panel, function = self._panels[name]
-            cls, whole = NumbersCommand if function in _NUMERIC else Command, typed(function)
+            cls, command = NumbersCommand if function in _NUMERIC else Command, typed(function)
             alone = Typer(add_completion=False, **_LOOKS)
-            alone.command(cls=cls, rich_help_panel=panel, **help_of(whole))(whole)
+            alone.command(cls=cls, rich_help_panel=panel, **help_of(command))(command)
             self._made[name] = get_command(alone)
         return self._made[name]
 

@@ -27,33 +27,33 @@ _SUMMARY = "best best_pose worst worst_pose mean median"
 
 
 def map_data(
-    found: Map, volume: ReachVolume | None, warnings: list[str], out: str | None
+    index_map: Map, volume: ReachVolume | None, warnings: list[str], out: str | None
 ) -> dict[str, Any]:
     """Return the data of `--json`: the grid, the reach, its causes, and each index."""
-    grid = found.grid
+    grid = index_map.grid
     return {
-        "robot": found.robot,
+        "robot": index_map.robot,
         "held": grid.held,
         "varies": [picked(axis, _AXIS) for axis in grid.axes],
         "poses": grid.size,
-        "in_reach": found.share,
-        "causes": found.causes,
+        "in_reach": index_map.share,
+        "causes": index_map.causes,
         "reach": volume and picked(volume, "box volume standard_error unit"),
-        "indices": [_index_data(found, index.name) for index in found.indices],
+        "indices": [_index_data(index_map, index.name) for index in index_map.indices],
         "warnings": warnings,
         **({"files": [out]} if out is not None else {}),
     }
 
 
-def _index_data(found: Map, name: str) -> dict[str, Any]:
+def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     from pteron.maps.map import ALL
 
     index = ALL[name]
     about = picked(index, "index=name title unit better")
     try:
-        summary = found.summary(name)
+        summary = index_map.summary(name)
     except DataError:
-        undetermined = int(found.reachable.sum())
+        undetermined = int(index_map.reachable.sum())
         return {
             **about,
             **dict.fromkeys(_SUMMARY.split()),
@@ -71,59 +71,63 @@ def map_rows(data: Mapping[str, Any]) -> Any:
 
     names = sorted([*data["held"], *(a["name"] for a in data["varies"])], key=[*COORDINATES].index)
     rows = []
-    for one in data["indices"]:
-        row = {key: one[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
+    for index in data["indices"]:
+        row = {key: index[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
         for side in ("best", "worst"):
-            pose = one[f"{side}_pose"] or [None] * len(names)
+            pose = index[f"{side}_pose"] or [None] * len(names)
             row |= {f"{side}_{name}": value for name, value in zip(names, pose, strict=True)}
         rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def show_map(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
+def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
     """Print for a person: the reach, what ends it, and each index."""
     from pteron.platforms.coordinates import are_angles, coordinate
 
-    held = ", ".join(pose_text(name, value) for name, value in found.grid.held.items())
+    constants = ", ".join(pose_text(name, value) for name, value in index_map.grid.held.items())
     lines: list[str | rich.table.Table] = [
-        f"[bold]{plain(found.robot)}[/bold]{f' at {held}' if held else ''}"
+        f"[bold]{plain(index_map.robot)}[/bold]{f' at {constants}' if constants else ''}"
     ]
     if volume is not None:
-        names = [name for name in found.grid.coordinates if coordinate(name).unit == "m"]
+        names = [name for name in index_map.grid.coordinates if coordinate(name).unit == "m"]
         box = zip(names, *volume.box.tolist(), strict=True)
         spans = ", ".join(span_text(name, low, high) for name, low, high in box)
         noun = "area" if volume.unit == "m^2" else "volume"
-        angles = {n: angle for n, angle in found.grid.held.items() if n not in names}
+        angles = {n: angle for n, angle in index_map.grid.held.items() if n not in names}
         at = ", ".join(pose_text(name, angle) for name, angle in angles.items())
         size = f"{noun} {volume.volume:.4g} {volume.unit}"
         lines.append(
             f"Reach{f' at {at}' if at else ''}: {spans}; {size} "
             f"(standard error {volume.standard_error:.1g})"
         )
-    varying = ", ".join(span_text(a.name, a.least, a.greatest) for a in found.grid.axes)
-    lines.append(f"Map: {varying}: {found.grid.size} poses, {percent(found.share)} in reach")
-    if found.causes:
-        told = sorted(found.causes.items(), key=lambda pair: -pair[1])
-        lines.append("; ".join(f"{percent(share)} {text}" for text, share in told))
-    made = table("index", "", "value", "where", numbers=("value",))
-    for one in data["indices"]:
-        unit = f" ({one['unit']})" if one["unit"] else ""
-        named = plain(f"{one['index']}{unit}")
-        if one["best"] is None:
-            made.add_row(named, "", "-", "determined at no pose in reach")
+    varying = ", ".join(span_text(a.name, a.least, a.greatest) for a in index_map.grid.axes)
+    lines.append(
+        f"Map: {varying}: {index_map.grid.size} poses, {percent(index_map.share)} in reach"
+    )
+    if index_map.causes:
+        causes = sorted(index_map.causes.items(), key=lambda pair: -pair[1])
+        lines.append("; ".join(f"{percent(share)} {text}" for text, share in causes))
+    index_table = table("index", "", "value", "where", numbers=("value",))
+    for index in data["indices"]:
+        unit = f" ({index['unit']})" if index["unit"] else ""
+        named = plain(f"{index['index']}{unit}")
+        if index["best"] is None:
+            index_table.add_row(named, "", "-", "determined at no pose in reach")
             continue
-        if abs(one["best"] - one["worst"]) <= _ALIKE * abs(one["best"]):
-            made.add_row(named, "", f"{one['best']:.4g}", "everywhere in reach")
+        if abs(index["best"] - index["worst"]) <= _ALIKE * abs(index["best"]):
+            index_table.add_row(named, "", f"{index['best']:.4g}", "everywhere in reach")
         else:
             for side in ("best", "worst"):
-                pose = " ".join(f"{value + 0.0:.4g}" for value in one[f"{side}_pose"])
-                made.add_row(named if side == "best" else "", side, f"{one[side]:.4g}", pose)
+                pose = " ".join(f"{value + 0.0:.4g}" for value in index[f"{side}_pose"])
+                index_table.add_row(
+                    named if side == "best" else "", side, f"{index[side]:.4g}", pose
+                )
             for side in ("mean", "median"):
-                made.add_row("", side, f"{one[side]:.4g}", "")
-        if one["undetermined"]:
-            share = one["undetermined"] / found.grid.size
-            made.add_row("", "singular", "-", f"{percent(share)} of the poses")
-    made.caption = f"Where: {' '.join(found.grid.coordinates)}, m" + (
-        " and rad" if are_angles(found.grid.coordinates).any() else ""
+                index_table.add_row("", side, f"{index[side]:.4g}", "")
+        if index["undetermined"]:
+            share = index["undetermined"] / index_map.grid.size
+            index_table.add_row("", "singular", "-", f"{percent(share)} of the poses")
+    index_table.caption = f"Where: {' '.join(index_map.grid.coordinates)}, m" + (
+        " and rad" if are_angles(index_map.grid.coordinates).any() else ""
     )
-    show(*lines, made)
+    show(*lines, index_table)

@@ -49,8 +49,8 @@ def played(robot: Manipulator, file: str) -> Playback:
     from pteron.playback import playback, read_motion
     from pteron.tables import Table
 
-    found = read_motion(robot, file)
-    return _of_table(robot, found) if isinstance(found, Table) else playback(robot, found)
+    motion = read_motion(robot, file)
+    return _of_table(robot, motion) if isinstance(motion, Table) else playback(robot, motion)
 
 
 def _of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
@@ -98,13 +98,13 @@ class Carried:
         """Read the options: a mass, perhaps its centre, and perhaps its inertia."""
         if payload is None:
             return cls(tool=tool)
-        mass, *more = payload.split("@")
+        mass, *further = payload.split("@")
         try:
-            parts = [tuple(float(word) for word in part.split(",")) for part in more]
+            parts = [tuple(float(word) for word in part.split(",")) for part in further]
             carried, count = float(mass), len(parts[0]) if parts else 3
         except ValueError:
             carried, count = 0.0, 0
-        if count != 3 or len(more) > 2:
+        if count != 3 or len(further) > 2:
             raise DataError(
                 f"--payload: {payload!r} given; MASS, MASS@X,Y,Z or MASS@X,Y,Z@INERTIA expected, "
                 "kg, m and kg m^2, such as 0.5@0,0,-0.03"
@@ -116,8 +116,8 @@ class Carried:
         """Return it in words behind a machine's name, empty if there is nothing."""
         tool = [] if self.tool is None else [f"tool {self.tool}"]
         at = "" if self.payload_center is None else f" at {_told(self.payload_center)} m"
-        told = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
-        return f" with {' and '.join(told)}" if told else ""
+        words = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
+        return f" with {' and '.join(words)}" if words else ""
 
     def on(self, robot: Manipulator) -> Manipulator:
         """Return the machine with it."""

@@ -19,7 +19,7 @@ _BINDS = 0.98
 """Share of a limit from which it is said to bind."""
 
 
-def peaks_table(found: Sequence[Peak]) -> Table:
+def peaks_table(largest: Sequence[Peak]) -> Table:
     """Return a table of the largest sizes in a motion, beside their limits."""
     numbers = ("leg", "size", "limit", "share")
     rows = (
@@ -28,7 +28,7 @@ def peaks_table(found: Sequence[Peak]) -> Table:
             *(str(peak.leg or ""), f"{peak.size:.4g}"),
             *((f"{peak.limit:.4g}", f"{peak.share:.0%}") if math.isfinite(peak.limit) else "--"),
         )
-        for peak in found
+        for peak in largest
     )
     return table("largest", *numbers, rows=rows, numbers=numbers)
 

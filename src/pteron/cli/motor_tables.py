@@ -45,7 +45,7 @@ def fits_frame(robot: Manipulator, fits: Sequence[Fit]) -> pl.DataFrame:
 
 def common_rows(robot: Manipulator, fits: Sequence[CommonFit]) -> list[dict[str, Any]]:
     """Return the motors that legs have in common as data, SI units; margins are the least."""
-    return [{"legs": list(one.legs), **_data(robot, one)} for one in fits]
+    return [{"legs": list(fit.legs), **_data(robot, fit)} for fit in fits]
 
 
 def motors_table(robot: Manipulator, fits: Sequence[Fit]) -> list[rich.table.Table]:
@@ -64,37 +64,37 @@ def _alone(fit: Fit) -> CommonFit:
     return CommonFit((fit.leg,), fit.motor, fit.span, fit.ratio, (fit,))
 
 
-def _data(robot: Manipulator, one: CommonFit) -> dict[str, Any]:
-    least, greatest = one.span if one.span else (None, None)
+def _data(robot: Manipulator, fit: CommonFit) -> dict[str, Any]:
+    least, greatest = fit.span if fit.span else (None, None)
     return {
-        "motor": one.motor.name,
-        "serves": bool(one.span),
-        "ratio": one.ratio,
-        "ratio_unit": _ratio_unit(robot, one),
+        "motor": fit.motor.name,
+        "serves": bool(fit.span),
+        "ratio": fit.ratio,
+        "ratio_unit": _ratio_unit(robot, fit),
         "least_ratio": least,
         "greatest_ratio": greatest,
-        **dict(zip(_MARGINS, _margins(one), strict=True)),
+        **dict(zip(_MARGINS, _margins(fit), strict=True)),
     }
 
 
 def _table(robot: Manipulator, heading: str, fits: Iterable[CommonFit]) -> list[rich.table.Table]:
     rows = []
-    for legs, group in groupby(fits, key=lambda one: one.legs):
-        for i, one in enumerate(islice(group, _BEST)):
-            ends = tuple(f"{end:.4g}" for end in one.span) if one.span else ("none", "")
-            told = f"{one.ratio:.4g} {_ratio_unit(robot, one)}"
-            margins = (f"{value:.2f}" for value in _margins(one))
+    for legs, group in groupby(fits, key=lambda fit: fit.legs):
+        for i, fit in enumerate(islice(group, _BEST)):
+            ends = tuple(f"{end:.4g}" for end in fit.span) if fit.span else ("none", "")
+            ratio = f"{fit.ratio:.4g} {_ratio_unit(robot, fit)}"
+            margins = (f"{value:.2f}" for value in _margins(fit))
             first = "" if i else " ".join(map(str, legs))
-            rows.append((first, plain(one.motor.name), told, *ends, *margins))
+            rows.append((first, plain(fit.motor.name), ratio, *ends, *margins))
     numbers, caption = ("leg", *_NUMBERS), _CAPTIONS[heading]
-    made = table(heading, "motor", *_NUMBERS, rows=rows, numbers=numbers, caption=caption)
-    return [made] if rows else []
+    motor_table = table(heading, "motor", *_NUMBERS, rows=rows, numbers=numbers, caption=caption)
+    return [motor_table] if rows else []
 
 
-def _margins(one: CommonFit) -> tuple[float, ...]:
+def _margins(common: CommonFit) -> tuple[float, ...]:
     """Return the margins of a motor, the least of several legs."""
-    return tuple(min(getattr(fit, name) for fit in one.fits) for name in _MARGINS)
+    return tuple(min(getattr(fit, name) for fit in common.fits) for name in _MARGINS)
 
 
-def _ratio_unit(robot: Manipulator, one: CommonFit) -> str:
-    return f"rad/{robot.legs[one.legs[0] - 1].joint.unit}"
+def _ratio_unit(robot: Manipulator, fit: CommonFit) -> str:
+    return f"rad/{robot.legs[fit.legs[0] - 1].joint.unit}"

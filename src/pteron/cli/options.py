@@ -63,32 +63,32 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
     Its `machine` is loaded from ROBOT in the working mode of --elbows, what it carries is read from
     --payload and --tool, and its result is printed for a person or, with --json, for a program.
     """
-    hints, own = get_type_hints(command), signature(command).parameters
+    hints, arguments = get_type_hints(command), signature(command).parameters
     options: dict[str, Parameter] = {}
-    for name, given in own.items():
+    for name, argument in arguments.items():
         if hints[name] is Machine:
-            options["robot"] = given.replace(name="robot", annotation=str)
+            options["robot"] = argument.replace(name="robot", annotation=str)
         elif hints[name] is Carried:
             options |= {each: _option(each, str | None) for each in ("payload", "tool")}
         else:
-            options[name] = given.replace(annotation=hints[name])
-    if "machine" in own:
+            options[name] = argument.replace(annotation=hints[name])
+    if "machine" in arguments:
         options.setdefault("elbows", _option("elbows", str | None))
     options.setdefault("json", _option("json", bool, default=False))
 
     @wraps(command)
     def run(**values: Any) -> None:
-        passed = {name: value for name, value in values.items() if name in own}
+        passed = {name: value for name, value in values.items() if name in arguments}
         if "before" in vars(command):  # a missing extra is told before a machine is read
             vars(command)["before"](passed)
-        if "carried" in own:
+        if "carried" in arguments:
             passed["carried"] = Carried.of(values["payload"], values["tool"])
-        if "machine" in own:
+        if "machine" in arguments:
             quiet = "warns" in vars(command)  # the command tells the file's warnings itself
             passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
-        found = command(**passed)
-        if found is not None:
-            found.tell(as_json=values["json"])
+        outcome = command(**passed)
+        if outcome is not None:
+            outcome.tell(as_json=values["json"])
 
     run.__dict__["__signature__"] = Signature(list(options.values()))
     run.__annotations__ = {name: option.annotation for name, option in options.items()}
@@ -102,21 +102,21 @@ def _option(name: str, kind: Any, *, default: Any = None) -> Parameter:
 def help_of(command: Callable[..., None]) -> dict[str, Any]:
     """Give a command's parameters their options; return its help and what stands at its end."""
     text, *sections = _SECTION.split(cleandoc(command.__doc__ or ""))
-    told = dict(zip(sections[::2], sections[1::2], strict=True))
-    examples = told.pop("Examples", "")
-    found: dict[str, dict[str, Any]] = {}
-    for title, lines in [("Options", _SHARED), *told.items()]:
+    parts = dict(zip(sections[::2], sections[1::2], strict=True))
+    examples = parts.pop("Examples", "")
+    help_by_name: dict[str, dict[str, Any]] = {}
+    for title, lines in [("Options", _SHARED), *parts.items()]:
         for line in re.sub(r"\n +", " ", lines).splitlines():
             name, about = _read(line)
-            found[name] = about if title in _OPTIONS else about | {"rich_help_panel": title}
+            help_by_name[name] = about if title in _OPTIONS else about | {"rich_help_panel": title}
     hints, options = get_type_hints(command), []
     for name, parameter in signature(command).parameters.items():
         key, kind = name.rstrip("_").replace("_", "-"), hints[name]
         if parameter.kind is parameter.KEYWORD_ONLY:
-            about = dict(found.get(f"--{key}", {}))
+            about = dict(help_by_name.get(f"--{key}", {}))
             kind = Annotated[kind, Option(f"--{key}", *about.pop("short", ()), **about)]
         elif kind is not Context:
-            kind = Annotated[kind, Argument(**found.get(key, {}))]
+            kind = Annotated[kind, Argument(**help_by_name.get(key, {}))]
         options.append(parameter.replace(annotation=kind))
     command.__dict__["__signature__"] = Signature(options)
     paragraphs = (" ".join(part.split()) for part in text.split("\n\n"))
@@ -126,9 +126,9 @@ def help_of(command: Callable[..., None]) -> dict[str, Any]:
 
 def _read(line: str) -> tuple[str, dict[str, Any]]:
     """Return the name of an argument or option, and what Typer is told of it."""
-    found = _LINE.match(line)
-    assert found is not None, line
-    name, short, metavar, text, default = found.groups()
+    match = _LINE.match(line)
+    assert match is not None, line
+    name, short, metavar, text, default = match.groups()
     about: dict[str, Any] = {"help": text, "autocompletion": _COMPLETION.get(name)}
     if not name.startswith("-"):
         return name.lower().rstrip("."), about | {"metavar": name}

@@ -31,8 +31,8 @@ def standard_motion(
     from pteron.motion.trajectories.time_law import in_time
 
     middle = given_pose(machine, around, "--around")
-    found = pick_and_place(machine, middle, scale=scale)
-    path = cycle_path(found)
+    standard = pick_and_place(machine, middle, scale=scale)
+    path = cycle_path(standard)
     if optimal:
         return time_optimal(machine, path, limits, step=step)
     check_path(machine, path)
@@ -44,10 +44,10 @@ def standard_motion(
             f"{beside if tilts else ''} is {PEAK_ACCELERATION:g} m/s^2 at most"
         )
         if tilts:
-            duration = found.duration
+            duration = standard.duration
         else:
             limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)
-    return in_time(machine, found.cycle.at, duration, limits, step)
+    return in_time(machine, standard.cycle.at, duration, limits, step)
 
 
 def line_motion(

@@ -55,20 +55,20 @@ def play(
         raise DataError("MOTION and --cycle given; give one of them")
     checked_page(out)
     with spinner(f"Drawing {machine.name}"):
-        found = _playback(machine, motion or cycle or STANDARD)
-        page = write_motion_page(machine, found, out)
-    samples, size = len(found.motion.time), page.stat().st_size
+        playback = _playback(machine, motion or cycle or STANDARD)
+        page = write_motion_page(machine, playback, out)
+    samples, size = len(playback.motion.time), page.stat().st_size
     data = {
         "robot": machine.name,
         "page": str(page),
         "bytes": size,
-        "source": found.source or STANDARD,
-        "log": found.log,
-        "duration": found.motion.duration,
+        "source": playback.source or STANDARD,
+        "log": playback.log,
+        "duration": playback.motion.duration,
         "samples": samples,
     }
-    told = f"{plain(machine.name)}: {found.motion.duration:.4g} s, {samples} samples"
-    return Result(data, [told, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
+    summary = f"{plain(machine.name)}: {playback.motion.duration:.4g} s, {samples} samples"
+    return Result(data, [summary, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:

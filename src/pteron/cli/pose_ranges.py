@@ -22,27 +22,27 @@ def pose_ranges(
     >>> pose_ranges("z=0,phi=-1:1", "--slice")
     ({'z': 0.0}, {'phi': (-1.0, 1.0)})
     """
-    held: dict[str, float] = {}
+    constants: dict[str, float] = {}
     ranges: dict[str, tuple[float, ...]] = {}
     for part in text.replace(" ", "").split(",") if text is not None else []:
         name, equals, values = part.partition("=")
         numbers = values.split(":")
         try:
-            given = tuple(float(number) for number in numbers)
+            span = tuple(float(number) for number in numbers)
         except ValueError:
-            given = ()
-        if not name or not equals or not 1 <= len(given) <= 3:
+            span = ()
+        if not name or not equals or not 1 <= len(span) <= 3:
             raise DataError(
                 f"{option}: {part!r} given; NAME=VALUE or NAME=LEAST:GREATEST[:COUNT] expected, in "
                 "m and rad without the unit, such as z=0,phi=0"
             )
-        if name in held or name in ranges:
+        if name in constants or name in ranges:
             raise DataError(f"{option}: {name} given twice")
-        if len(given) == 1:
-            held[name] = given[0]
+        if len(span) == 1:
+            constants[name] = span[0]
         else:
-            ranges[name] = given
-    return held, ranges
+            ranges[name] = span
+    return constants, ranges
 
 
 def pose_spans(
@@ -54,11 +54,11 @@ def pose_spans(
     """
     from pteron.maps.grid import expect_coordinates
 
-    held, ranges = pose_ranges(text, option)
-    expect_coordinates(robot, held, ranges)
+    constants, ranges = pose_ranges(text, option)
+    expect_coordinates(robot, constants, ranges)
     if any(len(span) > 2 for span in ranges.values()):
         raise DataError(f"{option}: NAME=LEAST:GREATEST expected{use}")
-    return ranges | {name: (value, value) for name, value in held.items()}
+    return ranges | {name: (value, value) for name, value in constants.items()}
 
 
 def box_of(spans: Iterable[tuple[float, ...]]) -> Box:

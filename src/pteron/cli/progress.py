@@ -54,12 +54,12 @@ def progress_bar(task: str) -> Iterator[Callable[[float], None]]:
 
     The callable takes the share, from 0 to 1; what it takes first may have been done before.
     """
-    left = TimeLeft()
-    with _bar(left) as progress:
+    estimate = TimeLeft()
+    with _bar(estimate) as progress:
         number = progress.add_task(plain(task), total=1.0)
 
         def tell(share: float) -> None:
-            left.tell(share)
+            estimate.tell(share)
             progress.update(number, completed=share)
 
         yield tell
@@ -101,20 +101,24 @@ class TimeLeft:
         if self._first is None:
             return None
         now, (began, base) = self._clock(), self._first
-        (start, before), share = self._told[0], self._share
-        if now - began < _UNKNOWN or share - base < _LITTLE * (1.0 - base) or share <= before:
+        (start, earlier_share), share = self._told[0], self._share
+        if (
+            now - began < _UNKNOWN
+            or share - base < _LITTLE * (1.0 - base)
+            or share <= earlier_share
+        ):
             return None
-        return (now - start) * max(1.0 - share, 0.0) / (share - before)
+        return (now - start) * max(1.0 - share, 0.0) / (share - earlier_share)
 
     def words(self) -> str:
         """Return what time is left in words, of two digits; empty as long as it is not known."""
-        left = self.seconds()
-        if left is None:
+        seconds = self.seconds()
+        if seconds is None:
             return ""
         for name, unit in (("s", 1.0), ("min", 60.0)):
-            if left < 90.0 * unit:
-                return f"about {float(f'{left / unit:.2g}'):.0f} {name} left"
-        return f"about {float(f'{left / 3600.0:.2g}'):g} h left"
+            if seconds < 90.0 * unit:
+                return f"about {float(f'{seconds / unit:.2g}'):.0f} {name} left"
+        return f"about {float(f'{seconds / 3600.0:.2g}'):g} h left"
 
 
 @contextmanager
@@ -126,16 +130,16 @@ def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
     """
     with _bar() as progress:
         number = progress.add_task(plain(task), total=None)
-        stage, before = "", 0
+        stage, done_rows = "", 0
 
         def tell(name: str, done: int, total: int) -> None:
-            nonlocal before, stage
+            nonlocal done_rows, stage
             if name != stage:
                 progress.reset(number, total=max(total, rows), description=plain(name))
-                stage, before = name, 0
+                stage, done_rows = name, 0
             # The rows of a stage's next file are counted anew.
-            progress.update(number, advance=done - before if done >= before else done)
-            before = done
+            progress.update(number, advance=done - done_rows if done >= done_rows else done)
+            done_rows = done
             if done >= max(total, rows):
                 progress.reset(number, total=None, description=plain(task))
                 stage = ""
@@ -143,20 +147,20 @@ def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
         yield tell
 
 
-def _bar(left: TimeLeft | None = None) -> Progress:
+def _bar(estimate: TimeLeft | None = None) -> Progress:
     from rich import progress
     from rich.console import Console
     from rich.text import Text
 
     class Left(progress.ProgressColumn):
         def render(self, task: progress.Task) -> Text:
-            return Text("" if left is None else left.words())
+            return Text("" if estimate is None else estimate.words())
 
     return progress.Progress(
         progress.TextColumn("{task.description}"),
         progress.BarColumn(),
         progress.TaskProgressColumn(),
-        progress.TimeRemainingColumn() if left is None else Left(),
+        progress.TimeRemainingColumn() if estimate is None else Left(),
         console=Console(stderr=True),
         disable=not is_watched(),
         transient=True,
@@ -181,8 +185,8 @@ class Times:
     def told(self) -> str:
         """Return the stages with their times, in a line."""
         self._end("")
-        found = ((name, spent) for name, spent in self._spent.items() if name and spent > _SHORT)
-        return f"Time: {', '.join(f'{name.lower()} {spent:.1f} s' for name, spent in found)}"
+        spans = ((name, spent) for name, spent in self._spent.items() if name and spent > _SHORT)
+        return f"Time: {', '.join(f'{name.lower()} {spent:.1f} s' for name, spent in spans)}"
 
     def _end(self, name: str) -> None:
         now, stage = perf_counter(), self._stage or name

@@ -49,40 +49,42 @@ def report(
 
         shown = None if motion is None else played(machine, motion)
         page = write_report(machine, out, motion=shown)
-    found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
-    warn([*found["doubts"], *found["cycle"]["overloads"]])
-    cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
-    tables = _machine(found), _legs(found["cycle"], found["joints"])
-    told = [*tables, f"Written to {plain(str(page))}"]
-    return Result({"page": str(page), **found, **asdict(carried), "cycle": cycle}, told)
+    contents = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
+    warn([*contents["doubts"], *contents["cycle"]["overloads"]])
+    cycle = {key: value for key, value in contents["cycle"].items() if key not in _SERIES}
+    tables = _machine(contents), _legs(contents["cycle"], contents["joints"])
+    lines = [*tables, f"Written to {plain(str(page))}"]
+    return Result({"page": str(page), **contents, **asdict(carried), "cycle": cycle}, lines)
 
 
 vars(report)["warns"] = True
 
 
-def _machine(found: dict[str, Any]) -> Table:
+def _machine(contents: dict[str, Any]) -> Table:
     from pteron.platforms.coordinates import coordinate
 
-    home, reach, base = found["home"], found["reach"], found["base_parameters"]
-    singular = ", ".join(f"{math.degrees(a):.4g}" for a in found["singular_orientations"] or ())
-    angles = [name for name in found["coordinates"] if coordinate(name).unit == "rad"]
-    told = {
+    home, reach, base = contents["home"], contents["reach"], contents["base_parameters"]
+    singular = ", ".join(f"{math.degrees(a):.4g}" for a in contents["singular_orientations"] or ())
+    angles = [name for name in contents["coordinates"] if coordinate(name).unit == "rad"]
+    cells = {
         "home pose": " ".join(f"{value:.4g}" for value in home["pose"]),
         "margin there": f"{home['reserve']:.3f} of 1",
         "condition number there": f"{home['condition_number']:.4g}",
     }
     if len(angles) == 1:
-        told[f"singular {angles[0]} there"] = f"{singular} deg" if singular else "none"
+        cells[f"singular {angles[0]} there"] = f"{singular} deg" if singular else "none"
     if reach is not None:
         factor, unit = (1e3, "litres") if reach["unit"] == "m^3" else (1e2, "dm^2")
-        told["reach"] = f"{factor * reach['volume']:.4g} {unit}"
-    if found["largest_tilt"] is not None:
-        told["leans to every side by"] = f"{math.degrees(found['largest_tilt']):.1f} deg"
-    told |= {
-        "cycle" if found["cycle"]["standard"] else "motion": f"{found['cycle']['duration']:.3g} s",
+        cells["reach"] = f"{factor * reach['volume']:.4g} {unit}"
+    if contents["largest_tilt"] is not None:
+        cells["leans to every side by"] = f"{math.degrees(contents['largest_tilt']):.1f} deg"
+    cells |= {
+        "cycle"
+        if contents["cycle"]["standard"]
+        else "motion": f"{contents['cycle']['duration']:.3g} s",
         "base parameters": f"{base['rank']} of {base['of']}",
     }
-    return table(plain(found["robot"]), "", rows=told.items())
+    return table(plain(contents["robot"]), "", rows=cells.items())
 
 
 def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:

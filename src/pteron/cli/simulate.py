@@ -98,9 +98,9 @@ def simulate(
     believed = None if model is None else _model(machine, model, elbows)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
-        acts, told = controller_of(controller, motion, 1.0 / rate, bandwidth), str(controller)
+        acts, law_name = controller_of(controller, motion, 1.0 / rate, bandwidth), str(controller)
         if gains is not None:
-            acts, told = read_gains(carrying, gains), gains
+            acts, law_name = read_gains(carrying, gains), gains
         motion = motion if cycles == 1 else motion.repeated(cycles)
         overloads = overloads_of(carrying, motion)
         if overloads and not anyway:
@@ -110,28 +110,30 @@ def simulate(
             )
         how: dict[str, Any] = {"sensors": Sensors(encoder=encoder), "delay": delay, "step": step}
         how |= {"model": believed, "payload": carried.payload if at_tool else 0.0, "method": method}
-        found = simulated(machine, motion, acts, **how)
-        found = replace(found, payload=found.payload * 0.0 + carried.payload)
+        simulation = simulated(machine, motion, acts, **how)
+        simulation = replace(simulation, payload=simulation.payload * 0.0 + carried.payload)
     warn(overloads)
-    if found.stopped:
-        note(f"Stopped {found.stopped}")
-    data = _data(found, told, cycle, carried)
-    person = partial(_tell, found, data, carried, out)
-    code = _ENDED if found.stopped else 0
-    return destination.deliver(found.table(), data, partial(_pictures, found), person, code)
+    if simulation.stopped:
+        note(f"Stopped {simulation.stopped}")
+    data = _data(simulation, law_name, cycle, carried)
+    person = partial(_tell, simulation, data, carried, out)
+    code = _ENDED if simulation.stopped else 0
+    return destination.deliver(
+        simulation.table(), data, partial(_pictures, simulation), person, code
+    )
 
 
 def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
     """Return the controller's model of a machine: one that moves as it does, in its mode."""
     model = load_robot(name, elbows)
-    for what, own, other in (
+    for what, names, other in (
         ("pose is", machine.coordinates, model.coordinates),
         ("joints are", machine.joint_names, model.joint_names),
     ):
-        if own != other:
+        if names != other:
             raise DataError(
                 f"--model {name}: its {what} {' '.join(other)}, and of {machine.name} "
-                f"{' '.join(own)}; give a model of the same machine"
+                f"{' '.join(names)}; give a model of the same machine"
             )
     return model
 
@@ -140,42 +142,42 @@ def controller_of(name: Name, motion: Motion, period: float, bandwidth: float | 
     """Return a controller; an adaptive one learns the parameters that the motion excites."""
     from pteron.controllers import Adaptive, ComputedTorque, FeedForwardPD, PDGravity
 
-    made: dict[str, Any] = {
+    kinds: dict[str, Any] = {
         "computed-torque": ComputedTorque,
         "feed-forward": FeedForwardPD,
         "pd": PDGravity,
         "adaptive": partial(Adaptive, motion=motion),
         "adaptive-drives": partial(Adaptive, motion=motion, friction=True),
     }
-    found: Controller = made[name](period=period, bandwidth=bandwidth)
-    return found
+    controller: Controller = kinds[name](period=period, bandwidth=bandwidth)
+    return controller
 
 
-def _data(found: Simulation, controller: str, cycle: str, carried: Carried) -> dict[str, Any]:
+def _data(simulation: Simulation, controller: str, cycle: str, carried: Carried) -> dict[str, Any]:
     import numpy as np
 
-    robot, error = found.robot, found.error
-    power = found.forces * found.joint_rates
+    robot, error = simulation.robot, simulation.error
+    power = simulation.forces * simulation.joint_rates
     drives = {
-        "peak_force": np.abs(found.forces).max(axis=0),
-        "rms_force": [np.sqrt(np.mean(force**2)) for force in found.forces.T],
-        "peak_speed": np.abs(found.joint_rates).max(axis=0),
+        "peak_force": np.abs(simulation.forces).max(axis=0),
+        "rms_force": [np.sqrt(np.mean(force**2)) for force in simulation.forces.T],
+        "peak_speed": np.abs(simulation.joint_rates).max(axis=0),
         "peak_power": np.abs(power).max(axis=0),
-        "at_its_limit": found.saturated,
+        "at_its_limit": simulation.saturated,
     }
     tracking = {
         "largest": np.abs(error).max(axis=0),
-        "rms": [np.sqrt(np.mean(one**2)) for one in error.T],
+        "rms": [np.sqrt(np.mean(deviation**2)) for deviation in error.T],
     }
     return {
         "robot": robot.name,
         "cycle": cycle,
         "controller": controller,
         **asdict(carried),
-        "duration": float(found.time[-1]),
-        "samples": len(found.time),
-        "step": None if np.isnan(found.step) else found.step,
-        "stopped": found.stopped,
+        "duration": float(simulation.time[-1]),
+        "samples": len(simulation.time),
+        "step": None if np.isnan(simulation.step) else simulation.step,
+        "stopped": simulation.stopped,
         "tracking": _rows({"coordinate": robot.coordinates} | tracking),
         "drives": _rows({"leg": range(1, len(robot.legs) + 1)} | drives),
     }
@@ -186,26 +188,26 @@ def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def _pictures(found: Simulation) -> dict[str, str]:
+def _pictures(simulation: Simulation) -> dict[str, str]:
     from pteron.plots import forces_figure, svg_file, tracking_figure
 
-    units = ", ".join(dict.fromkeys(leg.joint.force_unit for leg in found.robot.legs))
-    forces = forces_figure(found.time, found.forces, ylabel=f"drive force ({units})")
-    tracking = tracking_figure(found.time, found.error, found.robot.coordinates)
+    units = ", ".join(dict.fromkeys(leg.joint.force_unit for leg in simulation.robot.legs))
+    forces = forces_figure(simulation.time, simulation.forces, ylabel=f"drive force ({units})")
+    tracking = tracking_figure(simulation.time, simulation.error, simulation.robot.coordinates)
     return {"tracking.svg": svg_file(tracking), "forces.svg": svg_file(forces)}
 
 
-def _tell(found: Simulation, data: dict[str, Any], carried: Carried, out: str | None) -> None:
+def _tell(simulation: Simulation, data: dict[str, Any], carried: Carried, out: str | None) -> None:
     """Print for a person; without --out a pipe gets the table."""
     if is_terminal() or out is not None:
-        _show(found, data, carried)
+        _show(simulation, data, carried)
     else:
-        write(found.table().write_csv())
+        write(simulation.table().write_csv())
 
 
-def _show(found: Simulation, data: dict[str, Any], carried: Carried) -> None:
+def _show(simulation: Simulation, data: dict[str, Any], carried: Carried) -> None:
     """Print for a person: how well it follows, and what its drives do."""
-    robot = found.robot
+    robot = simulation.robot
     steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
     errors = (
         (row["coordinate"], *(f"{1e6 * row[key]:.3g} u{unit}" for key in ("largest", "rms")))

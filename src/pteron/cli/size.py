@@ -100,25 +100,25 @@ def size(
     cycles = cycle or [STANDARD]
     where = within or ("workspace" if cycles == [STANDARD] else "here")
     places: Any = {"workspace": "workspace", "here": None}
-    such = ", such as x=-0.1:0.1,y=-0.1:0.1"
-    spans = {} if where in places else pose_spans(machine, where, "--within", such)
+    example = ", such as x=-0.1:0.1,y=-0.1:0.1"
+    spans = {} if where in places else pose_spans(machine, where, "--within", example)
     carrying = carried.on(machine)
     with spinner(f"Sizing the drives of {machine.name}"):
-        motions = [cycle_of(carrying, one, duration) for one in cycles]
+        motions = [cycle_of(carrying, name, duration) for name in cycles]
         region = _box(machine, spans, motions) if spans else places[where]
         how: dict[str, Any] = {"dwell": dwell or [0.0], "friction": friction}
-        found = sized(carrying, motions, places=region, **how)
-        fits = choose(found, chosen, margin=margin)
-        common = choose_common(found, chosen, margin=margin)
-    lacking = [*_weak(found, margin), *_unserved(found, fits, margin)]
+        sizing = sized(carrying, motions, places=region, **how)
+        fits = choose(sizing, chosen, margin=margin)
+        common = choose_common(sizing, chosen, margin=margin)
+    lacking = [*_weak(sizing, margin), *_unserved(sizing, fits, margin)]
     warn(lacking)
-    asked = _Asked(" and ".join(cycles), carried, where, margin)
+    request = _Asked(" and ".join(cycles), carried, where, margin)
     # A list of motors is what its choice is asked for.
     return destination.deliver(
-        fits_frame(machine, fits) if fits and out is None else found.table(),
-        _data(found, fits, asked) | {"common_motors": common_rows(machine, common)},
-        partial(_more, found, fits),
-        partial(_show, found, fits, common, asked),
+        fits_frame(machine, fits) if fits and out is None else sizing.table(),
+        _data(sizing, fits, request) | {"common_motors": common_rows(machine, common)},
+        partial(_more, sizing, fits),
+        partial(_show, sizing, fits, common, request),
         _OVERLOADED if lacking else 0,
     )
 
@@ -149,25 +149,25 @@ def _box(
     return box_of([spans.get(name, (float(a), float(b))) for name, a, b in taken])
 
 
-def _weak(found: Sizing, margin: float) -> list[str]:
+def _weak(sizing: Sizing, margin: float) -> list[str]:
     """Return what the drives of the machine's file have too little of, a line each."""
     beyond = [
-        f"leg {one.leg}: not enough: {one.limit} allow {one.most:.4g} {one.unit}, {one.margin:.3g} "
-        f"times the {one.needed:.4g} {one.unit} that the cycle takes{found.where(one)}, and a "
-        f"margin of {margin:g} is asked for"
-        for one in found.margins
-        if 1.0 <= one.margin < margin * (1.0 - _ROUNDING)
+        f"leg {drive.leg}: not enough: {drive.limit} allow {drive.most:.4g} {drive.unit}, "
+        f"{drive.margin:.3g} times the {drive.needed:.4g} {drive.unit} that the cycle takes"
+        f"{sizing.where(drive)}, and a margin of {margin:g} is asked for"
+        for drive in sizing.margins
+        if 1.0 <= drive.margin < margin * (1.0 - _ROUNDING)
     ]
-    return [*found.overloads, *beyond]
+    return [*sizing.overloads, *beyond]
 
 
-def _unserved(found: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
+def _unserved(sizing: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
     """Return the joints for which no motor of the list is enough, and what the best one lacks."""
     lines = []
-    for leg in range(1, found.robot.joint_count + 1):
-        own = [fit for fit in fits if fit.leg == leg]
-        if own and not own[0].fits:
-            best = own[0]
+    for leg in range(1, sizing.robot.joint_count + 1):
+        leg_fits = [fit for fit in fits if fit.leg == leg]
+        if leg_fits and not leg_fits[0].fits:
+            best = leg_fits[0]
             lines.append(
                 f"leg {leg}: not enough: no motor of the list serves; {best.motor.name}, the "
                 f"nearest, has {best.margin:.3g} times the {best.scarcest} that the cycle takes, "
@@ -176,162 +176,162 @@ def _unserved(found: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
     return lines
 
 
-def _data(found: Sizing, fits: tuple[Fit, ...], asked: _Asked) -> dict[str, Any]:
-    total = found.power.sum(axis=-1)
+def _data(sizing: Sizing, fits: tuple[Fit, ...], request: _Asked) -> dict[str, Any]:
+    total = sizing.power.sum(axis=-1)
     return {
-        "robot": found.robot.name,
-        "cycle": asked.cycle,
-        "within": asked.within,
-        "margin": asked.margin,
-        **asdict(asked.carried),
-        "duration": found.duration,
-        "dwell": found.dwell,
-        "drives": found.table().to_dicts(),
+        "robot": sizing.robot.name,
+        "cycle": request.cycle,
+        "within": request.within,
+        "margin": request.margin,
+        **asdict(request.carried),
+        "duration": sizing.duration,
+        "dwell": sizing.dwell,
+        "drives": sizing.table().to_dicts(),
         "all": {
             "peak_power": float(total.max(initial=0.0)),
             "peak_braking": float((-total).max(initial=0.0)),
-            "energy": found.net_energy,
-            "mean_power": found.net_energy / found.duration,
+            "energy": sizing.net_energy,
+            "mean_power": sizing.net_energy / sizing.duration,
         },
-        "places": len(found.places) or 1,
-        "worst": _worst(found),
-        "assumed_friction": found.assumed_friction.tolist(),
-        "margins": [one._asdict() | {"margin": one.margin} for one in found.margins],
-        "overloads": list(found.overloads),
-        "motors": fits_frame(found.robot, fits).to_dicts() if fits else [],
+        "places": len(sizing.places) or 1,
+        "worst": _worst(sizing),
+        "assumed_friction": sizing.assumed_friction.tolist(),
+        "margins": [limit._asdict() | {"margin": limit.margin} for limit in sizing.margins],
+        "overloads": list(sizing.overloads),
+        "motors": fits_frame(sizing.robot, fits).to_dicts() if fits else [],
     }
 
 
-def _worst(found: Sizing) -> list[dict[str, Any]]:
+def _worst(sizing: Sizing) -> list[dict[str, Any]]:
     """Return the worst places of each leg; none where the cycle is done as it stands."""
     rows = []
-    for leg in range(found.robot.joint_count) if found.places else ():
+    for leg in range(sizing.robot.joint_count) if sizing.places else ():
         for quantity in _NAMED:
-            place = found.places[found.worst(quantity)[leg]]
+            place = sizing.places[sizing.worst(quantity)[leg]]
             rows.append({"leg": leg + 1, "quantity": quantity, **asdict(place)})
     return rows
 
 
-def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
+def _more(sizing: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
     """Return the further files of a folder."""
     from pteron.plots import svg_file
     from pteron.report.drive_figures import force_speed, power
 
-    if found.places:
-        found = found.at(int(found.power.sum(axis=-1).max(axis=0).argmax()))
-    texts = {"power.svg": svg_file(power(found)), "force-speed.svg": svg_file(force_speed(found))}
-    return texts | ({"motors.csv": fits_frame(found.robot, fits).write_csv()} if fits else {})
+    if sizing.places:
+        sizing = sizing.at(int(sizing.power.sum(axis=-1).max(axis=0).argmax()))
+    texts = {"power.svg": svg_file(power(sizing)), "force-speed.svg": svg_file(force_speed(sizing))}
+    return texts | ({"motors.csv": fits_frame(sizing.robot, fits).write_csv()} if fits else {})
 
 
 def _show(
-    found: Sizing, fits: tuple[Fit, ...], common: tuple[CommonFit, ...], asked: _Asked
+    sizing: Sizing, fits: tuple[Fit, ...], common: tuple[CommonFit, ...], request: _Asked
 ) -> None:
     """Print for a person: loads, power, motors, and the choice."""
-    rest = f", {found.dwell:g} s of it at rest" if found.dwell else ""
+    dwell = f", {sizing.dwell:g} s of it at rest" if sizing.dwell else ""
     places = (
-        f"The greatest of {len(found.places)} places and turns of the cycle, within "
-        f"{plain(asked.within.replace('workspace', 'the workspace'))}."
+        f"The greatest of {len(sizing.places)} places and turns of the cycle, within "
+        f"{plain(request.within.replace('workspace', 'the workspace'))}."
     )
     show(
-        f"[bold]{plain(found.robot.name)}[/bold]{plain(str(asked.carried))}, "
-        f"cycle {plain(asked.cycle)}: "
-        f"{found.duration:.4g} s{rest}",
-        *([places] if found.places else []),
-        _loads(found),
-        *_places(found),
-        _powers(found),
-        *_rotors(found),
-        *_energy(found),
-        *motors_table(found.robot, fits),
-        *common_table(found.robot, common),
-        *_verdict(found, fits, asked.margin),
+        f"[bold]{plain(sizing.robot.name)}[/bold]{plain(str(request.carried))}, "
+        f"cycle {plain(request.cycle)}: "
+        f"{sizing.duration:.4g} s{dwell}",
+        *([places] if sizing.places else []),
+        _loads(sizing),
+        *_places(sizing),
+        _powers(sizing),
+        *_rotors(sizing),
+        *_energy(sizing),
+        *motors_table(sizing.robot, fits),
+        *common_table(sizing.robot, common),
+        *_verdict(sizing, fits, request.margin),
     )
 
 
-def _energy(found: Sizing) -> list[str]:
+def _energy(sizing: Sizing) -> list[str]:
     """Return what all drives take, and from where their friction is."""
-    total = found.power.sum(axis=-1)
-    net = found.net_energy
-    given = f"{found.given_energy.sum():.4g} J given and taken back: there is no friction"
-    told = [
-        f"All drives: {net:.4g} J a cycle{'' if net else f' ({given})'}, "
-        f"{net / found.duration:.4g} W in the mean, {total.max():.4g} W at most"
+    total = sizing.power.sum(axis=-1)
+    net = sizing.net_energy
+    exchanged = f"{sizing.given_energy.sum():.4g} J given and taken back: there is no friction"
+    lines = [
+        f"All drives: {net:.4g} J a cycle{'' if net else f' ({exchanged})'}, "
+        f"{net / sizing.duration:.4g} W in the mean, {total.max():.4g} W at most"
     ]
-    if found.assumed_friction.any():
-        units = [leg.joint.force_unit for leg in found.robot.legs]
-        forces = zip(found.assumed_friction, units, strict=True)
+    if sizing.assumed_friction.any():
+        units = [leg.joint.force_unit for leg in sizing.robot.legs]
+        forces = zip(sizing.assumed_friction, units, strict=True)
         values = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
-        told.append(
+        lines.append(
             f"Friction is assumed where the file has none: dry, leg by leg {values}; --friction "
             "SHARE changes it, 0 leaves it out"
         )
-    return told
+    return lines
 
 
-def _verdict(found: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
+def _verdict(sizing: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
     """Return whether drives and motors are enough, and the margin that exists."""
-    told = []
-    if found.margins:
-        least = min(found.margins, key=lambda one: one.margin)
+    lines = []
+    if sizing.margins:
+        least = min(sizing.margins, key=lambda limit: limit.margin)
         enough = "Enough" if least.margin >= margin * (1.0 - _ROUNDING) else "Not enough"
-        told.append(
+        lines.append(
             f"{enough}: the drives in the file have a margin of {least.margin:.3g}, {margin:g} "
             f"asked; least is leg {least.leg}'s: {least.limit} allow {least.most:.4g} "
-            f"{least.unit}, the cycle takes {least.needed:.4g} {least.unit}{found.where(least)}"
+            f"{least.unit}, the cycle takes {least.needed:.4g} {least.unit}{sizing.where(least)}"
         )
     best = [next(f for f in fits if f.leg == leg) for leg in sorted({fit.leg for fit in fits})]
     if best:
         least_fit = min(best, key=lambda fit: (fit.fits, fit.margin))
         enough = "Enough" if all(fit.fits for fit in best) else "Not enough"
-        told.append(
+        lines.append(
             f"{enough}: the first motor listed for each leg has a margin of {least_fit.margin:.3g} "
             f"or more, {margin:g} asked; least is leg {least_fit.leg}'s {least_fit.scarcest} with "
             f"{plain(least_fit.motor.name)}"
         )
-    return told
+    return lines
 
 
-def _places(found: Sizing) -> list[rich.table.Table]:
+def _places(sizing: Sizing) -> list[rich.table.Table]:
     """Return where each leg's force and speed are greatest."""
     rows = []
-    for one in _worst(found):
-        pose = " ".join(f"{round(value, 6) + 0.0:.4g}" for value in one["pose"])
-        quantity = _NAMED[one["quantity"]].format(found.robot.legs[one["leg"] - 1].joint.force)
-        leg = str(one["leg"]) if one["quantity"] == "peak_force" else ""
-        rows.append((leg, quantity, pose, f"{math.degrees(one['turn']) % 360:.4g} deg"))
-    platform, coordinates = found.robot.platform, " ".join(found.robot.coordinates)
+    for worst in _worst(sizing):
+        pose = " ".join(f"{round(value, 6) + 0.0:.4g}" for value in worst["pose"])
+        quantity = _NAMED[worst["quantity"]].format(sizing.robot.legs[worst["leg"] - 1].joint.force)
+        leg = str(worst["leg"]) if worst["quantity"] == "peak_force" else ""
+        rows.append((leg, quantity, pose, f"{math.degrees(worst['turn']) % 360:.4g} deg"))
+    platform, coordinates = sizing.robot.platform, " ".join(sizing.robot.coordinates)
     units = ", ".join(["m"] * bool(platform.lengths) + ["rad"] * bool(platform.angles))
     names = "leg", "is greatest", f"about {coordinates} ({units})", "turned"
     return [table(*names, rows=rows, numbers=("leg", "turned"))] if rows else []
 
 
-def _loads(found: Sizing) -> rich.table.Table:
-    force = force_word(found.robot)
+def _loads(sizing: Sizing) -> rich.table.Table:
+    force = force_word(sizing.robot)
     names = ("leg", f"peak {force}", f"RMS {force}", "peak speed", "RMS speed")
-    columns = found.peak_forces, found.rms_forces, found.peak_speeds, found.rms_speeds
+    columns = sizing.peak_forces, sizing.rms_forces, sizing.peak_speeds, sizing.rms_speeds
     rows = []
-    for i, leg in enumerate(found.robot.legs):
+    for i, leg in enumerate(sizing.robot.legs):
         units = [leg.joint.force_unit] * 2 + [f"{leg.joint.unit}/s"] * 2
         cells = (f"{v[i]:.4g} {unit}" for v, unit in zip(columns, units, strict=True))
         rows.append((str(i + 1), *cells))
     return table(*names, rows=rows, numbers=names)
 
 
-def _powers(found: Sizing) -> rich.table.Table:
+def _powers(sizing: Sizing) -> rich.table.Table:
     names = ("leg", "peak (W)", "mean (W)", "brakes (W)", "gives (J)", "takes back (J)")
-    powers = (found.peak_power, found.mean_power, found.peak_braking)
-    columns = zip(*powers, found.given_energy, found.braked_energy, strict=True)
+    powers = (sizing.peak_power, sizing.mean_power, sizing.peak_braking)
+    columns = zip(*powers, sizing.given_energy, sizing.braked_energy, strict=True)
     rows = ((str(i), *(f"{v:.4g}" for v in values)) for i, values in enumerate(columns, start=1))
     return table(*names, rows=rows, numbers=names)
 
 
-def _rotors(found: Sizing) -> list[rich.table.Table]:
+def _rotors(sizing: Sizing) -> list[rich.table.Table]:
     """Return the loads of the motors of the machine's file, where it says enough."""
-    if not any(drive.ratio or drive.rotor_inertia for drive in found.drives):
+    if not any(drive.ratio or drive.rotor_inertia for drive in sizing.drives):
         return []
     names = ("leg", "load", "rotor", "load/rotor", "ratio", "best ratio", "RMS at motor")
     rows = []
-    for leg, row in zip(found.robot.legs, found.table().to_dicts(), strict=True):
+    for leg, row in zip(sizing.robot.legs, sizing.table().to_dicts(), strict=True):
         inertia = " kg" if leg.joint.unit == "m" else " kg m^2"
         units = {"greatest_load_inertia": inertia, "rotor_inertia": inertia, "inertia_ratio": ""}
         units |= {"ratio": "", "best_ratio": f" rad/{leg.joint.unit}", "rms_motor_torque": " N m"}

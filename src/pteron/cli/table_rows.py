@@ -96,8 +96,8 @@ class Rows:
         try:
             serve(values[row])
         except PteronError as error:
-            asked = isinstance(error, UnreachablePose) and error.millimetres
-            doubt = f"; {unlikely}" if unlikely and not asked else ""
+            is_millimetres = isinstance(error, UnreachablePose) and error.millimetres
+            doubt = f"; {unlikely}" if unlikely and not is_millimetres else ""
             if self.single:
                 raise PteronError(f"{error}{doubt}") from None
             raise PteronError(

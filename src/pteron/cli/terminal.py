@@ -71,14 +71,14 @@ def show(*things: str | Table) -> None:
         console.print(thing, soft_wrap=isinstance(thing, str) and not is_terminal())
 
 
-def _fit(made: Table, console: Console) -> None:
+def _fit(shown_table: Table, console: Console) -> None:
     """Break the headings of a table at their blanks if it is wider than the screen."""
     from rich.measure import Measurement
 
     wide = console.options.update(max_width=_ANY_WIDTH)
-    if Measurement.get(console, wide, made).maximum <= console.width:
+    if Measurement.get(console, wide, shown_table).maximum <= console.width:
         return
-    for column in made.columns:
+    for column in shown_table.columns:
         column.header = str(column.header).replace(" ", "\n")
 
 
@@ -109,15 +109,15 @@ def table(
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    made = Table(box=SIMPLE_HEAD, caption=caption, pad_edge=False, collapse_padding=True)
+    shown_table = Table(box=SIMPLE_HEAD, caption=caption, pad_edge=False, collapse_padding=True)
     for name in columns:
         number = name in numbers
         justify: Any = "right" if number else "left"
-        whole = number or name in names
-        made.add_column(plain(name), justify=justify, no_wrap=whole, overflow="fold")
+        unbroken = number or name in names
+        shown_table.add_column(plain(name), justify=justify, no_wrap=unbroken, overflow="fold")
     for row in rows:
-        made.add_row(*row)
-    return made
+        shown_table.add_row(*row)
+    return shown_table
 
 
 def written(*paths: object) -> list[str]:
@@ -152,7 +152,7 @@ def complain(message: str) -> None:
     from rich.console import Console
 
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
-    told, start, lines = message.partition("\n[")
-    console.print(f"[bold red]Error:[/bold red] {plain(told)}")
+    first_line, start, lines = message.partition("\n[")
+    console.print(f"[bold red]Error:[/bold red] {plain(first_line)}")
     for line in (start + lines).split("\n")[1:]:
         console.print(plain(line))

@@ -98,12 +98,12 @@ def tune(
     with spinner(f"Tuning {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         acts = controller_of(controller, motion, 1.0 / rate, bandwidth)
-        found = tuned(machine, motion, acts, required=required, **how)
-        best = float(np.max(found.controller.bandwidth or 0.1 * rate))
+        tuning = tuned(machine, motion, acts, required=required, **how)
+        best = float(np.max(tuning.controller.bandwidth or 0.1 * rate))
         tried = trials(
             machine,
             motion,
-            found.controller,
+            tuning.controller,
             bandwidths=[best * share for share in _SHARES if best * share < np.pi * rate],
             delays=[delay + late / rate for late in _DELAYS],
             encoders=steps,
@@ -115,33 +115,33 @@ def tune(
         "cycle": cycle,
         "controller": controller,
         "rate": rate,
-        "bandwidth": found.controller.bandwidth,
-        **found.gains(),
-        "margins": found.least,
-        "poses": len(found.states),
+        "bandwidth": tuning.controller.bandwidth,
+        **tuning.gains(),
+        "margins": tuning.least,
+        "poses": len(tuning.states),
         "trials": tried.to_dicts(),
     }
-    told = partial(_show, found, controller, tried)
-    return destination.deliver(found.table(), data, partial(_files, found, tried), told)
+    person = partial(_show, tuning, controller, tried)
+    return destination.deliver(tuning.table(), data, partial(_files, tuning, tried), person)
 
 
-def _files(found: Tuning, tried: pl.DataFrame) -> dict[str, str]:
+def _files(tuning: Tuning, tried: pl.DataFrame) -> dict[str, str]:
     from pteron.controllers import gains_text
     from pteron.report.tuning_page import tuning_page
 
     return {
-        "gains.toml": gains_text(found.robot, found.controller, found.least),
-        "tuning.html": tuning_page(found, tried),
+        "gains.toml": gains_text(tuning.robot, tuning.controller, tuning.least),
+        "tuning.html": tuning_page(tuning, tried),
     }
 
 
-def _show(found: Tuning, controller: str, tried: pl.DataFrame) -> None:
+def _show(tuning: Tuning, controller: str, tried: pl.DataFrame) -> None:
     """Print for a person: the gains, the least margins, and the trials."""
     import numpy as np
 
-    least, gains = found.least, found.gains()
-    rows = zip(found.robot.joint_names, *gains.values(), strict=True)
-    unit = "urad" if found.robot.platform.angular.all() else "um"
+    least, gains = tuning.least, tuning.gains()
+    rows = zip(tuning.robot.joint_names, *gains.values(), strict=True)
+    unit = "urad" if tuning.robot.platform.angular.all() else "um"
     tries = [
         (
             *(row["changed"], f"{row['value']:.4g}"),
@@ -159,12 +159,16 @@ def _show(found: Tuning, controller: str, tried: pl.DataFrame) -> None:
         for row in tried.to_dicts()
     ]
     names = ("changed", "value", "greatest error", "settled after", "peak force", "energy")
-    rate = found.controller.bandwidth
+    rate = tuning.controller.bandwidth
     chosen = "" if rate is None else f", {np.max(rate):.4g} rad/s"
     show(
-        f"[bold]{plain(found.robot.name)}[/bold], {controller}{chosen}: at {len(found.states)} "
+        f"[bold]{plain(tuning.robot.name)}[/bold], {controller}{chosen}: at {len(tuning.states)} "
         f"poses a gain margin of {least['gain']:.3g}, {np.degrees(least['phase']):.3g} degrees, "
         f"{1e3 * least['delay']:.3g} ms; disk margin {least['disk']:.3g}",
-        table("joint", *gains, rows=((name, *(f"{g:.6g}" for g in own)) for name, *own in rows)),
+        table(
+            "joint",
+            *gains,
+            rows=((name, *(f"{g:.6g}" for g in joint_gains)) for name, *joint_gains in rows),
+        ),
         table(*names, rows=tries, numbers=names[1:]),
     )

@@ -60,9 +60,9 @@ class TypedRow:
 
         Columns that are `replaced` are left out.
         """
-        kept = self._without({"row", "mode", *replaced})
+        columns = self._without({"row", "mode", *replaced})
         count = len(modes)
-        cells = {name: [*values] * count for name, values in kept.items()}
+        cells = {name: [*values] * count for name, values in columns.items()}
         return replace(self, cells={"row": [1] * count, **cells, "mode": modes})
 
     def empty(self, column: str) -> int:

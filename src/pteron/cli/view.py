@@ -72,7 +72,7 @@ def view(
             "payload": carried.payload,
             "compare": compare,
             "enlarge": enlarge,
-            "beside": [load_robot(one) for one in beside or ()],
+            "beside": [load_robot(name) for name in beside or ()],
         }
         viewer = opened(machine, host=host, port=port, **shown)
     # Ctrl-C is the usual way to end it.

@@ -132,7 +132,7 @@ def workspace(
         volume = _volume(machine, grid)
     warn(outside := _outside(grid, volume))
     with progress_bar(f"Mapping {machine.name}") as tell:
-        found = map_index(
+        index_map = map_index(
             machine,
             names,
             grid,
@@ -143,14 +143,16 @@ def workspace(
             progress=tell,
         )
     if out is not None and ending in (*_PICTURES, *_FILMS):
-        _draw(found, out, ending)
-    data = map_data(found, volume, [*warnings, *outside], out)
-    return Result(data, partial(_show, found, volume, data, out))
+        _draw(index_map, out, ending)
+    data = map_data(index_map, volume, [*warnings, *outside], out)
+    return Result(data, partial(_show, index_map, volume, data, out))
 
 
-def _show(found: Map, volume: ReachVolume | None, data: dict[str, Any], out: str | None) -> None:
+def _show(
+    index_map: Map, volume: ReachVolume | None, data: dict[str, Any], out: str | None
+) -> None:
     if is_terminal():
-        show_map(found, volume, data)
+        show_map(index_map, volume, data)
     else:
         write(map_rows(data).write_csv())
     if out is not None:
@@ -208,22 +210,22 @@ def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str)
     from pteron.maps import pose_grid
 
     names = robot.coordinates
-    held, ranges = pose_ranges(text, "--slice")
+    constants, ranges = pose_ranges(text, "--slice")
     if ending in _FILMS:
         points = points or _FILM_POINTS
         if text is None and len(names) > 3:
-            held = _home(robot, [name for name in names[:-1] if name not in ("x", "y")])
+            constants = _home(robot, [name for name in names[:-1] if name not in ("x", "y")])
     elif ending in _SURFACES and text is None and len(names) > 3:
-        held = _home(robot, robot.platform.angles)
-    fixed = held if text is not None or ending in (*_FILMS, *_SURFACES) else None
+        constants = _home(robot, robot.platform.angles)
+    fixed = constants if text is not None or ending in (*_FILMS, *_SURFACES) else None
     grid = pose_grid(robot, fixed, ranges, points=points, rim=_RIM if ending else 0.0)
     count = len(grid.axes)
-    told = ", ".join(axis.name for axis in grid.axes)
+    varying = ", ".join(axis.name for axis in grid.axes)
     if ending in (*_FILMS, *_SURFACES) and count != 3:
         what = "a film goes through the last of" if ending in _FILMS else "surfaces need"
-        raise DataError(f"--out: {what} three coordinates that vary, and here there vary {told}")
+        raise DataError(f"--out: {what} three coordinates that vary, and here there vary {varying}")
     if ending in _PICTURES and count > 3:
-        raise DataError(f"--out: a picture shows three coordinates, and here there vary {told}")
+        raise DataError(f"--out: a picture shows three coordinates, and here there vary {varying}")
     if ending in _FILMS and points and not any(len(span) > 2 for span in ranges.values()):
         return _with_frames(grid)
     return grid
@@ -273,12 +275,12 @@ def _outside(grid: Grid, volume: ReachVolume | None) -> list[str]:
     ]
 
 
-def _draw(found: Map, out: str, ending: str) -> None:
+def _draw(index_map: Map, out: str, ending: str) -> None:
     from pteron.plots import map_figure, map_film, save_figure
 
     if ending in _PICTURES:
-        with spinner(f"Drawing {found.robot}"):
-            save_figure(map_figure(found), out, dpi=_DPI)
+        with spinner(f"Drawing {index_map.robot}"):
+            save_figure(map_figure(index_map), out, dpi=_DPI)
         return
-    with progress_bar(f"Filming {found.robot}") as tell:
-        map_film(found, next(iter(found.values)), out, progress=tell)
+    with progress_bar(f"Filming {index_map.robot}") as tell:
+        map_film(index_map, next(iter(index_map.values)), out, progress=tell)

@@ -78,8 +78,8 @@ class AdaptationScales:
         rates = joint_rates(self.robot, *self.motion[:2]).actuated
         speed = np.sqrt((rates**2).mean(axis=0))
         least = _DRIVES * joint_masses(self.robot), force, force / speed, force
-        own = np.abs(drive_numbers(self.robot)[: len(ADAPTED) * self.robot.joint_count])
-        drives = np.maximum(own, np.concatenate(least))
+        drive_values = np.abs(drive_numbers(self.robot)[: len(ADAPTED) * self.robot.joint_count])
+        drives = np.maximum(drive_values, np.concatenate(least))
         return np.concatenate([np.abs(self.base.grouping) @ sizes, drives])
 
     def learning(self, damping: Array, count: int, rate: float, most: float) -> tuple[Array, float]:

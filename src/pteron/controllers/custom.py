@@ -76,20 +76,20 @@ class Custom:
         if not isinstance(self.function, ca.Function):
             raise DataError(f"function: {shown(self.function)} given, a casadi.Function expected")
         object.__setattr__(self, "period", period_of(self.period))
-        given, faults = set(self.parameters), []
+        named, faults = set(self.parameters), []
         names = self.function.name_in(), self.function.name_out()
-        unknown = [name for name in names[0] if name not in {*TOLD, *given}]
+        unknown = [name for name in names[0] if name not in {*TOLD, *named}]
         if unknown:
             faults.append(
                 f"{', '.join(unknown)}: no sensor gives it; there are the readings joints, "
                 "joint_rates, motors, motor_rates, the reference pose, velocity, acceleration, and "
                 "memory; for a parameter give its numbers in `parameters`"
             )
-        faults += [f"parameters: {n}: no input has that name" for n in given - set(names[0])]
-        faults += [f"parameters: {n}: is a reading or the reference" for n in given & set(TOLD)]
-        wanted = ["forces", *_MEMORY[1:]] if _MEMORY[0] in names[0] else ["forces"]
-        if sorted(names[1]) != sorted(wanted):
-            faults.append(f"outputs: {', '.join(names[1])} given, {', '.join(wanted)} expected")
+        faults += [f"parameters: {n}: no input has that name" for n in named - set(names[0])]
+        faults += [f"parameters: {n}: is a reading or the reference" for n in named & set(TOLD)]
+        expected = ["forces", *_MEMORY[1:]] if _MEMORY[0] in names[0] else ["forces"]
+        if sorted(names[1]) != sorted(expected):
+            faults.append(f"outputs: {', '.join(names[1])} given, {', '.join(expected)} expected")
         if faults:
             raise DataError(f"controller: {told(faults)}")
         _ = self._program
@@ -133,13 +133,17 @@ class Custom:
                 "leave out what iterates or calls other programs"
             ) from None
         # Each input and output is a column, and forces come first.
-        given = [ca.SX.sym(name, function.numel_in(k)) for k, name in enumerate(function.name_in())]
-        symbols = zip(given, function.sx_in(), strict=True)
-        found = function.call([ca.reshape(one, *like.shape) for one, like in symbols])
-        results = dict(zip(function.name_out(), found, strict=True))
+        columns = [
+            ca.SX.sym(name, function.numel_in(k)) for k, name in enumerate(function.name_in())
+        ]
+        symbols = zip(columns, function.sx_in(), strict=True)
+        outputs_of_call = function.call(
+            [ca.reshape(operation, *like.shape) for operation, like in symbols]
+        )
+        results = dict(zip(function.name_out(), outputs_of_call, strict=True))
         names = sorted(results)
         function = ca.Function(
-            function.name(), given, [ca.vec(ca.densify(results[name])) for name in names],
+            function.name(), columns, [ca.vec(ca.densify(results[name])) for name in names],
             function.name_in(), names,
         )  # fmt: skip
         function = straight(function)
@@ -147,9 +151,10 @@ class Custom:
         without = sorted({graph.nodes[k].operation for k in graph.operations()} - {*C})
         if without:
             codes = {str(getattr(ca, name)): name[3:] for name in dir(ca) if name.startswith("OP_")}
+            named = ", ".join(codes.get(operation, operation).lower() for operation in without)
             raise DataError(
-                f"controller: {', '.join(codes.get(one, one).lower() for one in without)} cannot "
-                f"be C here; there are {', '.join(C)}, tanh, sign and tan"
+                f"controller: {named} cannot be C here; there are {', '.join(C)}, tanh, sign and "
+                "tan"
             )
         inputs = tuple(
             Port(name, (function.numel_in(k),), name in self.parameters)
@@ -184,17 +189,17 @@ class CustomLaw:
 
     def memory(self, pose: Array, velocity: Array) -> Array:
         """Return what it keeps before the first sample, (K,)."""
-        given = self.controller.memory
-        value = given(pose, velocity) if callable(given) else given
+        memory = self.controller.memory
+        value = memory(pose, velocity) if callable(memory) else memory
         size = sum(port.size for port in self.program.inputs if port.name == _MEMORY[0])
         return _numbers(value, Port(_MEMORY[0], (size,))).ravel()
 
 
 def _numbers(value: ArrayLike, port: Port) -> Array:
     """Return a port's numbers, (1, 1, size), by columns where they are a matrix, after a check."""
-    found = as_array(value, port.name, ()).ravel("F")
-    if found.size != port.size or not np.isfinite(found).all():
+    numbers = as_array(value, port.name, ()).ravel("F")
+    if numbers.size != port.size or not np.isfinite(numbers).all():
         raise DataError(
             f"controller: {port.name}: {shown(value)} given, {port.size} finite numbers expected"
         )
-    return found.reshape(1, 1, -1)
+    return numbers.reshape(1, 1, -1)

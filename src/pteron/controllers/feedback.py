@@ -45,10 +45,10 @@ class Feedback(Controller):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = {"proportional": self.proportional, "derivative": self.derivative}
-        missing = [name for name, value in given.items() if value is None]
+        pair = {"proportional": self.proportional, "derivative": self.derivative}
+        missing = [name for name, value in pair.items() if value is None]
         if len(missing) == 1:
-            (other,) = given.keys() - missing
+            (other,) = pair.keys() - missing
             raise DataError(
                 f"{missing[0]}: missing, but {other} is given; give both, or bandwidth and damping"
             )

@@ -28,8 +28,8 @@ def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] |
     if not isinstance(several, list | tuple):
         return _number(f"{name}: {{}} given, a number above 0 expected", several)
     return tuple(
-        _number(f"{name}: {{}} given for joint {i}, a number above 0 expected", one)
-        for i, one in enumerate(several, start=1)
+        _number(f"{name}: {{}} given for joint {i}, a number above 0 expected", number)
+        for i, number in enumerate(several, start=1)
     )
 
 
@@ -53,10 +53,10 @@ def period_of(value: float) -> float:
 
 def per_joint(model: Manipulator, name: str, value: PerJoint) -> Array:
     """Return a number for each joint (n,)."""
-    found = np.asarray(value, dtype=float)
-    if found.ndim and found.shape != (model.joint_count,):
+    numbers = np.asarray(value, dtype=float)
+    if numbers.ndim and numbers.shape != (model.joint_count,):
         raise DataError(
-            f"{name}: {found.size} numbers given, but {model.name} has {model.joint_count} joints "
-            f"({', '.join(model.joint_names)}); give one for each, or one for all"
+            f"{name}: {numbers.size} numbers given, but {model.name} has {model.joint_count} "
+            f"joints ({', '.join(model.joint_names)}); give one for each, or one for all"
         )
-    return np.broadcast_to(found, model.joint_count)
+    return np.broadcast_to(numbers, model.joint_count)

@@ -45,15 +45,15 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
             for u in _RATES
         ]
     )
-    rest, line, square = np.tensordot(np.linalg.inv(np.vander(_RATES, 3, True)), forces, axes=1)
+    static, line, square = np.tensordot(np.linalg.inv(np.vander(_RATES, 3, True)), forces, axes=1)
     limits = limits_of(robot)
     most = limits.force
-    for i in np.flatnonzero((np.abs(rest) > most).any(axis=0)):
+    for i in np.flatnonzero((np.abs(static) > most).any(axis=0)):
         raise ModelError(
-            f"leg {i + 1}: its drive gives {most[i]:g}, but it takes {np.abs(rest[:, i]).max():.4g}"
-            " to hold the machine in the cycle"
+            f"leg {i + 1}: its drive gives {most[i]:g}, but it takes "
+            f"{np.abs(static[:, i]).max():.4g} to hold the machine in the cycle"
         )
-    rates = [_first_root(side * square, side * line, side * rest - most) for side in (1.0, -1.0)]
+    rates = [_first_root(side * square, side * line, side * static - most) for side in (1.0, -1.0)]
     speeds = np.abs(joint_rates(robot, motion.pose, motion.velocity).actuated).max(axis=0)
     with np.errstate(divide="ignore"):
         rate = min(*(float(part.min()) for part in rates), float((limits.speed / speeds).min()))
@@ -73,8 +73,8 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(line**2 - 4.0 * square * constant)
         falls = (line < 0.0) & (square > 0.0)  # the form without cancellation
-        found = np.where(falls, (root - line) / (2.0 * square), -2.0 * constant / (line + root))
-    return np.where(np.isfinite(found) & (found > 0.0), found, inf)
+        roots = np.where(falls, (root - line) / (2.0 * square), -2.0 * constant / (line + root))
+    return np.where(np.isfinite(roots) & (roots > 0.0), roots, inf)
 
 
 def _at_its_best(sizing: Sizing, leg: int, motor: Motor) -> Fit:
@@ -88,13 +88,13 @@ def _at_its_best(sizing: Sizing, leg: int, motor: Motor) -> Fit:
         return fit_at(sizing, leg, motor, span, float(np.exp(log_ratio)))
 
     middle = np.log(motor.max_speed / fastest if fastest else 1.0)
-    found = scipy.optimize.minimize_scalar(
+    optimum = scipy.optimize.minimize_scalar(
         lambda log_ratio: -np.log(at(log_ratio).margin),
         bounds=(middle - _DECADES * np.log(10.0), middle + np.log(10.0)),
         method="bounded",
         options={"xatol": 1e-6},
     )
-    return at(found.x)
+    return at(optimum.x)
 
 
 def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[Fit]:
@@ -102,13 +102,13 @@ def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) ->
 
     Where no margin reaches `enough`, it is the motor with the greatest margin.
     """
-    found = []
+    best = []
     for leg in range(1, sizing.robot.joint_count + 1):
-        fits = [_at_its_best(sizing, leg, one) for one in motors]
+        fits = [_at_its_best(sizing, leg, motor) for motor in motors]
         serving = [fit for fit in fits if fit.margin >= enough]
-        found.append(
+        best.append(
             min(serving, key=lambda fit: fit.motor.rated_torque * fit.motor.max_speed)
             if serving
             else max(fits, key=lambda fit: fit.margin)
         )
-    return found
+    return best

@@ -64,10 +64,10 @@ class Design:
     def values(self, what: str, poses: Array | None = None) -> Array:
         """Return a function's first output at poses, those of `poses` if none are given."""
         function = self.task.function(what)
-        own = {"geometry": self.geometry, "parameters": parameters(self.robot)}
-        given = {name: value for name, value in own.items() if name in function.fixed}
-        found = function(self.poses if poses is None else poses, **given)
-        return np.asarray(found[0] if isinstance(found, tuple) else found)
+        numbers = {"geometry": self.geometry, "parameters": parameters(self.robot)}
+        fixed = {name: value for name, value in numbers.items() if name in function.fixed}
+        outputs = function(self.poses if poses is None else poses, **fixed)
+        return np.asarray(outputs[0] if isinstance(outputs, tuple) else outputs)
 
     @cached_property
     def cube(self) -> Fit:
@@ -85,8 +85,8 @@ class Design:
     @cached_property
     def workspace(self) -> WorkspaceTable | None:
         """The required workspace, where it is in this design."""
-        asked = self.task.spec.workspace
-        return asked.placed(self.cube.center) if asked is not None and asked.floats else asked
+        table = self.task.spec.workspace
+        return table.placed(self.cube.center) if table is not None and table.floats else table
 
     @cached_property
     def poses(self) -> Array:
@@ -160,15 +160,15 @@ class Design:
         for _ in range(_ROUNDS):
             step = step / 2.0
             around = np.clip(worst[:, None] + step[:, None] * offsets, low[:, None], high[:, None])
-            for region, pose, own in zip(regions, worst, around, strict=True):
-                own[~region.holds(own)] = pose
-            found = sign * of(self, around.reshape(-1, self.robot.freedom))
-            found = np.nan_to_num(found, nan=-np.inf).reshape(len(worst), -1)
-            best = found.argmax(axis=1)
+            for region, pose, neighbours in zip(regions, worst, around, strict=True):
+                neighbours[~region.holds(neighbours)] = pose
+            nearby = sign * of(self, around.reshape(-1, self.robot.freedom))
+            nearby = np.nan_to_num(nearby, nan=-np.inf).reshape(len(worst), -1)
+            best = nearby.argmax(axis=1)
             here = np.arange(len(worst))
-            better = found[here, best] > most
+            better = nearby[here, best] > most
             worst = np.where(better[:, None], around[here, best], worst)
-            most = np.maximum(most, found[here, best])
+            most = np.maximum(most, nearby[here, best])
         return sign * float(most.max())
 
     @cached_property
@@ -203,13 +203,13 @@ class Design:
     @cached_property
     def _sides(self) -> dict[float, float]:
         """The least row of the conditions over the required workspace, by the measure's sign."""
-        found = {}
+        rows_by_side = {}
         for side in self.task.conditions.sides:
             rows = self.task.conditions.rows(self.geometry, self.poses, side)
             least = float(np.nanmin(rows))
             # A row that is NaN fails, though not as clearly as one that says by how much.
-            found[side] = min(least, UNKNOWN) if np.isnan(rows).any() else least
-        return found
+            rows_by_side[side] = min(least, UNKNOWN) if np.isnan(rows).any() else least
+        return rows_by_side
 
     @property
     def side(self) -> float:
@@ -284,12 +284,12 @@ class Design:
             return np.nan, "there is no cube" if self.workspace is None else "it fits nowhere"
         try:
             with alike(self.task.robot):
-                found = float(quantity.of(self))
+                amount = float(quantity.of(self))
         except PteronError as error:
             where = "in a cycle, " if quantity.cover == "cycles" else ""
             return np.nan, f"{where}{error}"
-        if not np.isnan(found):
-            return found, ""
+        if not np.isnan(amount):
+            return amount, ""
         out = int((~np.isfinite(self.joints).all(axis=-1)).sum())
         where = f"{out} of {len(self.poses)} sampled poses are out of reach"
         return np.nan, where if out else "it has none at some sampled pose: a singularity"

@@ -70,33 +70,35 @@ class Change:
 
 def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
     """Return the changes of the geometry in a design; legs that change alike as one."""
-    found: dict[tuple[str, float, float, str], list[int]] = {}
+    legs_by_change: dict[tuple[str, float, float, str], list[int]] = {}
     for variable in task.variables:
         for place in variable.places:
-            before, after = place.read(task.robot), place.read(robot)
-            if abs(after - before) > _NONE:
+            drawn, designed = place.read(task.robot), place.read(robot)
+            if abs(designed - drawn) > _NONE:
                 part = "" if place.part is None else f" {'xyz'[place.part]}"
                 what = f"{place.key.replace('_', ' ')}{part}"
                 unit = "m" if place.role in ("length", "point") else ""
-                key = what, round(before, 9), round(after, 9), unit
-                found.setdefault(key, []).append(place.leg)
+                key = what, round(drawn, 9), round(designed, 9), unit
+                legs_by_change.setdefault(key, []).append(place.leg)
     return [
-        Change(f"{what} of {told_legs(legs)}", before, after, unit)
-        for (what, before, after, unit), legs in found.items()
+        Change(f"{what} of {told_legs(legs)}", drawn, designed, unit)
+        for (what, drawn, designed, unit), legs in legs_by_change.items()
     ]
 
 
 def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
     """Return the changes of the bodies' masses; legs that change alike as one."""
-    found: dict[tuple[str, float, float], list[int]] = {}
+    legs_by_change: dict[tuple[str, float, float], list[int]] = {}
     for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1):
         for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True):
-            before, after = body.values[0], new.values[0]
-            if abs(after - before) > _NONE:
-                found.setdefault((leg.names[letter], before, round(after, 9)), []).append(i)
+            drawn, designed = body.values[0], new.values[0]
+            if abs(designed - drawn) > _NONE:
+                legs_by_change.setdefault(
+                    (leg.names[letter], drawn, round(designed, 9)), []
+                ).append(i)
     return [
-        Change(f"mass of {name} of {told_legs(legs)}", before, after, "kg")
-        for (name, before, after), legs in found.items()
+        Change(f"mass of {name} of {told_legs(legs)}", drawn, designed, "kg")
+        for (name, drawn, designed), legs in legs_by_change.items()
     ]
 
 

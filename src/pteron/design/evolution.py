@@ -18,8 +18,8 @@ def _pymoo(module: str) -> Any:
 def non_dominated(costs: Array) -> NDArray[np.int_]:
     """Return the numbers of the rows (N, M) of costs that no other row dominates, ascending."""
     sorting = _pymoo("util.nds.non_dominated_sorting").NonDominatedSorting()
-    found = sorting.do(costs, only_non_dominated_front=True)
-    return np.sort(np.asarray(found, dtype=int))
+    front_rows = sorting.do(costs, only_non_dominated_front=True)
+    return np.sort(np.asarray(front_rows, dtype=int))
 
 
 class Evolution:
@@ -55,6 +55,6 @@ class Evolution:
         from pymoo.core.population import Population
         from pymoo.problems.static import StaticProblem
 
-        whole = Population.merge(self._asked, Population.new("X", designs[len(self._asked) :]))
-        Evaluator().eval(StaticProblem(self._problem, F=costs, G=misses), whole)
-        self._algorithm.tell(infills=whole)
+        population = Population.merge(self._asked, Population.new("X", designs[len(self._asked) :]))
+        Evaluator().eval(StaticProblem(self._problem, F=costs, G=misses), population)
+        self._algorithm.tell(infills=population)

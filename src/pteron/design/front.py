@@ -78,26 +78,26 @@ class Front:
         """
         signs = np.array([o.sign for o in self.task.spec.objectives])
         costs = self.objectives * signs
-        found = {
+        best_designs = {
             f"best-{o.quantity}": int(costs[:, k].argmin())
             for k, o in enumerate(self.task.spec.objectives)
         }
         spans = np.ptp(costs, axis=0)
         shares = (costs - costs.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
         if len(signs) > 1:
-            found["compromise"] = int(np.linalg.norm(shares, axis=1).argmin())
-        return found
+            best_designs["compromise"] = int(np.linalg.norm(shares, axis=1).argmin())
+        return best_designs
 
     @property
     def headings(self) -> dict[str, str]:
         """Headings of the table's columns, with their units."""
-        found = {}
+        headings = {}
         for v in self.task.variables:
-            found[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
+            headings[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
         for name in self.task.asked:
             unit = self.task.unit(name)
-            found[name] = f"{name} ({unit})" if unit else name
-        return found | {name: f"{name} (m)" for name in places(self.task)}
+            headings[name] = f"{name} ({unit})" if unit else name
+        return headings | {name: f"{name} (m)" for name in places(self.task)}
 
 
 class Proofs:
@@ -130,8 +130,8 @@ class Proofs:
             unproved = [v for v, key in zip(values, keys, strict=True) if key not in self._rows]
             if not unproved:
                 return front
-            found = self._prove(unproved)
-            self._rows |= zip(self._keys(found), found.rows(), strict=True)
+            proved = self._prove(unproved)
+            self._rows |= zip(self._keys(proved), proved.rows(), strict=True)
 
     def _keys(self, designs: pl.DataFrame) -> list[bytes]:
         values = designs.select([v.name for v in self._task.variables]).to_numpy()
@@ -144,11 +144,11 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
     best: pl.DataFrame | None = None
     nearest: pl.DataFrame | None = None
-    evaluated = kept = 0
+    evaluated = feasible = 0
     for part in parts:
         missed = _missed(task, part)
         good = part.filter(missed == 0.0)
-        evaluated, kept = evaluated + len(part), kept + len(good)
+        evaluated, feasible = evaluated + len(part), feasible + len(good)
         if len(good):
             best = _foremost(task, good if best is None else pl.concat([best, good]))
         elif best is None:
@@ -158,7 +158,7 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
     if best is None:
         assert nearest is not None  # there is at least one design
         raise _impossible(task, nearest, evaluated)
-    return Front(task, best, evaluated, kept)
+    return Front(task, best, evaluated, feasible)
 
 
 def _missed(task: Task, designs: pl.DataFrame) -> Array:
@@ -177,33 +177,35 @@ def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
     costs = good.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
     best = non_dominated(costs)
     best = best[np.lexsort(costs[best].T[::-1])]
-    apart = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
-    found: pl.DataFrame = good[best[apart]]
-    return found
+    is_distinct = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
+    rows: pl.DataFrame = good[best[is_distinct]]
+    return rows
 
 
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
     """Return what is said where no design keeps all that is asked."""
     row = nearest.row(0, named=True)
     design = Design(task, task.machine([row[v.name] for v in task.variables]))
-    told = []
+    reasons = []
     for name in (name for name in nearest.columns if name.startswith(MISSES) and row[name] > 0.0):
         if name == f"{MISSES}workspace":
             what = "the workspace" if task.spec.workspace else "a cube"
             if task.floats and 0.0 < design.scale < 1.0:
-                told.append(f"{what} fits nowhere, {design.scale:.3g} times its size does")
+                reasons.append(f"{what} fits nowhere, {design.scale:.3g} times its size does")
             else:
-                told.append(f"{what} is not kept ({_worst_condition(design)})")
+                reasons.append(f"{what} is not kept ({_worst_condition(design)})")
         else:
-            asked = task.spec.requirements[int(name.split()[1]) - 1]
-            told.append(f"{asked.words} is missed, {_value(design, asked.quantity, row)}")
-    for one in task.spec.objectives:
-        if not np.isfinite(row[one.quantity]):
-            told.append(f"{one.quantity}: {_value(design, one.quantity, row)}")
+            requirement = task.spec.requirements[int(name.split()[1]) - 1]
+            reasons.append(
+                f"{requirement.words} is missed, {_value(design, requirement.quantity, row)}"
+            )
+    for objective in task.spec.objectives:
+        if not np.isfinite(row[objective.quantity]):
+            reasons.append(f"{objective.quantity}: {_value(design, objective.quantity, row)}")
     at = ", ".join(f"{v.name} = {row[v.name]:.4g}" for v in task.variables)
     return ModelError(
         f"none of {evaluated} designs keeps all that is asked; the nearest, {at}: "
-        f"{'; '.join(told)}. Ask for less, or widen the ranges of the variables",
+        f"{'; '.join(reasons)}. Ask for less, or widen the ranges of the variables",
         subject=task.robot.name,
     )
 

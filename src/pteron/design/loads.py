@@ -32,19 +32,19 @@ _PEAK = 10.0 / sqrt(3.0)
 """Greatest acceleration of a quintic from rest to rest over its length and inverse squared time."""
 
 
-def listed(given: Any) -> Any:
+def listed(names: Any) -> Any:
     """Return what may be one name or several as a list."""
-    return [given] if isinstance(given, str) else given
+    return [names] if isinstance(names, str) else names
 
 
-def _numbers(given: Any) -> Any:
-    return [given] if isinstance(given, int | float) else given
+def _numbers(numbers: Any) -> Any:
+    return [numbers] if isinstance(numbers, int | float) else numbers
 
 
-def _one_or_six(given: Any) -> Any:
-    if isinstance(given, list | tuple) and len(given) != 6:
-        raise ValueError(f"{len(given)} numbers given, 1 or 6 expected: Ixx Ixy Ixz Iyy Iyz Izz")
-    return given
+def _one_or_six(numbers: Any) -> Any:
+    if isinstance(numbers, list | tuple) and len(numbers) != 6:
+        raise ValueError(f"{len(numbers)} numbers given, 1 or 6 expected: Ixx Ixy Ixz Iyy Iyz Izz")
+    return numbers
 
 
 Each = Annotated[tuple[Least, ...], BeforeValidator(_numbers), Field(min_length=1)]
@@ -64,8 +64,10 @@ class PayloadTable(Table):
 
     def on(self, robot: Manipulator) -> Manipulator:
         """Return a machine that carries it; a number is of a ball where the platform tilts."""
-        given = self.inertia
-        tensor = given if isinstance(given, tuple) else (given, 0.0, 0.0, given, 0.0, given)
+        inertia = self.inertia
+        tensor = (
+            inertia if isinstance(inertia, tuple) else (inertia, 0.0, 0.0, inertia, 0.0, inertia)
+        )
         tilts = inertia_count(robot.platform.inertia.kinds) > 1
         return carrying(robot, self.mass, self.center, tensor if tilts else tensor[5])
 
@@ -112,8 +114,8 @@ class CycleTable(Table):
         )
         duration = self.times[-1] if self.times else self.duration
         time = "as [motion] acceleration allows" if duration is None else f"in {duration:.12g} s"
-        rest = f", then {self.dwell:.12g} s of rest" if self.dwell else ""
-        return f"{what} {time}{rest}{', anywhere in the workspace' if self.anywhere else ''}"
+        dwell = f", then {self.dwell:.12g} s of rest" if self.dwell else ""
+        return f"{what} {time}{dwell}{', anywhere in the workspace' if self.anywhere else ''}"
 
     def motion(self, robot: Manipulator, middle: Array, acceleration: float) -> Motion:
         """Return the motion of a machine about a pose, at this acceleration if no time is given."""
@@ -135,8 +137,8 @@ class CycleTable(Table):
         path = line_path(robot, poses, self.corner)
         stretches = np.diff(self.times) if self.times else np.sqrt(np.diff(path.rests))
         if not self.times:
-            whole = self.duration or sqrt(_PEAK / acceleration) * stretches.sum()
-            stretches = stretches * whole / stretches.sum()
+            total = self.duration or sqrt(_PEAK / acceleration) * stretches.sum()
+            stretches = stretches * total / stretches.sum()
         law = polynomial("quintic")
         course = timed_path(path, stretches.tolist(), [law] * len(stretches))
         return sampled(course.at, course.duration, course.duration / (SAMPLES - 1))
@@ -205,9 +207,11 @@ class ElasticityTable(Table):
     @property
     def elasticity(self) -> Elasticity:
         """The same for `stiffness`."""
-        given = (inf,) if self.actuators is None else self.actuators
+        stiffnesses = (inf,) if self.actuators is None else self.actuators
         upper, lower = (None if t is None else t.section for t in (self.upper, self.lower))
-        return Elasticity(given if len(given) > 1 else given[0], upper, lower, self.rod_distance)
+        return Elasticity(
+            stiffnesses if len(stiffnesses) > 1 else stiffnesses[0], upper, lower, self.rod_distance
+        )
 
 
 class MotorsTable(Table):

@@ -43,24 +43,26 @@ def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
         robot, robot.platform.angles[:1], np.array(spec.angles or ())[:, None]
     ):
         yield f"angles: {warning}"
-    asked = {o.quantity for o in spec.objectives} | {r.quantity for r in spec.requirements}
+    quantities_asked = {o.quantity for o in spec.objectives} | {
+        r.quantity for r in spec.requirements
+    }
     units = {leg.joint.force_unit for leg in robot.legs}
-    for name in sorted(asked & {"force", "speed", "cycle_force", "cycle_speed"}):
+    for name in sorted(quantities_asked & {"force", "speed", "cycle_force", "cycle_speed"}):
         if len(units) > 1:
             yield (
                 f"{name}: the joints of {robot.name} have unlike units; ask for drive_load, whose "
                 "limits the machine's file gives"
             )
-    for name in sorted(asked & INDICES.keys()):
+    for name in sorted(quantities_asked & INDICES.keys()):
         if INDICES[name].turning and not robot.platform.angles:
             yield f"{name}: about turning, but the platform of {robot.name} does not turn"
-    if "drive_load" in asked and not _limited(robot):
+    if "drive_load" in quantities_asked and not _limited(robot):
         yield f"drive_load: no drive of {robot.name} has max_force or max_speed; ask for force"
     named = [o.quantity for o in spec.objectives]
     for name in sorted({name for name in named if named.count(name) > 1}):
         yield f"objectives: {name} given more than once"
-    assert asked <= quantities().keys()  # the spec has checked them
-    yield from _missing(spec, robot, asked)
+    assert quantities_asked <= quantities().keys()  # the spec has checked them
+    yield from _missing(spec, robot, quantities_asked)
     yield from _loads(spec, robot)
 
 
@@ -79,25 +81,31 @@ def _limited(robot: Manipulator) -> bool:
     return bool(np.isfinite([limits.force, limits.speed]).any())
 
 
-def _missing(spec: Spec, robot: Manipulator, asked: set[str]) -> Iterator[str]:
+def _missing(spec: Spec, robot: Manipulator, quantities_asked: set[str]) -> Iterator[str]:
     """Yield what quantities need and the file does not have."""
     for name, table in _NEEDS.items():
-        if name in asked and getattr(spec, table) is None:
+        if name in quantities_asked and getattr(spec, table) is None:
             yield f"{name}: needs a table [{table}]"
-    if spec.elasticity is not None and "deflection" in asked and spec.elasticity.force is None:
+    if (
+        spec.elasticity is not None
+        and "deflection" in quantities_asked
+        and spec.elasticity.force is None
+    ):
         yield "deflection: needs a force, N, in [elasticity]"
-    moving = sorted(name for name in asked if name.startswith("cycle_") or name == "motor_margin")
+    moving = sorted(
+        name for name in quantities_asked if name.startswith("cycle_") or name == "motor_margin"
+    )
     if moving and not spec.cycles:
         yield f"{', '.join(moving)}: needs [[cycles]], a motion to drive"
-    if "cycle_time" in asked and not _limited(robot):
+    if "cycle_time" in quantities_asked and not _limited(robot):
         yield (
             f"cycle_time: no drive of {robot.name} has max_force or max_speed in its file, which "
             "say how fast it can be"
         )
     floats = spec.workspace is not None and spec.workspace.floats
-    if floats and "cube" in asked:
+    if floats and "cube" in quantities_asked:
         yield "cube: not with a workspace that floats; ask for scale, or give it a center"
-    if not floats and "scale" in asked:
+    if not floats and "scale" in quantities_asked:
         yield "scale: of a workspace that floats; leave out its center, or low and high"
 
 
@@ -116,11 +124,11 @@ def _loads(spec: Spec, robot: Manipulator) -> Iterator[str]:
         for point in cycle.points or ():
             for warning in unlikely_values(robot, robot.coordinates[: len(point)], np.array(point)):
                 yield f"cycles, item {i}: {warning}"
-    given = {
+    numbers = {
         "errors: encoder": spec.errors and spec.errors.encoder,
         "errors: backlash": spec.errors and spec.errors.backlash,
         "elasticity: actuators": spec.elasticity and spec.elasticity.actuators,
     }
-    for name, values in given.items():
+    for name, values in numbers.items():
         if values and len(values) not in (1, robot.joint_count):
             yield f"{name}: {len(values)} numbers given, 1 or {robot.joint_count} expected"

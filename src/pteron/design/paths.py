@@ -59,10 +59,10 @@ class Place:
 
 def places(robot: Manipulator, path: str) -> list[Place]:
     """Return the numbers that a path names."""
-    found = _WRITTEN.fullmatch(path.strip())
-    if found is None:
+    match = _WRITTEN.fullmatch(path.strip())
+    if match is None:
         raise ModelError(f"{shown(path)} is not {_SHAPE}")
-    minus, numbers, key, part = found.groups()
+    minus, numbers, key, part = match.groups()
     legs = range(1, robot.joint_count + 1)
     if numbers is not None:
         try:

@@ -32,8 +32,8 @@ class Pool(ProcessPoolExecutor):
     Each calls `begin` with what is given before its first job.
     """
 
-    def __init__(self, workers: int, begin: Callable[..., None], *given: Any) -> None:
-        super().__init__(workers, get_context("spawn"), _begun, (begin, *given))
+    def __init__(self, workers: int, begin: Callable[..., None], *arguments: Any) -> None:
+        super().__init__(workers, get_context("spawn"), _begun, (begin, *arguments))
         self._others = set(active_children())
 
     def submit(self, function: Any, /, *given: Any, **named: Any) -> Future[Any]:
@@ -49,11 +49,11 @@ class Pool(ProcessPoolExecutor):
         return super().__exit__(kind, *error)
 
 
-def _begun(begin: Callable[..., None], *given: Any) -> None:
+def _begun(begin: Callable[..., None], *arguments: Any) -> None:
     """Begin a process, which ends with the one that asked, and ignores Ctrl-C as what it starts."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
-    begin(*given)
+    begin(*arguments)
 
 
 def _end_with_parent() -> None:
@@ -91,13 +91,13 @@ def _table(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
     import polars as pl
 
     try:
-        found: pl.DataFrame = pl.concat(map(_result, pending), rechunk=True)
+        table: pl.DataFrame = pl.concat(map(_result, pending), rechunk=True)
     except BrokenProcessPool:
         raise PteronError(
             "a process that did a part of the work was ended: is there enough memory? what is "
             "finished is kept in the folder, if one is given: run it again"
         ) from None
-    return found
+    return table
 
 
 def _result(pending: Future[pl.DataFrame]) -> pl.DataFrame:

@@ -144,8 +144,8 @@ def _swept(
     if shared is None:
         sweep(partial(function, task), chunks, store, **options)
     else:
-        left = sorted({*range(len(chunks))} - store.finished())
-        table = shared.tables(function, {k: chunks[k] for k in left})
+        remaining = sorted({*range(len(chunks))} - store.finished())
+        table = shared.tables(function, {k: chunks[k] for k in remaining})
         sweep(table, range(len(chunks)), store, **options)
 
 
@@ -213,18 +213,18 @@ def _promising(
     jobs = []
     spread = np.linspace(0, len(front) - 1, count).round().astype(int)
     for k, at in enumerate(np.unique(spread)):
-        one = front.values[at], (number + k) % objectives
-        if (key := (one[0].tobytes(), one[1])) not in used:
+        candidate = front.values[at], (number + k) % objectives
+        if (key := (candidate[0].tobytes(), candidate[1])) not in used:
             used.add(key)
-            jobs.append((one[0].tolist(), one[1]))
+            jobs.append((candidate[0].tolist(), candidate[1]))
     return jobs
 
 
-def _costs(task: Task, found: pl.DataFrame) -> tuple[Array, Array]:
+def _costs(task: Task, table: pl.DataFrame) -> tuple[Array, Array]:
     """Return what is minimised (N, M), and what must not be above zero (N, C)."""
     signs = np.array([o.sign for o in task.spec.objectives])
-    costs = found.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
-    misses = found.select([c for c in found.columns if c.startswith(MISSES)]).to_numpy()
+    costs = table.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
+    misses = table.select([c for c in table.columns if c.startswith(MISSES)]).to_numpy()
     return np.where(np.isfinite(costs), costs, FAILED), misses
 
 

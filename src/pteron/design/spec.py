@@ -83,12 +83,13 @@ class WorkspaceTable(Table):
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
         keys = ("low", "high", "sides", "center", "edge", "radius", "height")
-        given = {key for key in keys if getattr(self, key) is not None}
-        wanted = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
-        if given not in wanted and given - {"center"} not in wanted[1:]:
+        keys_present = {key for key in keys if getattr(self, key) is not None}
+        valid_sets = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
+        if keys_present not in valid_sets and keys_present - {"center"} not in valid_sets[1:]:
             raise ValueError(
-                f"{', '.join(sorted(given)) or 'nothing'} given; a box has low and high, or sides, "
-                "a cube edge, a cylinder radius and height; these three have a center, or float"
+                f"{', '.join(sorted(keys_present)) or 'nothing'} given; a box has low and high, or "
+                "sides, a cube edge, a cylinder radius and height; these three have a center, or "
+                "float"
             )
         pairs = ((self.low, self.high), (self.sides, self.center))
         if any(a is not None and b is not None and len(a) != len(b) for a, b in pairs):
@@ -221,8 +222,8 @@ class RequirementTable(Table):
     def words(self) -> str:
         """The requirement in words: "links at most 1.2"."""
         ends = (("at least", self.least), ("at most", self.most))
-        told = (f"{word} {bound:.12g}" for word, bound in ends if bound is not None)
-        return f"{self.quantity} {' and '.join(told)}"
+        bounds = (f"{word} {bound:.12g}" for word, bound in ends if bound is not None)
+        return f"{self.quantity} {' and '.join(bounds)}"
 
 
 class SearchTable(Table):
@@ -272,8 +273,8 @@ class Spec(Table):
     @property
     def asked(self) -> tuple[str, ...]:
         """The quantities that objectives and requirements name, each once."""
-        given = (o.quantity for o in self.objectives), (r.quantity for r in self.requirements)
-        return tuple(dict.fromkeys(chain(*given)))
+        named = (o.quantity for o in self.objectives), (r.quantity for r in self.requirements)
+        return tuple(dict.fromkeys(chain(*named)))
 
     def with_seed(self, seed: int) -> Spec:
         """Return the same search with another seed of the random numbers."""
@@ -308,18 +309,18 @@ def read_spec(path: str | Path) -> Spec:
         update["robot"] = str(folder / spec.robot)
     if spec.motors is not None and (folder / spec.motors.file).is_file():
         update["motors"] = MotorsTable(file=str(folder / spec.motors.file))
-    found = spec.model_copy(update=update)
-    found._source = source
-    return found
+    read = spec.model_copy(update=update)
+    read._source = source
+    return read
 
 
 def asked_words(spec: Spec) -> list[str]:
     """Return the objectives and requirements of a search in words, one line each."""
     lines = [
-        f"{one.quantity} as {'small' if one.minimise else 'large'} as can be"
-        for one in spec.objectives
+        f"{part.quantity} as {'small' if part.minimise else 'large'} as can be"
+        for part in spec.objectives
     ]
-    lines += [one.words for one in spec.requirements]
+    lines += [part.words for part in spec.requirements]
     lines += [
         f"{name} at least {value:.12g} everywhere"
         for name, value in spec.floors
@@ -327,7 +328,7 @@ def asked_words(spec: Spec) -> list[str]:
     ]
     if spec.payload is not None:
         lines.append(f"a payload of {spec.payload.mass:.12g} kg")
-    lines += [f"cycle {k}: {one.words}" for k, one in enumerate(spec.cycles, start=1)]
+    lines += [f"cycle {k}: {part.words}" for k, part in enumerate(spec.cycles, start=1)]
     speed, acceleration = spec.motion.speed, spec.motion.acceleration
     if {"force", "speed", "drive_load"} & set(spec.asked):
         lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")

@@ -102,5 +102,5 @@ def survey_designs(task: Task, first: int, count: int) -> Array:
 
 
 def _parts(store: TableStore, chunks: range) -> Iterable[pl.DataFrame]:
-    whole = store.scan()
-    return (whole.slice(first, _CHUNK).collect() for first in chunks)
+    table = store.scan()
+    return (table.slice(first, _CHUNK).collect() for first in chunks)

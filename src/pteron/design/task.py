@@ -92,7 +92,7 @@ class Task:
 
     def __getstate__(self) -> dict[str, Any]:
         # It crosses to other processes, which compile for themselves.
-        return {one.name: getattr(self, one.name) for one in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def plan(self) -> dict[str, Any]:
@@ -112,11 +112,17 @@ class Task:
     @cached_property
     def floors(self) -> FloorsTable:
         """The least measures of every pose: the file's, or what is required where it is more."""
-        found = dict(self.spec.floors)
-        for one in self.spec.requirements:
-            if one.quantity in found and one.least is not None and one.least < 1.0:
-                found[one.quantity] = max(found[one.quantity], one.least)
-        return FloorsTable(**found)
+        measures = dict(self.spec.floors)
+        for requirement in self.spec.requirements:
+            if (
+                requirement.quantity in measures
+                and requirement.least is not None
+                and requirement.least < 1.0
+            ):
+                measures[requirement.quantity] = max(
+                    measures[requirement.quantity], requirement.least
+                )
+        return FloorsTable(**measures)
 
     @property
     def floats(self) -> bool:
@@ -138,8 +144,8 @@ class Task:
     def conditions(self) -> SmoothConditions:
         """The conditions at every pose, as functions of the geometry."""
         floors = self.floors
-        given = conditions(self.robot, type_i=floors.type_i, type_ii=floors.type_ii)
-        return smooth_conditions(self.robot, given)
+        required = conditions(self.robot, type_i=floors.type_i, type_ii=floors.type_ii)
+        return smooth_conditions(self.robot, required)
 
     @cached_property
     def orientations(self) -> Array:

@@ -62,15 +62,15 @@ class Variable:
 
 def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[Variable, ...]:
     """Return the variables of a search that begins with a machine."""
-    found: list[Variable] = []
+    variables: list[Variable] = []
     faults: list[str] = []
     for i, table in enumerate(tables, start=1):
         try:
-            found += _variables(robot, table)
+            variables += _variables(robot, table)
         except ModelError as error:
             faults += [f"variables, item {i}: {fault}" for fault in error.faults]
     taken: dict[tuple[int, str, int | None], str] = {}
-    for variable in found:
+    for variable in variables:
         for place in variable.places:
             key = place.leg, place.key, place.part
             if key in taken:
@@ -78,14 +78,14 @@ def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[V
             taken[key] = variable.name
     if faults:
         raise ModelError(told(faults), faults=faults)
-    return tuple(found)
+    return tuple(variables)
 
 
 def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
     named = [place for path in table.moves for place in places(robot, path)]
     legs = sorted({place.leg for place in named})
     groups = [[p for p in named if p.leg == leg] for leg in legs] if table.each else [named]
-    found = []
+    variables = []
     for group in groups:
         starts = [place.sign * place.read(robot) for place in group]
         start = {"factor": 1.0, "offset": 0.0}.get(table.by, float(np.mean(starts)))
@@ -98,8 +98,8 @@ def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
         variable = Variable(name, tuple(group), table.by, *table.range, start)
         if variable.unit == "m" and max(map(abs, table.range)) > unlikely_length(robot):
             raise ModelError(f"range: {list(table.range)} m given: are these mm? m are expected")
-        found.append(variable)
-    return found
+        variables.append(variable)
+    return variables
 
 
 def moved(
@@ -113,16 +113,20 @@ def moved(
     changed: dict[int, dict[str, list[float]]] = {}
     for variable, value in zip(variables, values, strict=True):
         for place in variable.places:
-            held = changed.setdefault(place.leg, {})
-            if place.key not in held:
-                held[place.key] = np.atleast_1d(getattr(legs[place.leg - 1], place.key)).tolist()
+            parts_by_key = changed.setdefault(place.leg, {})
+            if place.key not in parts_by_key:
+                parts_by_key[place.key] = np.atleast_1d(
+                    getattr(legs[place.leg - 1], place.key)
+                ).tolist()
             part = place.part or 0
             number = variable.number(place, place.read(robot), float(value))
-            held[place.key][part] = number
+            parts_by_key[place.key][part] = number
     for i, fields in changed.items():
         leg = legs[i - 1]
-        given = {key: tuple(parts) if len(parts) > 1 else parts[0] for key, parts in fields.items()}
-        other = replace(leg, **given)
+        values_by_key = {
+            key: tuple(parts) if len(parts) > 1 else parts[0] for key, parts in fields.items()
+        }
+        other = replace(leg, **values_by_key)
         legs[i - 1] = with_stretched_bodies(leg, other) if stretch else other
     return replace(robot, legs=tuple(legs), home=None)
 
@@ -145,9 +149,9 @@ def slopes_of(
     function: Callable[[Array], Any], variables: Sequence[Variable], values: Sequence[float]
 ) -> Array:
     """Return the derivatives (V, ...) of a function of the variables, by central differences."""
-    found = []
+    derivatives = []
     for k, variable in enumerate(variables):
         step = _STEP * (variable.high - variable.low) * np.eye(len(variables))[k]
         low, high = (function(np.asarray(values) + side * step) for side in (-1.0, 1.0))
-        found.append((np.asarray(high) - low) / (2.0 * step[k]))
-    return np.array(found)
+        derivatives.append((np.asarray(high) - low) / (2.0 * step[k]))
+    return np.array(derivatives)

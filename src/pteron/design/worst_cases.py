@@ -49,21 +49,21 @@ def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: f
     the side that adds to it, with all of Stribeck's part.
     """
     legs = (replace(leg, drive=_frictionless(leg.drive)) for leg in robot.legs)
-    rest, rows, squares = _expanded(replace(robot, legs=tuple(legs)), poses)
-    known = np.isfinite(rest).all(axis=-1)
-    found = np.full(rest.shape, np.nan)
+    static, rows, squares = _expanded(replace(robot, legs=tuple(legs)), poses)
+    known = np.isfinite(static).all(axis=-1)
+    greatest = np.full(static.shape, np.nan)
     if not known.all():
         if known.any():
-            found[known] = worst_forces(robot, poses[known], speed, acceleration)
-        return found
+            greatest[known] = worst_forces(robot, poses[known], speed, acceleration)
+        return greatest
     drives = drives_of(robot)
     lines = drives.viscous[:, None] * jacobian(robot, poses)[..., : squares.shape[-1]]
     values, vectors = np.linalg.eigh(squares)
     parts = np.einsum("...ij,...i->...j", vectors, lines) ** 2
-    still = acceleration * np.linalg.norm(rows, axis=-1) + drives.coulomb + drives.stribeck
-    rest = rest + drives.offset
-    above = rest + _most(values, parts, speed) + still
-    below = -rest + _most(-values, parts, speed) + still
+    independent = acceleration * np.linalg.norm(rows, axis=-1) + drives.coulomb + drives.stribeck
+    static = static + drives.offset
+    above = static + _most(values, parts, speed) + independent
+    below = -static + _most(-values, parts, speed) + independent
     return np.asarray(np.maximum(above, below))
 
 
@@ -76,20 +76,20 @@ def _expanded(robot: Manipulator, poses: Array) -> tuple[Array, Array, Array]:
     k = len(robot.platform.lengths)
     axes = np.eye(robot.freedom)[:k]
     pairs = list(combinations(range(k), 2))
-    still = np.zeros((1, robot.freedom))
+    zeros = np.zeros((1, robot.freedom))
     crossed = (axes[[i]] + axes[[j]] for i, j in pairs)
-    velocities = np.concatenate([still, *([still] * k), axes, *crossed])
+    velocities = np.concatenate([zeros, *([zeros] * k), axes, *crossed])
     accelerations = np.zeros_like(velocities)
     accelerations[1 : 1 + k] = axes
-    found = drive_forces(robot, poses[:, None], velocities, accelerations, on_failure="nan")
-    rest = found[:, 0]
-    rows, diagonal, mixed = np.split(found[:, 1:] - rest[:, None], [k, 2 * k], axis=1)
-    squares = np.zeros((*rest.shape, k, k))
+    forces = drive_forces(robot, poses[:, None], velocities, accelerations, on_failure="nan")
+    static = forces[:, 0]
+    rows, diagonal, mixed = np.split(forces[:, 1:] - static[:, None], [k, 2 * k], axis=1)
+    squares = np.zeros((*static.shape, k, k))
     squares[..., range(k), range(k)] = diagonal.swapaxes(1, 2)
     for at, (i, j) in enumerate(pairs):
         half = 0.5 * (mixed[:, at] - diagonal[:, i] - diagonal[:, j])
         squares[..., i, j] = squares[..., j, i] = half
-    return rest, rows.swapaxes(1, 2), squares
+    return static, rows.swapaxes(1, 2), squares
 
 
 def _most(values: Array, parts: Array, size: float) -> Array:
@@ -130,12 +130,12 @@ def _directions(count: int) -> tuple[Array, float]:
     They lead through the middles of cells on a cube's faces; opposite ones count as one.
     """
     middles = (np.arange(_CELLS) + 0.5) * 2.0 / _CELLS - 1.0
-    found = [
+    points = [
         np.insert(at, face, 1.0)
         for face in range(count)
         for at in product(middles, repeat=count - 1)
     ]
-    vectors = np.array(found)
+    vectors = np.array(points)
     # An angle from the cube's centre is no more than the distance on a face.
     farthest = sqrt(count - 1.0) / _CELLS
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True), float(np.cos(farthest))

@@ -54,8 +54,8 @@ def world_of(
     least = min(_LEAST, float(pose_margins(machine, home).least) / 2.0)
     step = min(_STEP, longest_step(machine, home[None], machines) / 2.0, period)
     count = int(np.ceil(period / step - 1e-9))
-    given = (home, _forces(machine, home), period, period / count, count)
-    world = World(machine, *given, spread, tolerance or _TOLERANCE, least, motion, machines)
+    stepping = (home, _forces(machine, home), period, period / count, count)
+    world = World(machine, *stepping, spread, tolerance or _TOLERANCE, least, motion, machines)
     box = world.travel(spread)
     # As far as the machine goes: of a hexapod with strokes of millimetres far less than asked.
     within = float(np.sqrt((world.metres(np.abs(box)) ** 2).mean()))
@@ -89,12 +89,12 @@ def _home(robot: Manipulator) -> Array:
 
 def _forces(robot: Manipulator, home: Array) -> Array:
     """Return what an action of 1 gives, (n,)."""
-    rest = np.zeros(robot.freedom)
+    zeros = np.zeros(robot.freedom)
     rows = jacobian(robot, home)
     rotors = np.diag([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
     mass = mass_matrix(robot, home) + rows.T @ rotors @ rows
     most = np.where(robot.platform.angular, _LIVELY / LEVER, _LIVELY)
     lively = np.linalg.solve(rows.T, mass * most)
-    enough = 2.0 * np.abs(drive_forces(robot, home, rest, rest)) + np.abs(lively).sum(axis=1)
-    given = limits_of(robot).force
-    return np.where(np.isfinite(given), given, enough)
+    enough = 2.0 * np.abs(drive_forces(robot, home, zeros, zeros)) + np.abs(lively).sum(axis=1)
+    limits = limits_of(robot).force
+    return np.where(np.isfinite(limits), limits, enough)

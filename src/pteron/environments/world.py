@@ -168,20 +168,20 @@ class World:
         DataError
             If an option is unknown, or a pose is none that the machine may have.
         """
-        given = {key: self._pose(key, value) for key, value in (options or {}).items()}
+        fixed = {key: self._pose(key, value) for key, value in (options or {}).items()}
         poses = self._drawn(generators, None)
-        targets = self._drawn(generators, given.get("pose", poses))
+        targets = self._drawn(generators, fixed.get("pose", poses))
         velocity, clock = np.zeros_like(poses), np.zeros(len(poses))
         if self.motion is not None:
             clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
-            if "pose" not in given:
+            if "pose" not in fixed:
                 poses, velocity, _ = self.motion.at(self.motion.time[0] + clock)
-        begun = np.broadcast_to(given.get("pose", poses), poses.shape)
+        begun = np.broadcast_to(fixed.get("pose", poses), poses.shape)
         return EpisodeState(
             begun,
             velocity,
             drive_states(self.robot, begun, velocity),
-            np.broadcast_to(given.get("target", targets), poses.shape),
+            np.broadcast_to(fixed.get("target", targets), poses.shape),
             clock,
         )
 
@@ -195,27 +195,27 @@ class World:
         drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
         box = self.travel(self.spread) if self.box is None else self.box
         drawn = np.where(drawn < 0.0, -drawn * box[0], drawn * box[1])
-        found = np.tile(self.home, (len(drawn), 1))
-        left = np.arange(len(drawn))
-        elsewhere = None if others is None else np.broadcast_to(others, found.shape)
+        starts = np.tile(self.home, (len(drawn), 1))
+        missing = np.arange(len(drawn))
+        elsewhere = None if others is None else np.broadcast_to(others, starts.shape)
         for share in _SHARES:
-            poses = self.home + share * drawn[left]
+            poses = self.home + share * drawn[missing]
             good: Any = self.margin_of(poses) >= self.least
             if elsewhere is not None:
-                away = self.metres(poses - elsewhere[left, None, :])
+                away = self.metres(poses - elsewhere[missing, None, :])
                 good &= away > _APART * self.tolerance
             has = good.any(axis=-1)
-            found[left[has]] = poses[has, good[has].argmax(axis=-1)]
-            left = left[~has]
-            if not len(left):
+            starts[missing[has]] = poses[has, good[has].argmax(axis=-1)]
+            missing = missing[~has]
+            if not len(missing):
                 break
-        return found
+        return starts
 
     def margin_of(self, poses: Array) -> Array:
         """Return the margin of poses, negative beyond a singularity of type II."""
-        across = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
+        is_beyond = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
         smallest = pose_margins(self.robot, poses).least
-        return np.where(across, -np.abs(smallest), smallest)
+        return np.where(is_beyond, -np.abs(smallest), smallest)
 
     @cached_property
     def _side(self) -> float:
@@ -270,21 +270,21 @@ class World:
 
     def _action(self, action: Any, shape: tuple[int, ...]) -> Array:
         """Return an action of machines (..., n) after a check; a machine has as many drives."""
-        given = as_array(action, "action", ())
-        if given.shape != shape:
-            raise DataError(f"action: shape {given.shape} given, {shape} expected")
-        if not np.isfinite(given).all():
+        numbers = as_array(action, "action", ())
+        if numbers.shape != shape:
+            raise DataError(f"action: shape {numbers.shape} given, {shape} expected")
+        if not np.isfinite(numbers).all():
             raise DataError("action: not finite numbers given; numbers from -1 to 1 expected")
-        return given
+        return numbers
 
     def why(self, pose: Array, velocity: Array) -> str:
         """Return why the episode of a machine ended, in its last state (m,)."""
         if (np.abs(velocity) > self._speeds).any():
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
-        found = pose_margins(self.robot, pose)
-        leg = int(found.type_i.argmin()) + 1
-        if self.margin_of(pose[None])[0] < 0.0 <= found.least or found.type_ii < ENDS:
+        margins = pose_margins(self.robot, pose)
+        leg = int(margins.type_i.argmin()) + 1
+        if self.margin_of(pose[None])[0] < 0.0 <= margins.least or margins.type_ii < ENDS:
             return "next to a singularity of type II: the actuators hardly hold the platform"
-        if found.joints.min() < ENDS <= found.type_i.min():
-            return f"leg {int(found.joints.argmin()) + 1} is at its joint's limit"
+        if margins.joints.min() < ENDS <= margins.type_i.min():
+            return f"leg {int(margins.joints.argmin()) + 1} is at its joint's limit"
         return f"leg {leg} is at the end of its reach"

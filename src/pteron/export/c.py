@@ -20,7 +20,8 @@ from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
-from pteron.export.functions import PLACES, Asked, Exported, chosen
+from pteron.export.exported_function import Exported
+from pteron.export.functions import PLACES, FunctionChoice, exported_functions
 from pteron.export.names import prefix_of
 from pteron.kernels import Array
 from pteron.kernels.code import (
@@ -45,7 +46,7 @@ _WIDTH = 97
 
 def export_c(
     robot: RobotLike,
-    functions: Asked | None = None,
+    functions: FunctionChoice | None = None,
     folder: str | Path = ".",
     *,
     real: Real = "double",
@@ -119,7 +120,7 @@ def export_c(
     robot = as_manipulator(robot)
     if real not in get_args(Real):
         raise ModelError(f'real: {real!r} is neither "double" nor "float"')
-    exported = chosen(
+    exported = exported_functions(
         robot, functions, specialised=specialised, wrench=wrench, output=output, base=base
     )
     return write_texts(folder, c_texts(robot, exported, real))
@@ -202,15 +203,15 @@ class CPrinter:
 
     def _operations(self) -> dict[str, str]:
         """Return the forms of operations in C, roots and quotients guarded."""
-        own = {
+        replacements = {
             "sin": f"{self.prefix}_sincos({{0}}).sine",
             "cos": f"{self.prefix}_sincos({{0}}).cosine",
             "exp": f"{self.prefix}_exponential({{0}})",
         }
-        printed = single_precision(C) if self.real == "float" else C | own
-        one, zero = self.number(1.0), self.number(0.0)
+        printed = single_precision(C) if self.real == "float" else C | replacements
+        unity, zero = self.number(1.0), self.number(0.0)
         return printed | {
-            "less": f"isless({{0}}, {{1}}) ? {one} : {zero}",
+            "less": f"isless({{0}}, {{1}}) ? {unity} : {zero}",
             "select": f"({{0}} > {zero}) ? {{1}} : {zero}",
             "sqrt": f"{self.prefix}_root({{0}})",
             "div": f"{self.prefix}_ratio({{0}}, {{1}})",

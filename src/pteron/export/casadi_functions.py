@@ -83,22 +83,24 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     robot = as_manipulator(robot)
     refuse_readings(robot, "CasADi's functions")
     missing = "direct_step" if closure_of(robot).closed_form else "direct_kinematics"
-    found = {name: _plain(robot, name, what) for name, what in _NAMES.items() if name != missing}
-    found |= {function.name(): function for function in _driven(robot)}
-    return found
+    functions = {
+        name: _plain(robot, name, what) for name, what in _NAMES.items() if name != missing
+    }
+    functions |= {function.name(): function for function in _driven(robot)}
+    return functions
 
 
 def _plain(robot: Manipulator, name: str, what: str) -> ca.Function:
     """Return a function of the library's table, its matrices with their rows as rows."""
-    given = specialised(
+    library = specialised(
         program(robot, what, wrench=what in _LOADED), {"parameters": parameters(robot)}
     )
-    symbols = given.function.sx_in()
+    symbols = library.function.sx_in()
     results = [
         result.T if len(port.shape) == 2 else ca.reshape(result, -1, 1)
-        for result, port in zip(given.function.call(symbols), given.outputs, strict=True)
+        for result, port in zip(library.function.call(symbols), library.outputs, strict=True)
     ]
-    names = [port.name for port in given.inputs], [port.name for port in given.outputs]
+    names = [port.name for port in library.inputs], [port.name for port in library.outputs]
     return ca.Function(name, symbols, results, *names)
 
 
@@ -112,10 +114,10 @@ def _driven(robot: Manipulator) -> Iterator[ca.Function]:
     sizes["wrench"] = len(robot.platform.wrench_columns)
     symbols = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
     pose, velocity, acceleration, forces, wrench = symbols.values()
-    own = drives.Drives.of(ca.SX(ca.DM(drives.drive_numbers(robot))))
+    machine_drives = drives.Drives.of(ca.SX(ca.DM(drives.drive_numbers(robot))))
     rates = ca.mtimes(jacobian(machine.state(pose)), velocity)
-    dry = drives.dry_friction(own, rates) * ca.tanh(rates / own.rest_speed)
-    others = own._replace(coulomb=ca.SX(n, 1), stribeck=ca.SX(n, 1))
+    dry = drives.dry_friction(machine_drives, rates) * ca.tanh(rates / machine_drives.rest_speed)
+    others = machine_drives._replace(coulomb=ca.SX(n, 1), stribeck=ca.SX(n, 1))
     values = ca.SX(ca.DM(parameters(robot)))
 
     rigid = _plain(robot, "rigid", "inverse_dynamics")(pose, velocity, acceleration, wrench)

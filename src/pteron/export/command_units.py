@@ -41,7 +41,7 @@ def factors(robot: Manipulator, output: Output) -> tuple[float, ...]:
         If a leg's drive does not say what is needed; it names the first leg and key.
     """
     expect_one_of(get_args(Output), ModelError, output=output)
-    found = []
+    scales = []
     for i, leg in enumerate(robot.legs, start=1):
         drive = leg.drive or Drive()
         for key in _NEEDS[output]:
@@ -51,8 +51,10 @@ def factors(robot: Manipulator, output: Output) -> tuple[float, ...]:
                     f"{_HINTS[key]}"
                 )
         factor = 1.0 if output == "force" else 1.0 / drive.gear
-        found.append(factor * (100.0 / (drive.rated_torque or 1.0) if output == "percent" else 1.0))
-    return tuple(found)
+        scales.append(
+            factor * (100.0 / (drive.rated_torque or 1.0) if output == "percent" else 1.0)
+        )
+    return tuple(scales)
 
 
 _HINTS = {
@@ -61,17 +63,17 @@ _HINTS = {
 }
 
 
-def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
+def in_units(function: Program, robot: Manipulator, output: Output) -> Program:
     """Return a program whose forces are in the units of the drives' commands."""
     if output == "force":
-        return given
-    symbols, ports = given.function.sx_in(), list(given.outputs)
-    results = given.function.call(symbols)
+        return function
+    symbols, ports = function.function.sx_in(), list(function.outputs)
+    results = function.function.call(symbols)
     place = next(k for k, port in enumerate(ports) if port.name == NAMES["force"])
     ports[place] = replace(ports[place], name=NAMES[output])
     scale = ca.reshape(ca.DM(factors(robot, output)), results[place].shape)
     results[place] = results[place] * scale
-    return Program.of(given.name, symbols, given.inputs, results, ports)
+    return Program.of(function.name, symbols, function.inputs, results, ports)
 
 
 _PER_READING = {
@@ -82,10 +84,10 @@ _PER_READING = {
 """Outputs and inputs that the scale of a joint's reading multiplies, with its power."""
 
 
-def at_readings(given: Program, robot: Manipulator) -> Program:
+def at_readings(function: Program, robot: Manipulator) -> Program:
     """Return a program whose joints, rates and forces are as the drives count them."""
     if not has_readings(robot):
-        return given
+        return function
     zeros, scales = ca.DM(reading_zeros(robot)), ca.DM(reading_scales(robot))
 
     def per_joint(value: Expression, power: int) -> Expression:
@@ -94,19 +96,19 @@ def at_readings(given: Program, robot: Manipulator) -> Program:
             return ca.mtimes(value, ca.diag(scales**power))
         return value * ca.reshape(scales**power, *value.shape)
 
-    symbols, taken, results = given.function.sx_in(), [], []
-    for port, symbol in zip(given.inputs, symbols, strict=True):
+    symbols, taken, results = function.function.sx_in(), [], []
+    for port, symbol in zip(function.inputs, symbols, strict=True):
         place = port.name in ("joints", "motors")
         power = 1 if place else -_PER_READING.get(port.name, 0)
         zero = ca.reshape(zeros, *symbol.shape) if place else 0.0
         taken.append(zero + per_joint(symbol, power) if power else symbol)
-    for port, result in zip(given.outputs, given.function.call(taken), strict=True):
+    for port, result in zip(function.outputs, function.function.call(taken), strict=True):
         if port.name == "joints":
             results.append(per_joint(result - ca.reshape(zeros, *result.shape), -1))
         else:
             power = _PER_READING.get(port.name, 0)
             results.append(per_joint(result, power) if power else result)
-    return Program.of(given.name, symbols, given.inputs, results, given.outputs)
+    return Program.of(function.name, symbols, function.inputs, results, function.outputs)
 
 
 def told_meaning(robot: Manipulator, output: Output) -> str:

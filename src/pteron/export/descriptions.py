@@ -46,7 +46,9 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     rates, seconds = (", ".join(f"{unit}/{per}" for _, unit in kinds) for per in ("s", "s^2"))
     moment = ", N m about k" if platform.angles else ""
     wrench = "force, N, and moment about it, N m, in base axes" if platform.tilts else f"N{moment}"
-    told = "what the drives read of the joints" if has_readings(robot) else "joint coordinates"
+    joints_words = (
+        "what the drives read of the joints" if has_readings(robot) else "joint coordinates"
+    )
     center = "its centre of mass in the platform's frame: x, y, z in m"
     if platform.slides:
         center = "not looked at: what a platform that slides carries is on its axis"
@@ -58,7 +60,7 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
         "pose": pose,
         "rates": rates,
         "accelerations": seconds,
-        "told": told,
+        "told": joints_words,
         "joints": _by_leg(units),
         "joint_rates": _by_leg([f"{unit}/s" for unit in units]),
         "joint_accelerations": _by_leg([f"{unit}/s^2" for unit in units]),
@@ -75,8 +77,8 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
 
 def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
     """Return the meanings of a control law's inputs and outputs, from those elsewhere."""
-    kept = MEMORY.get(what)
-    remembered = ", ".join(TEXTS["memory"][name] for name in kept) if kept else "what it keeps"
+    memory = MEMORY.get(what)
+    remembered = ", ".join(TEXTS["memory"][name] for name in memory) if memory else "what it keeps"
     words = {**meanings, "what": what, "remembered": remembered}
     return {name: text.format(**words) for name, text in TEXTS["law"].items()}
 

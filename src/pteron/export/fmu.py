@@ -28,7 +28,7 @@ from pteron.errors import DataError, ModelError
 from pteron.export.c import CPrinter, c_texts
 from pteron.export.descriptions import banner
 from pteron.export.fmu_variables import fmu_variables
-from pteron.export.functions import chosen
+from pteron.export.functions import exported_functions
 from pteron.export.names import prefix_of
 from pteron.export.start_pose import start_pose
 from pteron.export.tools import tool_lines
@@ -110,9 +110,11 @@ def export_fmu(
     refuse_readings(robot, "an FMU")
     prefix = prefix_of(robot)
     start = start_pose(robot) if pose is None else _expected(robot, pose)
-    rest = np.zeros(robot.freedom)
-    forces = drive_forces(robot, start, rest, rest)
-    exported = chosen(robot, _FUNCTIONS, specialised=False, wrench=True, output="force", base=None)
+    zeros = np.zeros(robot.freedom)
+    forces = drive_forces(robot, start, zeros, zeros)
+    exported = exported_functions(
+        robot, _FUNCTIONS, specialised=False, wrench=True, output="force", base=None
+    )
     tables = {table.name: table.values for item in exported for table in item.tables}
     call = [_CALL[port.name] for port in exported[0].inputs]
     texts = {name: text for name, text in c_texts(robot, exported).items() if prefix in name}
@@ -135,7 +137,7 @@ def export_fmu(
         "drives": tables["drives"],
         "least_square": LEAST**2,
         "layout": fmu_variables(robot, start, forces),
-        "start": np.concatenate([start, rest]),
+        "start": np.concatenate([start, zeros]),
         "forces": np.asarray(forces),
         "acceleration_call": ", ".join([*call, "found + M"]),
     }
@@ -161,12 +163,12 @@ def export_fmu(
 
 def _expected(robot: Manipulator, pose: ArrayLike) -> Array:
     """Return the pose to start from, after a check that the machine can be there."""
-    given = as_array(pose, "pose", np.shape(pose))
-    if given.shape != (robot.freedom,):
+    start = as_array(pose, "pose", np.shape(pose))
+    if start.shape != (robot.freedom,):
         names = ", ".join(robot.platform.coordinates)
-        raise DataError(f"pose: shape {given.shape} given, ({robot.freedom},) expected: {names}")
-    inverse_kinematics(robot, given)
-    return given
+        raise DataError(f"pose: shape {start.shape} given, ({robot.freedom},) expected: {names}")
+    inverse_kinematics(robot, start)
+    return start
 
 
 def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
@@ -201,8 +203,8 @@ def _platform() -> tuple[str, str]:
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:
-    held = io.BytesIO()
-    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():
             archive.writestr(zipfile.ZipInfo(name, _DATES), data, zipfile.ZIP_DEFLATED)
-    return held.getvalue()
+    return buffer.getvalue()

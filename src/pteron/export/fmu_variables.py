@@ -88,7 +88,7 @@ class FmuVariables:
         for block in self.blocks:
             hidden = {"causality": "local"} if block.rate_of else {}
             for k, variable in enumerate(block.variables):
-                found = {
+                attributes = {
                     "name": variable.name,
                     "valueReference": block.first + k,
                     "description": variable.description,
@@ -99,17 +99,17 @@ class FmuVariables:
                     "derivative": self[block.rate_of][k] if block.rate_of else None,
                     "start": variable.start,
                 }
-                yield {name: value for name, value in found.items() if value is not None}
+                yield {name: value for name, value in attributes.items() if value is not None}
 
     @property
     def known(self) -> dict[int, tuple[int, ...]]:
         """For each variable that is computed, or is a state, the variables that it depends on."""
-        found = {}
+        dependencies = {}
         for block in self.blocks:
             every = sum((self[name] for name in block.depends), ())
-            for k, own in enumerate(block.references):
-                found[own] = (self[block.like][k],) if block.like else every
-        return found
+            for k, reference in enumerate(block.references):
+                dependencies[reference] = (self[block.like][k],) if block.like else every
+        return dependencies
 
     @property
     def outputs(self) -> tuple[int, ...]:
@@ -125,8 +125,8 @@ class FmuVariables:
     @property
     def computed(self) -> tuple[int, ...]:
         """The value references of what is computed from the start values."""
-        found = {*self.outputs, *self.derivatives} - {*self["pose"], *self["velocity"]}
-        return tuple(sorted(found))
+        references = {*self.outputs, *self.derivatives} - {*self["pose"], *self["velocity"]}
+        return tuple(sorted(references))
 
 
 def fmu_variables(robot: Manipulator, pose: Array, forces: Array) -> FmuVariables:
@@ -134,18 +134,22 @@ def fmu_variables(robot: Manipulator, pose: Array, forces: Array) -> FmuVariable
     words, blocks, first = _words(robot, pose, forces), list[Block](), 0
     for row in _TABLE["blocks"]:
         variables = tuple(_variable(row, {**each, "zero": 0.0}) for each in words[row["each"]])
-        more = row.get("rate_of", ""), row.get("like", ""), tuple(row.get("depends", ()))
+        relations = row.get("rate_of", ""), row.get("like", ""), tuple(row.get("depends", ()))
         if variables:
-            blocks.append(Block(row["name"], first, row["kind"], row["place"], variables, *more))
+            blocks.append(
+                Block(row["name"], first, row["kind"], row["place"], variables, *relations)
+            )
         first += len(variables)
     return FmuVariables(tuple(blocks))
 
 
 def _variable(row: dict[str, str], words: _Words) -> FmuVariable:
     """Return the variable of a row of the table with these words."""
-    name, unit, told = (row[key].format(**words) for key in ("variable", "unit", "description"))
+    name, unit, description = (
+        row[key].format(**words) for key in ("variable", "unit", "description")
+    )
     start, least = (words.get(row.get(key, "")) for key in ("start", "least"))
-    return FmuVariable(name, unit, told, start, least)
+    return FmuVariable(name, unit, description, start, least)
 
 
 def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Words]]:
@@ -157,8 +161,8 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
         "machine": [{}],
         "coordinates": [{"name": name, "unit": unit, "at": at} for name, unit, at in coordinates],
         "legs": [
-            {"i": i, **vars(leg.joint), "force_unit": _dotted(leg.joint.force_unit), "held": held}
-            for i, (leg, held) in legs
+            {"i": i, **vars(leg.joint), "force_unit": _dotted(leg.joint.force_unit), "held": force}
+            for i, (leg, force) in legs
         ],
         "wrench": list(_wrench(platform)),
         "center": [
@@ -182,8 +186,8 @@ def _wrench(platform: Platform) -> Iterator[_Words]:
         return
     for name in platform.wrench_columns:
         axis, force = f"the base frame's {name[1]}", name[0] == "f"
-        along = axis if force else f"a turn about {axis}"
-        yield {"name": name, "unit": "N" if force else "N.m", "along": along}
+        direction = axis if force else f"a turn about {axis}"
+        yield {"name": name, "unit": "N" if force else "N.m", "along": direction}
 
 
 def _inertia(platform: Platform) -> Iterator[_Words]:
@@ -193,8 +197,8 @@ def _inertia(platform: Platform) -> Iterator[_Words]:
             least = {"least": 0.0} if pair[0] == pair[1] else {}
             yield {"name": pair, "told": f"I{pair} about its own centre", **least}
     elif platform.angles:
-        told = "Its inertia about the axis through its own centre"
-        yield {"name": "nertia", "told": told, "least": 0.0}
+        description = "Its inertia about the axis through its own centre"
+        yield {"name": "nertia", "told": description, "least": 0.0}
 
 
 def _drives(robot: Manipulator) -> Iterator[_Words]:

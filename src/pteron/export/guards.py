@@ -76,16 +76,16 @@ it is the greatest of these."""
 class Names:
     """The names in use, which differ in more than case."""
 
-    def __init__(self, kept: Iterable[str]) -> None:
-        self._taken = {name.lower() for name in kept}
+    def __init__(self, names: Iterable[str]) -> None:
+        self._taken = {name.lower() for name in names}
 
     def new(self, text: str) -> str:
         """Return a text as an identifier, with a number behind it where that is taken."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")
         numbered = (f"{name}_{number}" for number in count(2))
-        found = next(n for n in chain([name], numbered) if n.lower() not in self._taken)
-        self._taken.add(found.lower())
-        return found
+        identifier = next(n for n in chain([name], numbered) if n.lower() not in self._taken)
+        self._taken.add(identifier.lower())
+        return identifier
 
 
 class Statements:

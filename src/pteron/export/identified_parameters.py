@@ -72,9 +72,9 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         known, drives, kinds = data[_NAME], data["drives"], data["kinds"]
         names, expressions = known["names"], known["expressions"]
         values = np.array(known["values"], dtype=float)
-        legs = [_driven(leg, one) for leg, one in zip(robot.legs, drives, strict=False)]
-        all_names, told = data["estimate"]["names"], [str(one) for one in data["expressions"]]
-        if not (np.isfinite(values).all() and len(told) >= len(values)):
+        legs = [_driven(leg, entry) for leg, entry in zip(robot.legs, drives, strict=False)]
+        all_names, texts = data["estimate"]["names"], [str(entry) for entry in data["expressions"]]
+        if not (np.isfinite(values).all() and len(texts) >= len(values)):
             raise ValueError("values are missing")
         groups = [tuple(group) for group in known["shared"]]
         grade = re.sub(r"[^a-z ]", "?", str(data["verdict"]["grade"])[:40])
@@ -102,7 +102,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
             f"{robot.name!r}: names or groupings differ; give the robot that was identified"
         )
     driven = replace(robot, legs=tuple(legs))
-    return Identified(driven, base, values, _comments(base, told), grade)
+    return Identified(driven, base, values, _comments(base, texts), grade)
 
 
 def _object(path: str | Path) -> dict[str, Any]:
@@ -118,16 +118,16 @@ def _object(path: str | Path) -> dict[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def _driven(leg: LegKind, found: dict[str, Any]) -> LegKind:
+def _driven(leg: LegKind, friction: dict[str, Any]) -> LegKind:
     """Return a leg with the friction and the rotor's inertia that were found for its joint."""
-    drive, law = leg.drive or Drive(), found["stribeck"]
+    drive, law = leg.drive or Drive(), friction["stribeck"]
     return replace(
         leg,
         drive=replace(
             drive,
-            **{name: found[name] for name in ("coulomb", "viscous", "offset")},
+            **{name: friction[name] for name in ("coulomb", "viscous", "offset")},
             stribeck=law and Stribeck(law["force"], law["speed"]),
-            rotor_inertia=found["inertia"] / drive.gear**2,
+            rotor_inertia=friction["inertia"] / drive.gear**2,
         ),
     )
 
@@ -152,13 +152,16 @@ def base_program(what: str, given: Identified, *, wrench: bool, folded: bool) ->
     if what == "set_payload":
         return _payload_program(robot, base)
     cheapest = cheapest_parameters(robot)
-    own, other = (program(robot, what, columns_of(one), wrench=wrench) for one in (base, cheapest))
+    direct, other = (
+        program(robot, what, columns_of(parameters), wrench=wrench)
+        for parameters in (base, cheapest)
+    )
     # Forces of base parameters b are those of the inertial parameters selection b.
     matrix = cheapest.grouping @ base.selection
-    forms = [own, _recombined(other, matrix)]
+    forms = [direct, _recombined(other, matrix)]
     if folded:
         forms = [
-            with_values(own, {_NAME: given.values}),
+            with_values(direct, {_NAME: given.values}),
             with_values(other, {_NAME: matrix @ given.values}),
         ]
     return min(forms, key=lambda form: count_operations(form.function))
@@ -168,23 +171,26 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
     """Return `set_payload` of base parameters, which a payload's own parameters are added to."""
     load = program(robot, "set_payload")
     mass, center, inertia, parameters = load.function.sx_in()
-    more = load.function(mass, center, inertia, ca.SX.zeros(parameters.shape))
-    given = ca.SX.sym(_NAME, base.rank)
+    load_parameters = load.function(mass, center, inertia, ca.SX.zeros(parameters.shape))
+    base_symbols = ca.SX.sym(_NAME, base.rank)
     grouping = ca.sparsify(ca.SX(ca.DM(base.grouping)))
     ports = (*load.inputs[:3], Port(_NAME, (base.rank,), shared=True))
-    loaded, found = Port(f"loaded_{_NAME}", (base.rank,)), given + ca.mtimes(grouping, more.T)
+    loaded, loaded_values = (
+        Port(f"loaded_{_NAME}", (base.rank,)),
+        base_symbols + ca.mtimes(grouping, load_parameters.T),
+    )
     return Program.of(
-        load.name, [mass, center, inertia, given], ports, [found], [loaded]
+        load.name, [mass, center, inertia, base_symbols], ports, [loaded_values], [loaded]
     ).optimised()
 
 
-def _recombined(given: Program, matrix: Array) -> Program:
+def _recombined(function: Program, matrix: Array) -> Program:
     """Return a program of the base parameters b that one of matrix @ b makes."""
-    place = next(k for k, port in enumerate(given.inputs) if port.name == _NAME)
-    symbols, ports = given.function.sx_in(), list(given.inputs)
+    place = next(k for k, port in enumerate(function.inputs) if port.name == _NAME)
+    symbols, ports = function.function.sx_in(), list(function.inputs)
     symbols[place] = ca.SX.sym(_NAME, matrix.shape[1])
     ports[place] = Port(_NAME, matrix.shape[1:], shared=True)
     taken = list(symbols)
     taken[place] = ca.mtimes(ca.sparsify(ca.SX(ca.DM(matrix))), symbols[place])
-    results = given.function.call(taken)
-    return Program.of(given.name, symbols, ports, results, given.outputs).optimised()
+    results = function.function.call(taken)
+    return Program.of(function.name, symbols, ports, results, function.outputs).optimised()

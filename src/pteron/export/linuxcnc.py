@@ -18,7 +18,7 @@ from pteron.atomic import write_texts
 from pteron.equations.machine import Machine, closure_of
 from pteron.export.c import c_texts
 from pteron.export.descriptions import banner
-from pteron.export.functions import chosen
+from pteron.export.functions import exported_functions
 from pteron.export.names import marked, prefix_of
 from pteron.export.start_pose import start_pose
 from pteron.kernels import Array
@@ -176,16 +176,18 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     >>> [path.name for path in files]
     ['quadrupteronkins.comp', 'quadrupteron.ini', 'quadrupteron.hal']
     """
-    given = as_manipulator(robot)
-    robot = without_readings(given)  # LinuxCNC converts them itself, by SCALE and HOME_OFFSET
+    machine = as_manipulator(robot)
+    robot = without_readings(machine)  # LinuxCNC converts them itself, by SCALE and HOME_OFFSET
     prefix = prefix_of(robot)
     closed = closure_of(robot).closed_form
     closed = closed and not robot.platform.tilts  # whose poses are many, and the last one is near
     names = ("inverse_kinematics", "direct_kinematics" if closed else "direct_step")
-    exported = chosen(robot, names, specialised=True, wrench=False, output="force", base=None)
+    exported = exported_functions(
+        robot, names, specialised=True, wrench=False, output="force", base=None
+    )
     texts = c_texts(robot, exported)
     home = start_pose(robot)
-    axes, joints = linuxcnc_axes(robot), tuple(_joints(given, home))
+    axes, joints = linuxcnc_axes(robot), tuple(_joints(machine, home))
     platform, seen = robot.platform, home.copy()
     seen[~platform.angular] += platform.directions @ (platform.tool @ platform.at(home)[1])
     tilted = _TurnedArm.of(platform, home) if platform.tilts else None
@@ -249,24 +251,24 @@ def _linear(robot: Manipulator) -> bool:
 def linuxcnc_axes(robot: Manipulator) -> tuple[LinuxCncAxis, ...]:
     """Return the axes of LinuxCNC that the pose's coordinates are."""
     letters = iter("XYZ")
-    found = []
+    axes = []
     for name, unit in zip(robot.coordinates, robot.units, strict=True):
         if robot.platform.tilts:
             letter, angle = _LETTERS[name], unit == "rad"
             field = letter.lower() if angle else f"tran.{letter.lower()}"
-            found.append(LinuxCncAxis(letter, field, name, _DEGREES if angle else _MILLIMETRES))
+            axes.append(LinuxCncAxis(letter, field, name, _DEGREES if angle else _MILLIMETRES))
             continue
         if unit == "m":
             letter = next(letters)
-            found.append(LinuxCncAxis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
+            axes.append(LinuxCncAxis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
             continue
         axis = np.array(robot.platform.axis)
         place = int(np.abs(axis).argmax())
         aligned = np.abs(axis[place]) > 1.0 - 1e-12 and not robot.platform.planar
         letter = "ABC"[place] if aligned else "C"
         sign = float(np.sign(axis[place])) if aligned else 1.0
-        found.append(LinuxCncAxis(letter, letter.lower(), name, sign * _DEGREES))
-    return tuple(found)
+        axes.append(LinuxCncAxis(letter, letter.lower(), name, sign * _DEGREES))
+    return tuple(axes)
 
 
 def _joints(robot: Manipulator, home: Array) -> Iterator[_Joint]:

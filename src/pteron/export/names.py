@@ -42,15 +42,19 @@ def safe_name(name: str, separator: str) -> str:
     checksum: two that differ stay apart.
     """
     letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
-    found = re.sub(r"[^a-z0-9]+", separator, letters).strip(separator)
-    if found in _TAKEN:
-        found = f"robot{separator}{found}"
+    identifier = re.sub(r"[^a-z0-9]+", separator, letters).strip(separator)
+    if identifier in _TAKEN:
+        identifier = f"robot{separator}{identifier}"
     plain = _PLAIN.fullmatch(name) is not None
-    return found if plain and len(found) <= _LONGEST else marked(found, name, _LONGEST, separator)
+    return (
+        identifier
+        if plain and len(identifier) <= _LONGEST
+        else marked(identifier, name, _LONGEST, separator)
+    )
 
 
 def marked(stem: str, name: str, longest: int, separator: str = "_") -> str:
     """Return a stem with a name's checksum, cut to a length."""
     digest = hashlib.sha256(name.encode()).hexdigest()[:_DIGITS]
-    kept = stem[: longest - _DIGITS - 1].rstrip(separator) or "robot"
-    return f"{kept}{separator}{digest}"
+    shortened = stem[: longest - _DIGITS - 1].rstrip(separator) or "robot"
+    return f"{shortened}{separator}{digest}"

@@ -29,7 +29,7 @@ _AXES = {1: [""], 2: ["_a", "_b"], 3: ["_x", "_y", "_z"]}
 
 
 def node_names(
-    machine: Machine, given: Program, graph: Graph, states: list[list[Array]]
+    machine: Machine, function: Program, graph: Graph, states: list[list[Array]]
 ) -> dict[int, str]:
     """Return a name for every node of a program's graph that computes something.
 
@@ -38,9 +38,9 @@ def node_names(
     depends on one leg alone has the leg's number; all others are numbered. `states` are values of
     the inputs.
     """
-    symbols = given.function.sx_in()
-    inputs = {port.name: symbol for port, symbol in zip(given.inputs, symbols, strict=True)}
-    results = zip(given.outputs, given.function.call(symbols), strict=True)
+    symbols = function.function.sx_in()
+    inputs = {port.name: symbol for port, symbol in zip(function.inputs, symbols, strict=True)}
+    results = zip(function.outputs, function.function.call(symbols), strict=True)
     inputs |= {port.name: result.T for port, result in results if port.name == "found"}
     names, legs, scalars = [], [], []
     for name, leg, value in _quantities(machine, inputs):
@@ -52,8 +52,8 @@ def node_names(
     nodes = graph.values(lambda i, j: elements[i][j], expression)
     both = ca.Function("both", symbols, [ca.vertcat(*nodes), ca.vertcat(*scalars)])
     computed = [[np.array(part) for part in both(*state)] for state in states]
-    values, wanted = (np.hstack(parts) for parts in zip(*computed, strict=True))
-    return _named(graph, _matches(values, wanted), names, legs)
+    values, quantities = (np.hstack(parts) for parts in zip(*computed, strict=True))
+    return _named(graph, _matches(values, quantities), names, legs)
 
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[NamedQuantity]:
@@ -89,7 +89,7 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
     for i, (equations, leg, point) in enumerate(
         zip(machine.legs, state.legs, platform.points, strict=True), start=1
     ):
-        found = equations.named(point, platform.rotation) | {
+        quantities = equations.named(point, platform.rotation) | {
             "l_u": leg.links[0],
             "l_l": leg.links[1],
             "joint": leg.coordinate,
@@ -97,7 +97,7 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
             "joint_acceleration": leg.acceleration,
             "divisor": leg.divisor,
         }
-        for name, value in found.items():
+        for name, value in quantities.items():
             if value is not None:
                 yield f"leg{i}_{name}", i, value
         # A platform point's coordinates may serve several legs.
@@ -105,16 +105,16 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
             yield f"{name}{i}", 0, value
 
 
-def _matches(values: Array, wanted: Array) -> dict[int, int]:
+def _matches(values: Array, quantities: Array) -> dict[int, int]:
     """Return the places of the wanted quantities, by the first node that equals each of them."""
-    found: dict[int, int] = {}
-    for place, row in enumerate(wanted):
+    places: dict[int, int] = {}
+    for place, row in enumerate(quantities):
         if np.isfinite(row).all() and np.ptp(row) > 0.0:  # constants may be equal by chance
             same = (np.abs(values - row) <= _SAME * np.abs(row)).all(axis=1)
             for k in np.flatnonzero(same):
-                found.setdefault(int(k), place)
+                places.setdefault(int(k), place)
                 break
-    return found
+    return places
 
 
 def _named(
@@ -122,18 +122,18 @@ def _named(
 ) -> dict[int, str]:
     """Return a name for every node: known ones, those of one leg, and the rest."""
     of_leg: list[frozenset[int]] = []
-    found: dict[int, str] = {}
+    node_names: dict[int, str] = {}
     counts: dict[str, int] = {}
     for k, node in enumerate(graph.nodes):
         if node.operation in (INPUT, CONSTANT):
             of_leg.append(frozenset())
             continue
-        own = {legs[known[k]]} - {0} if k in known else set()
-        of_leg.append(frozenset(own).union(*(of_leg[i] for i in node.arguments)))
+        node_legs = {legs[known[k]]} - {0} if k in known else set()
+        of_leg.append(frozenset(node_legs).union(*(of_leg[i] for i in node.arguments)))
         if k in known:
-            found[k] = names[known[k]]
+            node_names[k] = names[known[k]]
         else:
             stem = f"leg{min(of_leg[k])}_" if len(of_leg[k]) == 1 else "t"
             counts[stem] = counts.get(stem, 0) + 1
-            found[k] = f"{stem}{counts[stem]}"
-    return found
+            node_names[k] = f"{stem}{counts[stem]}"
+    return node_names

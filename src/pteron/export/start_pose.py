@@ -39,8 +39,8 @@ def start_pose(robot: Manipulator) -> Array:
     measures = _measures(robot, poses)
     enough = _SHARE * measures.max()
     poses = poses[measures >= enough]
-    apart = np.linalg.norm(poses - np.median(poses, axis=0), axis=1)
-    middle: Array = poses[apart.argmin()]
+    distances = np.linalg.norm(poses - np.median(poses, axis=0), axis=1)
+    middle: Array = poses[distances.argmin()]
     rounded = np.array([float(f"{v:.3g}") for v in middle])
     for pose in (np.zeros(robot.freedom), rounded):
         if keeps_limits(robot, pose) and _measures(robot, pose) >= 0.9 * enough:
@@ -62,16 +62,16 @@ def measures_of(robot: Manipulator, poses: Array) -> Array:
 
     It is NaN where a leg does not reach, or a joint is beyond its limits.
     """
-    kept = keeps_limits(robot, poses)
-    found = np.full(kept.shape, np.nan)
-    found[kept] = _measures(robot, poses[kept])
-    return found
+    is_within = keeps_limits(robot, poses)
+    measures = np.full(is_within.shape, np.nan)
+    measures[is_within] = _measures(robot, poses[is_within])
+    return measures
 
 
 def _measures(robot: Manipulator, poses: Array) -> Array:
     bent = np.sqrt(unchecked(robot, "squared_type_i", poses).min(axis=-1))
-    held = 2.0 * np.abs(unchecked(robot, "type_ii", poses))
-    return np.asarray(np.minimum(bent, held))
+    type_ii = 2.0 * np.abs(unchecked(robot, "type_ii", poses))
+    return np.asarray(np.minimum(bent, type_ii))
 
 
 def keeps_limits(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:

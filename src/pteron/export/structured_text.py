@@ -16,7 +16,8 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
-from pteron.export.functions import Asked, Exported, chosen, listed
+from pteron.export.exported_function import Exported
+from pteron.export.functions import FunctionChoice, choice_list, exported_functions
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.names import prefix_of
 from pteron.export.tools import tool_lines
@@ -39,7 +40,7 @@ _STATUSES = (("Usable", 3), ("Reachable", 1), ("Regular", 2))
 
 def export_st(
     robot: RobotLike,
-    functions: Asked | None = None,
+    functions: FunctionChoice | None = None,
     folder: str | Path = ".",
     *,
     specialised: bool | None = None,
@@ -102,17 +103,18 @@ def export_st(
     robot = as_manipulator(robot)
     # A block is valid or not as a whole; but of two assembly modes one alone may be in reach.
     direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
-    names = None if functions is None else listed(functions)
+    names = None if functions is None else choice_list(functions)
     if names is not None:
-        own = [one.what for one in names if isinstance(one, Custom)]
-        if own:
+        controllers = [function.what for function in names if isinstance(function, Custom)]
+        if controllers:
             raise ModelError(
-                f"functions: {own[0]}, a Custom controller, can be exported as C alone: export_c"
+                f"functions: {controllers[0]}, a Custom controller, can be exported as C alone: "
+                "export_c"
             )
         names = [direct if name == "direct_kinematics" else name for name in names]
     if specialised is None:
         specialised = not {"set_payload", "set_payload_base"}.intersection(map(str, names or ()))
-    exported = chosen(
+    exported = exported_functions(
         robot,
         names,
         usual=_BLOCKS,

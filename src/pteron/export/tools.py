@@ -35,11 +35,11 @@ def tool_lines(robot: Manipulator) -> list[str]:
     """Return a line for each tool: the arguments of `set_payload` while it is mounted."""
     lines = []
     for tool in robot.tools:
-        given = (
+        arguments = (
             f"{name} := [{', '.join(map(repr, values.tolist()))}]"
             for name, values in _arguments(robot, tool).items()
         )
-        lines.append(f"{_told(tool)}: {', '.join(given)}.")
+        lines.append(f"{_told(tool)}: {', '.join(arguments)}.")
     return lines
 
 

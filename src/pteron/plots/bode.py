@@ -18,37 +18,38 @@ def bode_figure(frequencies: ArrayLike, loops: Any, names: Sequence[str] | None 
 
     Lines mark the gain 1 and the phase -180 degrees.
     """
-    omega, found = np.asarray(frequencies, dtype=float), np.asarray(loops)
-    if found.ndim != 2 or omega.shape != found.shape[:1]:
+    omega, responses = np.asarray(frequencies, dtype=float), np.asarray(loops)
+    if responses.ndim != 2 or omega.shape != responses.shape[:1]:
         raise DataError(
-            f"loops: shape {found.shape} given, a row for each of {omega.size} frequencies expected"
+            f"loops: shape {responses.shape} given, a row for each of {omega.size} frequencies "
+            "expected"
         )
-    phase = np.degrees(np.unwrap(np.angle(found), axis=0))
+    phase = np.degrees(np.unwrap(np.angle(responses), axis=0))
     # A loop of two integrators begins at -180 degrees, not at 180, one of a spring at 0.
     phase -= 360.0 * np.round((phase[0] + 90.0) / 360.0)
     figure = blank(5.4, 4.4)
     axes = stack(figure, "frequency (rad/s)", ["gain", "phase (degrees)"])
-    curves = list(range(found.shape[1]))
+    curves = list(range(responses.shape[1]))
     labels = list(names or (f"drive {i + 1}" for i in curves))
-    for one, values, line in zip(axes, (np.abs(found), phase), (1.0, -180.0), strict=True):
-        leg_curves(one, omega, values, curves, 1.6, labels if one is axes[0] else ())
-        one.axhline(line, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
-        one.set_xscale("log")
+    for plot, values, line in zip(axes, (np.abs(responses), phase), (1.0, -180.0), strict=True):
+        leg_curves(plot, omega, values, curves, 1.6, labels if plot is axes[0] else ())
+        plot.axhline(line, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+        plot.set_xscale("log")
     axes[0].set_yscale("log")
-    legend(figure, found.shape[1])
+    legend(figure, responses.shape[1])
     return figure
 
 
 def poles_figure(poles: Any) -> Figure:
     """Return a picture of a sampled loop's poles, complex, and the unit circle round the stable."""
     try:
-        found = np.asarray(poles, dtype=complex).ravel()
+        roots = np.asarray(poles, dtype=complex).ravel()
     except (TypeError, ValueError):
         raise DataError("poles: not an array of complex numbers") from None
     figure = blank(3.6, 3.6)
     axes = plain_axes(figure, "real part of z", "imaginary part of z")
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
     axes.plot(circle.real, circle.imag, color=MUTED, linewidth=1.0)
-    axes.plot(found.real, found.imag, "x", color=INK, markersize=5.0)
+    axes.plot(roots.real, roots.imag, "x", color=INK, markersize=5.0)
     axes.set_aspect("equal")
     return figure

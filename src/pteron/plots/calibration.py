@@ -89,15 +89,15 @@ def differences_figure(
     >>> found = replace(drawn, legs=(first, *drawn.legs[1:]))
     >>> figure = pteron.plots.differences_figure(drawn, found)
     """
-    one, other = as_manipulator(drawn), as_manipulator(found)
-    expect_alike(one, other)
-    shown = home_pose(one) if pose is None else checked(one, pose, "pose").ravel()
-    points, there = joint_points(one, shown), joint_points(other, shown)
-    guides = joint_guides(one, shown)
+    machine, other = as_manipulator(drawn), as_manipulator(found)
+    expect_alike(machine, other)
+    shown = home_pose(machine) if pose is None else checked(machine, pose, "pose").ravel()
+    points, there = joint_points(machine, shown), joint_points(other, shown)
+    guides = joint_guides(machine, shown)
     size = scene_of(points, guides, None).size
     times = enlargement(greatest_difference(points, there), size) if enlarge is None else enlarge
     moved = enlarged_points(points, there, times)
-    scene = scene_of(points, guides, gravity_of(one))
+    scene = scene_of(points, guides, gravity_of(machine))
     far = scene_of(moved, enlarged_guides(guides, joint_guides(other, shown), times), None)
     sheet = _in_grey(scene, points, f"differences {times:g} times enlarged")
     for color, guide in zip(LEG_COLORS, far.guides, strict=False):
@@ -133,8 +133,8 @@ def tool_errors_figure(
     known = np.isfinite(errors).all(axis=-1)
     greatest = float(np.linalg.norm(errors[known], axis=-1).max(initial=0.0))
     times = enlargement(greatest, scene.size) if enlarge is None else enlarge
-    told = f"errors {times:g} times enlarged, the greatest {1e3 * greatest:.3g} mm"
-    sheet = _in_grey(scene, points, told)
+    remark = f"errors {times:g} times enlarged, the greatest {1e3 * greatest:.3g} mm"
+    sheet = _in_grey(scene, points, remark)
     for place, error in zip(places[known], errors[known], strict=True):
         sheet.line(np.array([place, place + times * error]), WARNING, 1.3, raised=2.0)
         sheet.mark(place, WARNING, PAPER, 3.2, raised=2.1)
@@ -193,13 +193,13 @@ def enlargement(difference: float, size: float) -> float:
     return nice_step(_SHOWN * size / difference) if difference > 1e-9 * size else 1.0
 
 
-def expect_alike(one: Manipulator, other: Manipulator) -> None:
+def expect_alike(robot: Manipulator, other: Manipulator) -> None:
     """Check that two machines differ in numbers only."""
-    if [leg.type for leg in one.legs] != [leg.type for leg in other.legs] or (
-        one.coordinates != other.coordinates
+    if [leg.type for leg in robot.legs] != [leg.type for leg in other.legs] or (
+        robot.coordinates != other.coordinates
     ):
         raise DataError(
-            f"{other.name} is no machine to compare with {one.name}: it has other legs, or its "
+            f"{other.name} is no machine to compare with {robot.name}: it has other legs, or its "
             "platform moves otherwise"
         )
 

@@ -197,9 +197,9 @@ def _with_power(label: str, power: int) -> str:
     """Return a label whose unit has a power of ten, if there is one."""
     if not power:
         return label
-    before, bracket, unit = label.rpartition("(")
+    name, bracket, unit = label.rpartition("(")
     ten = power_of_ten(power)
-    return f"{before}({ten} {unit}" if bracket else f"{label} ({ten})".lstrip()
+    return f"{name}({ten} {unit}" if bracket else f"{label} ({ten})".lstrip()
 
 
 def log_scale(axes: Axes, low: float, high: float) -> None:
@@ -239,17 +239,17 @@ def panels(
     """Return rows of axes beside each other, all over one scale along x, named below the last."""
     rows, columns = len(ylabels), len(ylabels[0])
     grid = GridSpec(rows, columns, figure=figure, height_ratios=ratios)
-    found = [
+    axes_rows = [
         [plain_axes(figure, "", label, grid[i, j]) for j, label in enumerate(row)]
         for i, row in enumerate(ylabels)
     ]
-    for row in found[:-1]:
-        for axes, lowest in zip(row, found[-1], strict=True):
+    for row in axes_rows[:-1]:
+        for axes, lowest in zip(row, axes_rows[-1], strict=True):
             axes.sharex(lowest)
             axes.tick_params(labelbottom=False)
-    for axes in found[-1]:
+    for axes in axes_rows[-1]:
         axes.set_xlabel(xlabel)
-    return found
+    return axes_rows
 
 
 def leg_style(i: int, width: float) -> dict[str, Any]:
@@ -280,8 +280,8 @@ def shown_unit(unit: str) -> tuple[float, str]:
 
 def axis_label(name: str) -> str:
     """Return a coordinate's symbol with its unit in a picture."""
-    found = coordinate(name)
-    return f"{found.symbol} ({shown_unit(found.unit)[1]})"
+    symbol_and_unit = coordinate(name)
+    return f"{symbol_and_unit.symbol} ({shown_unit(symbol_and_unit.unit)[1]})"
 
 
 def leg_curves(
@@ -302,11 +302,11 @@ def leg_curves(
     shown = values[:, chosen]
     near = _SAME * float(np.ptp(shown[np.isfinite(shown)])) if np.isfinite(shown).any() else 0.0
     for i in chosen:
-        apart = np.abs(shown - values[:, [i]])
-        known = np.atleast_1d(np.isfinite(apart).any(axis=0))
+        differences = np.abs(shown - values[:, [i]])
+        known = np.atleast_1d(np.isfinite(differences).any(axis=0))
         alike = [
             j
-            for j, off, seen in zip(chosen, apart.T, known, strict=True)
+            for j, off, seen in zip(chosen, differences.T, known, strict=True)
             if seen and not (off > near).any()
         ]
         style, label = leg_style(i, width), f"{noun} {names[i]}".lstrip() if names else None
@@ -344,7 +344,9 @@ def groups_of(kinds: Sequence[Kind]) -> dict[Kind, list[int]]:
     >>> groups_of(["m", "m", "rad"])
     {'m': [0, 1], 'rad': [2]}
     """
-    return {kind: [i for i, own in enumerate(kinds) if own == kind] for kind in kinds}
+    return {
+        kind: [i for i, column_kind in enumerate(kinds) if column_kind == kind] for kind in kinds
+    }
 
 
 def nice_step(least: float) -> float:

@@ -119,8 +119,8 @@ def certainty_figure(
         axes.plot([_CERTAIN, ratio], [y, y], color=color, linewidth=1.2, alpha=0.6)
         marker = "o" if k < inertial else "s"
         # The largest values stand on the right edge, whole.
-        whole = {"marker": marker, "markeredgewidth": 0.6, "clip_on": False}
-        spot(axes, ratio, y, color, PAPER, 5.5, **whole)
+        mark_style = {"marker": marker, "markeredgewidth": 0.6, "clip_on": False}
+        spot(axes, ratio, y, color, PAPER, 5.5, **mark_style)
     axes.axvline(_CERTAIN, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
     axes.set_ylim(-0.8, p - 0.2)
     log_scale(axes, 0.1, high)

@@ -61,23 +61,23 @@ def comparison_figure(
     figure = blank(4.4, 3.1)
     color, unit = LEG_COLORS[leg], joint.force_unit
     labels = [f"{joint.force} ({unit})", f"residual ({unit})"]
-    forces, rest = stack(figure, "time (s)", labels, [2.1, 1.0])
+    forces, residuals = stack(figure, "time (s)", labels, [2.1, 1.0])
     forces.plot(time, measured, color=MUTED, alpha=0.45, linewidth=4.0, solid_capstyle="round")
     forces.plot(time, without_friction, color=MUTED, linewidth=1.0, linestyle=(0, (2.5, 1.8)))
     forces.plot(time, predicted, color=color, linewidth=1.3)
-    zero_line(rest)
+    zero_line(residuals)
     missed = measured - predicted
-    rest.plot(time, missed, color=MUTED, linewidth=0.6)
-    rest.plot(time, np.where(used, missed, np.nan), color=color, linewidth=0.8)
+    residuals.plot(time, missed, color=MUTED, linewidth=0.6)
+    residuals.plot(time, np.where(used, missed, np.nan), color=color, linewidth=0.8)
     # Samples that do not count may be far out: they must not flatten the others.
     size = float(np.abs(np.where(used, missed, 0.0)).max()) or 1.0
-    rest.set_ylim(-1.2 * size, 1.2 * size)
+    residuals.set_ylim(-1.2 * size, 1.2 * size)
     edges = np.flatnonzero(np.diff(np.r_[False, ~used, False].astype(int))).reshape(-1, 2)
     for start, stop in np.minimum(edges, len(time) - 1).tolist():
-        for axes in (forces, rest):
+        for axes in (forces, residuals):
             axes.axvspan(time[start], time[stop], color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
-    all_of_time(rest, time)
-    figure.align_ylabels([forces, rest])
+    all_of_time(residuals, time)
+    figure.align_ylabels([forces, residuals])
     return figure
 
 
@@ -97,12 +97,12 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
     for i, color in zip(range(n), LEG_COLORS, strict=False):
         y = n - 1 - i
         least = max(float(floor[i]), low)
-        own, bare = max(errors[i], low), max(without_friction[i], low)
+        error, bare = max(errors[i], low), max(without_friction[i], low)
         axes.plot([least, bare], [y, y], color=GRID, linewidth=3.0)
-        axes.plot([least, own], [y, y], color=color, linewidth=3.0)
+        axes.plot([least, error], [y, y], color=color, linewidth=3.0)
         # Over many decades, as without noise, the largest stand on the right edge: whole.
         spot(axes, bare, y, PAPER, color, 7.0, markeredgewidth=1.6, clip_on=False)
-        spot(axes, own, y, color, PAPER, 8.0, clip_on=False)
+        spot(axes, error, y, color, PAPER, 8.0, clip_on=False)
         axes.plot([least], [y], marker="|", markersize=15.0, color=INK, markeredgewidth=1.8)
     log_scale(axes, low, high)
     axes.set_ylim(-0.6, n - 0.4)

@@ -82,7 +82,7 @@ def force_speed_figure(
         rms = np.sqrt((speeds**2).mean(axis=0)), np.sqrt((forces**2).mean(axis=0))
     groups = groups_of(units)
     figure = blank(5.4, 3.4 * len(groups))
-    for k, ((rate, unit), own) in enumerate(groups.items()):
+    for k, ((rate, unit), legs) in enumerate(groups.items()):
         word = "torque" if unit == "N m" else "force"
         place = figure.add_gridspec(len(groups), 1)[k]
         axes = plain_axes(figure, f"speed ({rate})", f"{word} ({unit})", place)
@@ -90,15 +90,15 @@ def force_speed_figure(
         axes.axvline(0.0, color=MUTED, linewidth=0.8)
         sizes = []
         for values, key in ((speeds, "speed"), (forces, "force")):
-            used = float(np.abs(values[:, own]).max()) or 1.0
-            near = [getattr(abilities[i], key) or 0.0 for i in own]
-            near += [abilities[i].rated or 0.0 for i in own] if key == "force" else []
-            sizes.append(_ROOM * max(used, *(one for one in near if one <= _FAR * used), 0.0))
+            used = float(np.abs(values[:, legs]).max()) or 1.0
+            near = [getattr(abilities[i], key) or 0.0 for i in legs]
+            near += [abilities[i].rated or 0.0 for i in legs] if key == "force" else []
+            sizes.append(_ROOM * max(used, *(limit for limit in near if limit <= _FAR * used), 0.0))
         axes.set(xlim=(-sizes[0], sizes[0]), ylim=(-sizes[1], sizes[1]))
-        shared = len({abilities[i] for i in own}) == 1
-        for i in own[: 1 if shared else None]:
+        shared = len({abilities[i] for i in legs}) == 1
+        for i in legs[: 1 if shared else None]:
             _box(axes, abilities[i], sizes, MUTED if shared else LEG_COLORS[i])
-        for i in own:
+        for i in legs:
             axes.plot(speeds[:, i], forces[:, i], label=f"leg {i + 1}", **leg_style(i, 1.6))
             spot(axes, rms[0][i], rms[1][i], LEG_COLORS[i], PAPER, 6.5, zorder=5)
         if k == 0:

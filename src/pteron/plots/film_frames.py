@@ -100,18 +100,18 @@ def frames(
     sheet.measures = False
     sheet.fill(angles[probes].tolist() if turns else (0.0,))
     sheet.clear(0)
-    kept = 0
+    still_count = 0
     for k, time in enumerate(times):
         if turns and isinstance(sheet, SpaceAxes):
             sheet.turn(float(angles[k]))
-        if turns or not kept:
+        if turns or not still_count:
             _draw_still(sheet, scene, path)
-            kept = 0 if turns else len(sheet.things)
+            still_count = 0 if turns else len(sheet.things)
         draw_machine(sheet, scene, points.at(k))
         for line in now:
             line.set_xdata([time, time])
         yield pixels(figure)
-        sheet.clear(kept)
+        sheet.clear(still_count)
 
 
 def _draw_still(sheet: MachineAxes, scene: Scene, path: Array) -> None:
@@ -130,13 +130,15 @@ def _strip(
     groups = groups_of([leg.joint.force_unit for leg in robot.legs])
     wide, tall = (float(side) for side in figure.get_size_inches())
     each = wide / len(groups)
-    found = []
-    for k, (unit, own) in enumerate(groups.items()):
+    time_lines = []
+    for k, (unit, legs) in enumerate(groups.items()):
         axes: Axes = plain_axes(figure, "time (s)", f"drives ({unit})")
         room = each - sum(_SIDES)
         box = ((k * each + _SIDES[0]) / wide, _BELOW / tall, room / wide)
         axes.set_position((*box, share - (_BELOW + _ABOVE) / tall))
         zero_line(axes)
-        leg_curves(axes, motion.time, forces, own, 1.4)
-        found.append(axes.axvline(float(motion.time[0]), color=INK, linewidth=1.2, clip_on=False))
-    return found
+        leg_curves(axes, motion.time, forces, legs, 1.4)
+        time_lines.append(
+            axes.axvline(float(motion.time[0]), color=INK, linewidth=1.2, clip_on=False)
+        )
+    return time_lines

@@ -195,13 +195,13 @@ def write_film(
     """Write so many pictures of a size as a film, whole or not at all."""
     # Made elsewhere: a film that is not finished leaves nothing behind.
     with TemporaryDirectory(prefix="pteron-film-") as folder:
-        made = Path(folder) / f"film{target.suffix.lower()}"
-        with closing(ENCODERS[target.suffix.lower()].writer(made, size, rate)) as writer:
+        file = Path(folder) / f"film{target.suffix.lower()}"
+        with closing(ENCODERS[target.suffix.lower()].writer(file, size, rate)) as writer:
             for done, picture in enumerate(pictures, start=1):
                 writer.add(picture)
                 if progress is not None:
                     progress(done / count)
-        write_bytes(target, made.read_bytes())
+        write_bytes(target, file.read_bytes())
 
 
 def checked_film(path: str | Path) -> Path:
@@ -222,10 +222,10 @@ def _expect_number(name: str, value: float, low: float, high: float) -> None:
 
 
 def _checked_forces(forces: ArrayLike, motion: Motion, robot: Manipulator) -> Array:
-    found = as_array(forces, "forces", ())
+    array = as_array(forces, "forces", ())
     expected = len(motion.time), robot.joint_count
-    if found.shape != expected:
+    if array.shape != expected:
         raise DataError(
-            f"forces: shape {found.shape} given, {expected} expected, as the motion has"
+            f"forces: shape {array.shape} given, {expected} expected, as the motion has"
         )
-    return found
+    return array

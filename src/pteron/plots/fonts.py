@@ -29,8 +29,8 @@ def take_fonts(figure: Figure) -> str:
         lacking = _lacking(usual, frozenset(c for c in letters if not c.isspace()))
         if lacking:
             families, missing = _others(lacking)
-            own = [name for name in text.get_fontfamily() if name not in families]
-            text.set_fontfamily([*own, *families])
+            first_families = [name for name in text.get_fontfamily() if name not in families]
+            text.set_fontfamily([*first_families, *families])
             absent |= missing
     return "".join(sorted(absent))
 
@@ -59,9 +59,9 @@ def _others(letters: frozenset[str]) -> tuple[list[str], frozenset[str]]:
     """Return families that have letters, and the letters that none of this machine has."""
     families: list[str] = []
     for name, path in _upright().items():
-        rest = _lacking(path, letters)
-        if rest < letters:
-            families, letters = [*families, name], rest
+        unprinted = _lacking(path, letters)
+        if unprinted < letters:
+            families, letters = [*families, name], unprinted
         if not letters:
             break
     return families, letters

@@ -41,14 +41,14 @@ def forces_figure(
     words = [ylabel or f"actuator {joint.force} ({joint.force_unit})" for joint in joints]
     groups = groups_of(words)
     figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups))
-    found = stack(figure, "time (s)", list(groups))
-    for axes, own in zip(found, groups.values(), strict=True):
+    panels = stack(figure, "time (s)", list(groups))
+    for axes, legs in zip(panels, groups.values(), strict=True):
         zero_line(axes)
-        leg_curves(axes, time, forces, own, 1.8, numbered(len(joints)), "leg")
+        leg_curves(axes, time, forces, legs, 1.8, numbered(len(joints)), "leg")
         if turning_point is not None:
             axes.axvline(turning_point, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     if turning_point is not None:
-        remark(found[0], "out", (float(time[0]) + turning_point) / 2.0, inf, MUTED, 3.0)
-        remark(found[0], "back", (turning_point + float(time[-1])) / 2.0, inf, MUTED, 3.0)
+        remark(panels[0], "out", (float(time[0]) + turning_point) / 2.0, inf, MUTED, 3.0)
+        remark(panels[0], "back", (turning_point + float(time[-1])) / 2.0, inf, MUTED, 3.0)
     legend(figure, forces.shape[1])
     return figure

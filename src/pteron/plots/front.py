@@ -96,16 +96,16 @@ def front_figure(
             label="designs of the front" if k == 1 else None,
         )
         for mark, (name, at) in zip(cycle(_MARKS), (chosen or {}).items(), strict=False):
-            told = name.replace("-", " ") if k == 1 else None
+            label = name.replace("-", " ") if k == 1 else None
             spot(
                 *(axes, values[at, k], values[at, 0], LEG_COLORS[1], PAPER, 8.0),
                 marker=mark,
-                label=told,
+                label=label,
                 zorder=5,
             )
         if begun is not None and np.isfinite(begun[[0, k]]).all():
-            told = "to begin with" if k == 1 else None
-            spot(axes, begun[k], begun[0], INK, PAPER, 11.0, marker="*", label=told, zorder=6)
+            label = "to begin with" if k == 1 else None
+            spot(axes, begun[k], begun[0], INK, PAPER, 11.0, marker="*", label=label, zorder=6)
         axes.margins(0.08)
     legend(figure, 3)
     return figure

@@ -105,29 +105,31 @@ def map_figure(given: Map, *names: str) -> Figure:
     return map_panels(panels, scales, {}, len(chosen) if len(planes) > 1 else 1)
 
 
-def _planes(given: Map) -> list[Map]:
+def _planes(volume: Map) -> list[Map]:
     """Return the map itself, or of one over three coordinates the planes through its middle."""
-    axes = given.grid.axes
+    axes = volume.grid.axes
     if len(axes) < 3:
-        return [given]
+        return [volume]
     if len(axes) > 3:
         raise DataError(
             f"{', '.join(axis.name for axis in axes)} vary: a picture shows three coordinates; "
             "hold the others"
         )
-    depth = scipy.ndimage.distance_transform_edt(np.pad(given.reachable, 1))[1:-1, 1:-1, 1:-1]
+    depth = scipy.ndimage.distance_transform_edt(np.pad(volume.reachable, 1))[1:-1, 1:-1, 1:-1]
     middle = np.unravel_index(int(depth.argmax()), depth.shape)
     places = [axis.values[i] for axis, i in zip(axes, middle, strict=True)]
     return [
-        given.at(axis.name, float(place))
+        volume.at(axis.name, float(place))
         for axis, place in zip(reversed(axes), reversed(places), strict=True)
     ]
 
 
-def color_scale(given: Map, name: str) -> Normalize:
+def color_scale(shown_map: Map, name: str) -> Normalize:
     """Return the scale of colours for the values of an index."""
     factor = shown_unit(ALL[name].unit)[0]
-    known = factor * given.values[name][given.reachable & np.isfinite(given.values[name])]
+    known = (
+        factor * shown_map.values[name][shown_map.reachable & np.isfinite(shown_map.values[name])]
+    )
     if not len(known):
         return Normalize(0.0, 1.0)
     low, high = float(known.min()), float(known.max())
@@ -195,15 +197,15 @@ def _plane(
     if drawn.count():
         _best(axes, plane, name, handles)
     bar = figure.colorbar(mesh, ax=axes, fraction=0.05, pad=0.02, extend=_extended(drawn, scale))
-    told = "bright is better"
+    direction = "bright is better"
     if drawn.count() and _alike(summary := plane.summary(name)):
         bar.set_ticks([factor * summary.best], labels=[f"{factor * summary.best:.4g}"])
-        told = "the same everywhere here"
+        direction = "the same everywhere here"
     elif isinstance(scale, LogNorm):
         bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         bar.ax.yaxis.set_major_formatter("{x:g}")
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
-    bar.set_label(f"{_named(name)}\n{told}", fontsize=FONT_SIZE, color=INK)
+    bar.set_label(f"{_named(name)}\n{direction}", fontsize=FONT_SIZE, color=INK)
     bar.ax.tick_params(labelsize=FONT_SIZE - 1.0, colors=INK, color=MUTED)
     outline: Any = bar.outline
     outline.set_visible(False)
@@ -235,14 +237,14 @@ def _extended(drawn: Any, scale: Normalize) -> str:
 def _hatched(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> list[Any]:
     """Hatch the poses that do not serve, and return the entries of the legend."""
     first, second = (_shown(axis) for axis in plane.grid.axes)
-    status, told = plane.status.T, name == MARGIN.name
+    status, by_cause = plane.status.T, name == MARGIN.name
     handles: dict[str, Any] = {}
     for code in (BEYOND_LIMITS, *range(1, len(_HATCHES))):
         here = status == code
         if not here.any() and cause(code) not in causes:
             continue
-        known = told or code == BEYOND_LIMITS
-        face = _light(LEG_COLORS[code - 1]) if told and code != BEYOND_LIMITS else GRID
+        known = by_cause or code == BEYOND_LIMITS
+        face = _light(LEG_COLORS[code - 1]) if by_cause and code != BEYOND_LIMITS else GRID
         hatch = _HATCHES[code if known else 1]
         if here.any():
             region = axes.contourf(
@@ -267,29 +269,29 @@ def _hatched(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> li
 
 def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
     """Mark the best pose of a plane, unless all are alike."""
-    found = plane.summary(name)
-    if _alike(found):
+    summary = plane.summary(name)
+    if _alike(summary):
         return
-    factor = shown_unit(found.unit)[0]
+    factor = shown_unit(summary.unit)[0]
     at = [
-        shown_unit(axis.unit)[0] * found.best_pose[plane.grid.coordinates.index(axis.name)]
+        shown_unit(axis.unit)[0] * summary.best_pose[plane.grid.coordinates.index(axis.name)]
         for axis in plane.grid.axes
     ]
-    label = f"best here: {factor * found.best:.4g} {_unit(name)}".rstrip()
+    label = f"best here: {factor * summary.best:.4g} {_unit(name)}".rstrip()
     spot(axes, at[0], at[1], PAPER, INK, 6.0, zorder=5, label=label, clip_on=False)
     handles.append(axes.lines[-1])
 
 
-def _alike(found: Summary) -> bool:
-    return abs(found.best - found.worst) <= _ALIKE * abs(found.best)
+def _alike(summary: Summary) -> bool:
+    return abs(summary.best - summary.worst) <= _ALIKE * abs(summary.best)
 
 
-def _curve(axes: Axes, given: Map, name: str) -> None:
+def _curve(axes: Axes, curve: Map, name: str) -> None:
     """Draw an index over one coordinate."""
-    place = _shown(given.grid.axes[0])
+    place = _shown(curve.grid.axes[0])
     factor = shown_unit(ALL[name].unit)[0]
-    serves = given.reachable
-    axes.plot(place, np.where(serves, factor * given.values[name], np.nan), color=INK)
+    serves = curve.reachable
+    axes.plot(place, np.where(serves, factor * curve.values[name], np.nan), color=INK)
     axes.set(xlim=(place[0], place[-1]))
     if not serves.all():
         axes.fill_between(
@@ -326,11 +328,11 @@ def _unit(name: str) -> str:
     return shown_unit(ALL[name].unit)[1]
 
 
-def _title(given: Map) -> str:
+def _title(shown_map: Map) -> str:
     """Return the machine's name, and the coordinates that are held."""
-    pairs = ((coordinate(name), value) for name, value in given.grid.held.items())
-    held = (
+    pairs = ((coordinate(name), value) for name, value in shown_map.grid.held.items())
+    constants = (
         f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
         for c, value in pairs
     )
-    return "  ".join([given.robot, *held])
+    return "  ".join([shown_map.robot, *constants])

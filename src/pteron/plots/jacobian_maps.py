@@ -158,16 +158,16 @@ def _map(
 ) -> tuple[Figure, Axes, Array, Array, Array]:
     """Return a figure, its axes, and what they show, in mm and degrees."""
     scaled, labels = [], []
-    for given, name in zip((first, second), names, strict=True):
-        numbers = as_array(given, name, ())
+    for axis_values, name in zip((first, second), names, strict=True):
+        numbers = as_array(axis_values, name, ())
         if numbers.ndim != 1 or len(numbers) < 2 or not (np.diff(numbers) > 0.0).all():
             raise DataError(f"{name}: two or more numbers expected that ascend, m or rad")
         scaled.append(coordinate(name).shown_factor * numbers)
         labels.append(axis_label(name))
     x, y = scaled
-    found = np.asarray(values, dtype=float)
-    if found.shape != (len(y), len(x)):
-        raise DataError(f"values: shape {found.shape} given, ({len(y)}, {len(x)}) expected")
+    array = np.asarray(values, dtype=float)
+    if array.shape != (len(y), len(x)):
+        raise DataError(f"values: shape {array.shape} given, ({len(y)}, {len(x)}) expected")
     alike = len(set(are_angles(names).tolist())) == 1
     height = _MARGIN + (_WIDTH - _MARGIN) * (float(np.ptp(y) / np.ptp(x)) if alike else 0.75)
     figure = blank(_WIDTH, min(max(height, 1.8), 6.0))
@@ -176,7 +176,7 @@ def _map(
     if alike:
         axes.set_aspect("equal")
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    return figure, axes, x, y, np.where(np.isfinite(found), found, np.nan)
+    return figure, axes, x, y, np.where(np.isfinite(array), array, np.nan)
 
 
 def _rim(axes: Axes, x: Array, y: Array, values: Array) -> None:

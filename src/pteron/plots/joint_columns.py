@@ -25,18 +25,18 @@ def named(robot: RobotLike | None, values: ArrayLike, what: str) -> ArrayLike:
     """Return a table's columns of a machine, such as its "forces"; an array as it is."""
     if robot is None:
         return values
-    found: ArrayLike = by_name(values, as_manipulator(robot).column_names[what], what)
-    return found
+    columns: ArrayLike = by_name(values, as_manipulator(robot).column_names[what], what)
+    return columns
 
 
 def rows(
     time: ArrayLike, values: ArrayLike, what: str, columns: int | None = None
 ) -> tuple[Array, Array]:
     """Return times (T,) and a row of values (T, n) for each, as arrays."""
-    t, found = as_array(time, "time", ()), as_array(values, what, ())
+    t, array = as_array(time, "time", ()), as_array(values, what, ())
     expected = "n" if columns is None else columns
     if t.ndim != 1 or not len(t):
         raise DataError(f"time: shape {t.shape} given, (T,) expected, T above 0")
-    if found.ndim != 2 or len(found) != len(t) or columns not in (None, found.shape[1]):
-        raise DataError(f"{what}: shape {found.shape} given, ({len(t)}, {expected}) expected")
-    return t, found
+    if array.ndim != 2 or len(array) != len(t) or columns not in (None, array.shape[1]):
+        raise DataError(f"{what}: shape {array.shape} given, ({len(t)}, {expected}) expected")
+    return t, array

@@ -60,11 +60,11 @@ class MachineAxes(ABC):
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
         """Place the axes so that all things fill them, seen from any of the angles, rad."""
 
-    def clear(self, kept: int) -> None:
+    def clear(self, count: int) -> None:
         """Remove all but the first things."""
-        for thing in self.things[kept:]:
+        for thing in self.things[count:]:
             thing.remove()
-        del self.things[kept:]
+        del self.things[count:]
         self._drawn.clear()
 
     @property

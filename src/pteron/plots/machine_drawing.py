@@ -187,8 +187,8 @@ def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
     """Return the lines of a leg's last link: one (2, 3), or two and the bars between them."""
     if bar is None:
         return [line[-2:]]
-    one, other = (line[-2:] + side * APART * size * bar for side in (1.0, -1.0))
-    return [one, other, *np.stack([one, other], axis=1)]
+    first_rod, second_rod = (line[-2:] + side * APART * size * bar for side in (1.0, -1.0))
+    return [first_rod, second_rod, *np.stack([first_rod, second_rod], axis=1)]
 
 
 def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
@@ -213,14 +213,14 @@ def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, siz
         sheet.line(ends, color, 3.0 if points.bars[i] is None else 2.0)
     for joint in line[::2] if points.rams[i] else line:
         sheet.mark(joint, PAPER, color, 5.0)
-    along = guide.axis if guide.slides else line[1] - line[0]
-    away = sheet.beside(line[0] - points.reference, along)
+    direction = guide.axis if guide.slides else line[1] - line[0]
+    away = sheet.beside(line[0] - points.reference, direction)
     sheet.text(line[0] + 0.075 * size * away, str(i + 1), color, bold=True)
 
 
-def _block(center: Array, along: Array, size: float) -> list[Array]:
+def _block(center: Array, direction: Array, size: float) -> list[Array]:
     """Return the six faces of a slider's block."""
-    frame = upright(along)
+    frame = upright(direction)
     half = size * np.array([0.02, 0.02, 0.036])
     loop = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     return [

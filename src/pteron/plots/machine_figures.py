@@ -192,8 +192,8 @@ def poses_figure(
     >>> len(figure.axes)
     2
     """
-    given = [robots] if isinstance(robots, RobotLike) else list(robots)
-    machines = [as_manipulator(robot) for robot in given]
+    several = [robots] if isinstance(robots, RobotLike) else list(robots)
+    machines = [as_manipulator(robot) for robot in several]
     expect(machines, "robots", "none", "at least 1")
     first = machines[0]
     shown = np.reshape(checked(first, poses, "poses"), (-1, first.freedom))

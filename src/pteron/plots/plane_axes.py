@@ -78,8 +78,8 @@ class PlaneAxes(MachineAxes):
     def beside(self, away: Array, along: Array) -> Array:
         """Return the unit vector in the plane, across a line, nearest to `away`."""
         x, y = self.plane @ along
-        across = np.array([-y, x]) / max(float(np.hypot(x, y)), 1e-12)
-        return np.asarray(np.copysign(1.0, across @ self.plane @ away) * across @ self.plane)
+        normal = np.array([-y, x]) / max(float(np.hypot(x, y)), 1e-12)
+        return np.asarray(np.copysign(1.0, normal @ self.plane @ away) * normal @ self.plane)
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
         """Let the scales end a rim beyond what was drawn."""

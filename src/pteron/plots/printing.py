@@ -135,7 +135,9 @@ def _thin(axes: Axes) -> None:
         numbers = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
         places = sorted((box.x0, box.x1) for box in numbers)
         ticks = axes.get_xticks()
-        if len(ticks) < 3 or all(one[1] + _GAP < other[0] for one, other in pairwise(places)):
+        if len(ticks) < 3 or all(
+            span[1] + _GAP < next_span[0] for span, next_span in pairwise(places)
+        ):
             return
         for scale in (axes.xaxis, axes.yaxis):
             scale.set_major_locator(MultipleLocator(2.0 * float(ticks[1] - ticks[0])))

@@ -84,12 +84,12 @@ def measure_figure(
     figure, axes, first, second = _sheet(cut, lowest=0.0)
     # Drawn beyond the edge of the reach and cut off there, so that the edge is smooth.
     nearest = scipy.ndimage.distance_transform_edt(np.isnan(measure), return_indices=True)[1]
-    whole = measure[tuple(nearest)]
-    inside = np.ma.masked_where(cut.status != REACHABLE, whole)
+    extended = measure[tuple(nearest)]
+    inside = np.ma.masked_where(cut.status != REACHABLE, extended)
     drawn = [
-        axes.contourf(first, second, whole, levels=[level, np.inf], colors=[REACH], alpha=0.11)
+        axes.contourf(first, second, extended, levels=[level, np.inf], colors=[REACH], alpha=0.11)
         for level in levels
-        if level < whole.max()
+        if level < extended.max()
     ]
     named = [level for level in levels[::2] if inside.min() < level < inside.max()]
     if named:
@@ -105,8 +105,8 @@ def measure_figure(
     ]
     outline = Path.make_compound_path(*map(Path, rims))
     edge.set_paths([outline])
-    for one in drawn:
-        one.set_clip_path(outline, axes.transData)
+    for region in drawn:
+        region.set_clip_path(outline, axes.transData)
     _finish(axes, cut, path)
     return figure
 

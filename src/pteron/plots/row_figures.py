@@ -78,7 +78,7 @@ def parameters_figure(
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['kg m', 'kg m^2', 'kg']
     """
-    found = _fitting(names, values, "values")
+    numbers = _fitting(names, values, "values")
     wide = np.full(len(names), np.nan)
     if intervals is not None:
         wide = _fitting(names, intervals, "intervals")
@@ -86,21 +86,21 @@ def parameters_figure(
     if units and len(units) != len(names):
         raise DataError(f"units: {len(units)} given, {len(names)} expected, one for each name")
     groups = groups_of(units or ["value"] * len(names))
-    counts = [len(own) for own in groups.values()]
+    counts = [len(members) for members in groups.values()]
     figure = blank(_WIDE, _HEAD * len(groups) + _ROW * len(names))
     grid = figure.add_gridspec(len(groups), 1, height_ratios=[count + 1.0 for count in counts])
-    for k, (unit, own) in enumerate(groups.items()):
-        axes = row_axes(figure, [names[i] for i in own], unit, grid[k])
+    for k, (unit, members) in enumerate(groups.items()):
+        axes = row_axes(figure, [names[i] for i in members], unit, grid[k])
         axes.axvline(0.0, color=MUTED, linewidth=0.8)
-        for y, i in enumerate(reversed(own)):
+        for y, i in enumerate(reversed(members)):
             if known is not None:
                 spot(axes, known[i], y, PAPER, INK, 7.5, markeredgewidth=1.2)
-            missed = known is not None and abs(found[i] - known[i]) > wide[i]
+            missed = known is not None and abs(numbers[i] - known[i]) > wide[i]
             color = WARNING if missed else REACH
             if np.isfinite(wide[i]):
-                ends = [found[i] - wide[i], found[i] + wide[i]]
+                ends = [numbers[i] - wide[i], numbers[i] + wide[i]]
                 axes.plot(ends, [y, y], color=color, linewidth=2.0, marker="|", markersize=6.0)
-            spot(axes, found[i], y, color, PAPER, 5.0, markeredgewidth=0.6)
+            spot(axes, numbers[i], y, color, PAPER, 5.0, markeredgewidth=0.6)
     return figure
 
 
@@ -154,6 +154,6 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
 
 
 def _fitting(names: Sequence[str], values: ArrayLike, what: str) -> Array:
-    found = np.asarray(values, dtype=float)
-    expect(found.shape == (len(names),), what, f"shape {found.shape}", f"({len(names)},)")
-    return found
+    array = np.asarray(values, dtype=float)
+    expect(array.shape == (len(names),), what, f"shape {array.shape}", f"({len(names)},)")
+    return array

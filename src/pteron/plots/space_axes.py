@@ -68,9 +68,9 @@ class SpaceAxes(MachineAxes):
         self.angle = angle
         azimuth, elevation = np.radians(_AZIMUTH) + angle, np.radians(_ELEVATION)
         self.axes.view_init(elev=_ELEVATION, azim=float(np.degrees(azimuth)))
-        across = np.cos(elevation)
+        level = np.cos(elevation)
         self._towards_eye = np.array(
-            [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)]
+            [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
         )
 
     def _placed(self, points: Array, *, held: bool = True) -> Array:
@@ -89,9 +89,9 @@ class SpaceAxes(MachineAxes):
 
     def beside(self, away: Array, along: Array) -> Array:
         """Return the unit vector in the picture's plane, across a line, nearest to `away`."""
-        across = np.cross(along, self.rotation.T @ self._towards_eye)
-        across = across / max(float(np.linalg.norm(across)), 1e-12)
-        return np.asarray(np.copysign(1.0, across @ away) * across)
+        normal = np.cross(along, self.rotation.T @ self._towards_eye)
+        normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
+        return np.asarray(np.copysign(1.0, normal @ away) * normal)
 
     def beside_eye(self, point: Array, center: Array) -> Array:
         """Return a point of the upright frame, in the base frame, gone round with the eye."""

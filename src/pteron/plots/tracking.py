@@ -24,13 +24,13 @@ def tracking_figure(time: ArrayLike, error: ArrayLike, names: Sequence[str]) -> 
     """
     time, error = rows(time, error, "error", len(names))
     groups = groups_of([coordinate(name).unit for name in names])
-    scales = [_scale(error[:, own]) for own in groups.values()]
+    scales = [_scale(error[:, columns]) for columns in groups.values()]
     labels = [f"error ({scales[k][1]}{unit})" for k, unit in enumerate(groups)]
     figure = blank(5.4, 1.6 + 1.6 * len(groups))
-    found = stack(figure, "time (s)", labels)
-    for axes, own, (factor, _) in zip(found, groups.values(), scales, strict=True):
+    panels = stack(figure, "time (s)", labels)
+    for axes, columns, (factor, _) in zip(panels, groups.values(), scales, strict=True):
         zero_line(axes)
-        leg_curves(axes, time, factor * error, own, 1.4, names)
+        leg_curves(axes, time, factor * error, columns, 1.4, names)
     legend(figure, len(names))
     return figure
 

@@ -64,9 +64,9 @@ def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['pose (m)', 'velocity (m/s)']
     """
-    told = [coordinate(name) for name in names]
-    groups = groups_of([one.unit for one in told])
-    return _courses_figure(time, courses, [one.symbol for one in told], groups, _OF_POSE)
+    coordinates = [coordinate(name) for name in names]
+    groups = groups_of([c.unit for c in coordinates])
+    return _courses_figure(time, courses, [c.symbol for c in coordinates], groups, _OF_POSE)
 
 
 def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None = None) -> Figure:
@@ -122,13 +122,13 @@ def _courses_figure(
         for word, order, _ in zip(words, _ORDERS, values, strict=False)
     ]
     figure = blank(_WIDE, _HEAD + _TALL * len(values))
-    found = panels(figure, "time (s)", labels)
-    for column in zip(*found, strict=True):
+    axes_rows = panels(figure, "time (s)", labels)
+    for column in zip(*axes_rows, strict=True):
         figure.align_ylabels(column)
-    for row, course in zip(found, values, strict=True):
-        for axes, own in zip(row, groups.values(), strict=True):
+    for row, course in zip(axes_rows, values, strict=True):
+        for axes, columns in zip(row, groups.values(), strict=True):
             zero_line(axes)
-            leg_curves(axes, t, course, own, 1.6, names if course is values[0] else (), noun)
+            leg_curves(axes, t, course, columns, 1.6, names if course is values[0] else (), noun)
     legend(figure, len(names))
     return figure
 

@@ -30,8 +30,8 @@ class NumericalRank:
         return self.largest_dropped <= ROUNDING
 
     def __str__(self) -> str:
-        kept, dropped = f"{self.smallest_kept:.1e}", f"{self.largest_dropped:.1e}"
-        return f"{self.rank} (smallest singular value kept {kept}, largest dropped {dropped})"
+        smallest, largest = f"{self.smallest_kept:.1e}", f"{self.largest_dropped:.1e}"
+        return f"{self.rank} (smallest singular value kept {smallest}, largest dropped {largest})"
 
 
 @dataclass(frozen=True)
@@ -193,19 +193,19 @@ class ExactCertificate(Certificate):
         lines += _listed("Taken as exact", self.recognised)
         lines += _listed("Approximated", self.approximated)
         if self.numerical is not None:
-            found = f"that of the machine itself is {self.numerical}"
+            comparison = f"that of the machine itself is {self.numerical}"
             if self.numerical.rank != self.rank:
                 lines.append(
                     "The rank is that of the machine in these exact numbers, but IN FLOATING POINT "
-                    f"{found}: a special relation may be lost."
+                    f"{comparison}: a special relation may be lost."
                 )
             elif not self.numerical.clear:
                 lines.append(
-                    f"In floating point {found}: WHAT WAS DROPPED IS MORE THAN ROUNDING "
+                    f"In floating point {comparison}: WHAT WAS DROPPED IS MORE THAN ROUNDING "
                     f"({ROUNDING:.0e}), so that floats do not confirm the rank."
                 )
             else:
-                lines.append(f"In floating point {found}: the same.")
+                lines.append(f"In floating point {comparison}: the same.")
         lines += _listed("Not kept exactly", self.lost)
         lines += _listed("Nearly special, and perhaps meant to be", self.nearly)
         return "\n".join(lines)

@@ -74,17 +74,25 @@ def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
     base = base_parameters(robot)
     grouping = _without_units(robot, base)
     places = [(p.kind, p.body) for p in columns]
-    own = [k for k, place in enumerate(places) if place in OWN]
-    joined = [k for k, place in enumerate(places) if place in JOINED]
-    others = [k for k in range(len(columns)) if k not in own and k not in joined]
+    leg_columns = [k for k, place in enumerate(places) if place in OWN]
+    shared_columns = [k for k, place in enumerate(places) if place in JOINED]
+    others = [k for k in range(len(columns)) if k not in leg_columns and k not in shared_columns]
     model = _Model(robot)
-    found = {base.kept}
+    candidates = {base.kept}
     for order in (others, others[::-1]):
-        start = tuple(sorted(independent(grouping, [*own, *order, *joined], least=_NONZERO)[0]))
+        start = tuple(
+            sorted(
+                independent(grouping, [*leg_columns, *order, *shared_columns], least=_NONZERO)[0]
+            )
+        )
         # The columns of a platform that tilts are too many to exchange one by one.
         tilts = robot.platform.tilts
-        found.add(start if tilts else _improved(model, grouping, start, [*own, *others]))
-    return min(found, key=lambda kept: (_final_cost(robot, kept), kept))
+        candidates.add(
+            start if tilts else _improved(model, grouping, start, [*leg_columns, *others])
+        )
+    return min(
+        candidates, key=lambda base_columns: (_final_cost(robot, base_columns), base_columns)
+    )
 
 
 def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
@@ -95,23 +103,23 @@ def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
 
 
 def _improved(
-    model: _Model, grouping: Array, kept: tuple[int, ...], candidates: Sequence[int]
+    model: _Model, grouping: Array, base_columns: tuple[int, ...], candidates: Sequence[int]
 ) -> tuple[int, ...]:
     """Exchange columns one by one as long as that saves operations."""
-    cost = model.cost(kept)
+    cost = model.cost(base_columns)
     while True:
-        basis = grouping[:, kept]
-        better = (cost, kept)
+        basis = grouping[:, base_columns]
+        better = (cost, base_columns)
         for column in candidates:
-            if column in kept:
+            if column in base_columns:
                 continue
             shares = np.linalg.solve(basis, grouping[:, column])
             for place in np.flatnonzero(np.abs(shares) > _NONZERO):
-                other = tuple(sorted({*kept, column} - {kept[place]}))
+                other = tuple(sorted({*base_columns, column} - {base_columns[place]}))
                 better = min(better, (model.cost(other), other))
         if better[0] >= cost:
-            return kept
-        cost, kept = better
+            return base_columns
+        cost, base_columns = better
 
 
 class _Model:
@@ -124,18 +132,18 @@ class _Model:
         self.state = self.machine.state(*self.motion)
         self.known: dict[tuple[int, ...], int] = {}
 
-    def cost(self, kept: tuple[int, ...]) -> int:
+    def cost(self, base_columns: tuple[int, ...]) -> int:
         """Return the operations of a state before the pass that saves some, which takes longer."""
-        if kept not in self.known:
-            base = ca.SX.sym("base", len(kept))
-            given = ca.SX(len(self.machine.parameters), 1)
-            given[list(kept)] = base
-            known = self.machine, self.state, given
-            self.known[kept] = min(
+        if base_columns not in self.known:
+            base = ca.SX.sym("base", len(base_columns))
+            values = ca.SX(len(self.machine.parameters), 1)
+            values[list(base_columns)] = base
+            known = self.machine, self.state, values
+            self.known[base_columns] = min(
                 self._operations(base, inverse_dynamics(*known, carried=carried))
                 for carried in (True, False)
             )
-        return self.known[kept]
+        return self.known[base_columns]
 
     def _operations(self, base: Expression, forces: Expression) -> int:
         """Count what depends on the state; what depends on base parameters alone is done once."""
@@ -145,7 +153,7 @@ class _Model:
         return sum(not graph.nodes[k].shared for k in graph.operations())
 
 
-def _final_cost(robot: Manipulator, kept: tuple[int, ...]) -> int:
+def _final_cost(robot: Manipulator, base_columns: tuple[int, ...]) -> int:
     """Return the operations of the kernel: after the pass, base parameters made ready once."""
-    built = program(robot, "inverse_dynamics", tuple((column,) for column in kept))
+    built = program(robot, "inverse_dynamics", tuple((column,) for column in base_columns))
     return count_operations(hoisted(built, "base_parameters")[0].function)

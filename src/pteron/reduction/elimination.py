@@ -29,9 +29,9 @@ def dependencies(
         For each other column, its coefficients on the kept columns.
     """
     work = [[row[j] % prime for j in order] for row in rows]
-    kept: list[int] = []
+    independent: list[int] = []
     for place, column in enumerate(order):
-        top = len(kept)
+        top = len(independent)
         pivot = next((i for i in range(top, len(work)) if work[i][place]), None)
         if pivot is None:
             continue
@@ -42,13 +42,13 @@ def dependencies(
             factor = row[place]
             if i != top and factor:
                 work[i] = [(a - factor * b) % prime for a, b in zip(row, lead, strict=True)]
-        kept.append(column)
-    given = {
-        column: {k: work[i][place] for i, k in enumerate(kept) if work[i][place]}
+        independent.append(column)
+    relations = {
+        column: {k: work[i][place] for i, k in enumerate(independent) if work[i][place]}
         for place, column in enumerate(order)
-        if column not in kept
+        if column not in independent
     }
-    return kept, given
+    return independent, relations
 
 
 def remainder(values: Sequence[int], primes: Sequence[int]) -> tuple[int, int]:

@@ -10,10 +10,11 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from operator import add
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from sympy import Integer, factorint, isprime
@@ -63,6 +64,75 @@ Number = TypeVar("Number", int, Fraction)
 Relations = dict[int, dict[int, int]]
 
 
+@dataclass(frozen=True)
+class _ExactRegressor:
+    """A machine's regressor in exact numbers, the columns that legs share added up."""
+
+    robot: Manipulator
+    geometry: ExactGeometry
+    columns: Sequence[Parameter]
+    order: Sequence[int]
+    sharing: Array
+    transfers: Sequence[Transfer]
+    rng: random.Random
+
+    @property
+    def states(self) -> int:
+        """Random states whose rows are more than the columns."""
+        return -(-len(self.order) // self.robot.freedom) + _SPARE_STATES
+
+    def rows(self, prime: int, states: int) -> list[list[int]]:
+        """Return the rows at random states, modulo a prime."""
+        rows = modular_rows(bare(self.robot), self.geometry, prime, states, self.rng)
+        return _shared_rows(rows, self.sharing)
+
+    def rational_rows(self) -> list[list[Fraction]]:
+        """Return the rows at random rational configurations; none where there are none."""
+        rows = rational_rows(bare(self.robot), self.geometry, _RATIONAL_CHECKS, self.rng)
+        return _shared_rows(rows, self.sharing)
+
+    def mass_vectors(self, prime: int) -> list[dict[int, int]]:
+        """Return the null vectors of the mass transfers modulo a prime, by column."""
+        return [_modular(t, self.geometry, self.columns, prime) for t in self.transfers]
+
+    def symbolic_shares(self, base_columns: Sequence[int]) -> dict[int, dict[int, Any]]:
+        """Return the dependent columns' shares by the mass transfers, as exact SymPy numbers."""
+        numbers = algebraic_values(self.geometry)
+        return symbolic_shares(self.columns, sorted(base_columns), self.transfers, [], numbers)
+
+
+@dataclass(frozen=True)
+class _Elimination:
+    """The independent columns modulo primes, and the dependent ones' shares.
+
+    Attributes
+    ----------
+    base_columns, dropped : list of int
+        The independent columns and the others.
+    extra : list of int
+        Dropped columns that no mass transfer explains.
+    primes : tuple of int
+        Those that agree on the rank.
+    shares : mapping, optional
+        As fractions, where the primes give them.
+    """
+
+    base_columns: list[int]
+    dropped: list[int]
+    extra: list[int]
+    primes: tuple[int, ...]
+    shares: dict[int, dict[int, Fraction]] | None
+
+
+@dataclass(frozen=True)
+class _Verified:
+    """Shares that annihilate the regressor at states that they were not computed from."""
+
+    shares: Shares
+    coefficients: str
+    rational_configurations: int
+
+
 def exact_grouping(
     robot: Manipulator,
     columns: Sequence[Parameter],
@@ -80,100 +150,123 @@ def exact_grouping(
     """
     if is_singular_everywhere(robot):
         raise _without_dynamics(robot)
-    geometry = exact_geometry(robot)
-    topology, n, exact_values = bare(robot), robot.freedom, algebraic_values(geometry)
-    rng = random.Random(seed)
+    geometry, rng = exact_geometry(robot), random.Random(seed)
+    regressor = _ExactRegressor(robot, geometry, columns, order, sharing, mass_transfers, rng)
     primes = primes_of(geometry, rng)
-    states = -(-len(order) // n) + _SPARE_STATES
+    elimination = _eliminate(regressor, primes)
+    fresh = next(primes)
+    verified = _verify(regressor, elimination, fresh, seed)
+    certificate = _certificate(regressor, elimination, verified, fresh, seed)
+    return Grouping(tuple(sorted(elimination.base_columns)), verified.shares, certificate)
 
-    found: dict[int, tuple[list[int], Relations]] = {}
+
+def _eliminate(regressor: _ExactRegressor, primes: Iterator[int]) -> _Elimination:
+    """Return the elimination modulo as many primes as its shares need to become fractions."""
+    geometry, order = regressor.geometry, regressor.order
+    eliminations: dict[int, tuple[list[int], Relations]] = {}
     shares: dict[int, dict[int, Fraction]] | None = None
     most = _FEW_PRIMES
-    while len(found) < most and shares is None:
+    while len(eliminations) < most and shares is None:
         prime = next(primes)
         try:
-            rows = _shared_rows(modular_rows(topology, geometry, prime, states, rng), sharing)
+            rows = regressor.rows(prime, regressor.states)
         except ZeroDivisionError:
-            raise _without_dynamics(robot) from None
-        found[prime] = dependencies(rows, order, prime)
+            raise _without_dynamics(regressor.robot) from None
+        eliminations[prime] = dependencies(rows, order, prime)
         # A prime may hide a column by bad luck, never invent one: keep those of greatest rank.
-        best = max(len(kept) for kept, _ in found.values())
-        found = {p: result for p, result in found.items() if len(result[0]) == best}
-        if len(found) > 1:
-            shares = _lifted(found)
-        first, (kept, relations) = next(iter(found.items()))
-        dropped = [column for column in order if column not in kept]
-        by_mass = [_modular(transfer, geometry, columns, first) for transfer in mass_transfers]
+        best = max(len(independent) for independent, _ in eliminations.values())
+        eliminations = {p: pair for p, pair in eliminations.items() if len(pair[0]) == best}
+        if len(eliminations) > 1:
+            shares = _lifted(eliminations)
+        first, (base_columns, relations) = next(iter(eliminations.items()))
+        dropped = [column for column in order if column not in base_columns]
+        by_mass = regressor.mass_vectors(first)
         extra = _unexplained(by_mass, relations, dropped, len(order), first)
         most = _MOST_PRIMES if extra and not geometry.radicands else _FEW_PRIMES
-
     if shares is None and not extra and not geometry.radicands:
         # Fractions of more digits than the primes hold.
-        known = symbolic_shares(columns, sorted(kept), mass_transfers, [], exact_values)
         shares = {
             column: {k: Fraction(int(share.p), int(share.q)) for k, share in terms.items()}
-            for column, terms in known.items()
+            for column, terms in regressor.symbolic_shares(base_columns).items()
         }
+    return _Elimination(base_columns, dropped, extra, tuple(eliminations), shares)
 
-    fresh = next(primes)
+
+def _verify(
+    regressor: _ExactRegressor, elimination: _Elimination, fresh: int, seed: int
+) -> _Verified:
+    """Return the shares after a check in fractions and modulo a fresh prime."""
+    base_columns, shares = elimination.base_columns, elimination.shares
     rational_checks = 0
-    coefficients = "rational"
-    given: Shares
+    verified: Shares
     if shares is not None:
-        given = {column: dict(terms) for column, terms in shares.items()}
+        coefficients = "rational"
+        verified = {column: dict(terms) for column, terms in shares.items()}
         field = PrimeField(fresh)
         residues = {
             column: {k: field.number(share) for k, share in terms.items()}
             for column, terms in shares.items()
         }
-        if not geometry.radicands:
-            exact_rows = rational_rows(topology, geometry, _RATIONAL_CHECKS, rng)
-            hold = _annihilate(shares, _shared_rows(exact_rows, sharing), None)
+        if not regressor.geometry.radicands:
+            rational = regressor.rational_rows()
+            hold = _annihilate(shares, rational, None)
             # Only what is due to special guide points may fail at others.
-            assert hold or extra
-            rational_checks = hold * len(exact_rows) // n
+            assert hold or elimination.extra
+            rational_checks = hold * len(rational) // regressor.robot.freedom
     else:
-        new_rows = modular_rows(topology, geometry, fresh, states, rng)
-        residues = dependencies(_shared_rows(new_rows, sharing), order, fresh)[1]
-        if extra:
+        rows = regressor.rows(fresh, regressor.states)
+        residues = dependencies(rows, regressor.order, fresh)[1]
+        if elimination.extra:
             coefficients = "floating point"
-            given = fitted_shares(robot, sharing, kept, dropped, seed)
+            verified = fitted_shares(
+                regressor.robot, regressor.sharing, base_columns, elimination.dropped, seed
+            )
         else:
             coefficients = "algebraic"
-            given = symbolic_shares(columns, sorted(kept), mass_transfers, [], exact_values)
-    rows = _shared_rows(modular_rows(topology, geometry, fresh, _MODULAR_CHECKS, rng), sharing)
-    vectors = [{-1: _modular(transfer, geometry, columns, fresh)} for transfer in mass_transfers]
+            verified = regressor.symbolic_shares(base_columns)
+    rows = regressor.rows(fresh, _MODULAR_CHECKS)
+    vectors = [{-1: vector} for vector in regressor.mass_vectors(fresh)]
     assert all(_annihilate(each, rows, fresh) for each in (residues, *vectors))
+    return _Verified(verified, coefficients, rational_checks)
 
-    degree = degree_bound(topology)
+
+def _certificate(
+    regressor: _ExactRegressor,
+    elimination: _Elimination,
+    verified: _Verified,
+    fresh: int,
+    seed: int,
+) -> ExactCertificate:
+    """Return what was computed and checked, with the probability that a false vector passes."""
+    robot, geometry = regressor.robot, regressor.geometry
+    degree = degree_bound(bare(robot))
     # A pose is drawn among the 1 in 2^n whose n radicands are squares, and the 2^n choices of their
     # roots multiply the degree.
-    odds = min(1.0, degree * 4.0 ** roots(topology) / fresh) ** _MODULAR_CHECKS
+    odds = min(1.0, degree * 4.0 ** roots(bare(robot)) / fresh) ** _MODULAR_CHECKS
     numerical = None
     if geometry.approximated or geometry.recognised or geometry.nearly:
         with suppress(ModelError):  # no states are found
-            numerical = numerical_rank(robot, sharing, seed)
-    certificate = ExactCertificate(
+            numerical = numerical_rank(robot, regressor.sharing, seed)
+    return ExactCertificate(
         method="exact",
-        rank=len(kept),
-        columns=len(order),
-        primes=tuple(found),
-        states=states,
-        null_vectors=len(dropped),
-        rational_configurations=rational_checks,
+        rank=len(elimination.base_columns),
+        columns=len(regressor.order),
+        primes=elimination.primes,
+        states=regressor.states,
+        null_vectors=len(elimination.dropped),
+        rational_configurations=verified.rational_configurations,
         modular_configurations=_MODULAR_CHECKS,
         degree=degree,
-        false_acceptance=len(dropped) * odds,
-        transfers=len(mass_transfers),
-        unexplained=tuple(columns[column].name for column in extra),
-        coefficients=coefficients,
+        false_acceptance=len(elimination.dropped) * odds,
+        transfers=len(regressor.transfers),
+        unexplained=tuple(regressor.columns[column].name for column in elimination.extra),
+        coefficients=verified.coefficients,
         recognised=geometry.recognised,
         approximated=geometry.approximated,
         lost=geometry.lost,
         nearly=geometry.nearly,
         numerical=numerical,
     )
-    return Grouping(tuple(sorted(kept)), given, certificate)
 
 
 def _without_dynamics(robot: Manipulator) -> SingularPose:
@@ -211,8 +304,8 @@ def _unexplained(
         shares = {k: -share % prime for k, share in relations[column].items()}
         vectors.append({**shares, column: 1})
     rows = [[vector.get(j, 0) for vector in vectors] for j in range(columns)]
-    kept, _ = dependencies(rows, range(len(vectors)), prime)
-    return [dropped[i - len(by_mass)] for i in kept if i >= len(by_mass)]
+    independent, _ = dependencies(rows, range(len(vectors)), prime)
+    return [dropped[i - len(by_mass)] for i in independent if i >= len(by_mass)]
 
 
 def primes_of(geometry: ExactGeometry, rng: random.Random) -> Iterator[int]:
@@ -231,22 +324,22 @@ def _shared_rows(rows: Sequence[Sequence[Number]], sharing: Array) -> list[list[
 
 
 def _lifted(
-    found: dict[int, tuple[list[int], Relations]],
+    eliminations: dict[int, tuple[list[int], Relations]],
 ) -> dict[int, dict[int, Fraction]] | None:
     """Return the shares as fractions, if all primes but the last give what the last confirms."""
-    primes = list(found)
+    primes = list(eliminations)
     *earlier, last = primes
     lifted: dict[int, dict[int, Fraction]] = {}
     field = PrimeField(last)
-    for column in found[last][1]:
-        terms = {k for prime in primes for k in found[prime][1][column]}
+    for column in eliminations[last][1]:
+        terms = {k for prime in primes for k in eliminations[prime][1][column]}
         lifted[column] = {}
         for k in sorted(terms):
-            residues = [found[prime][1][column].get(k, 0) for prime in earlier]
+            residues = [eliminations[prime][1][column].get(k, 0) for prime in earlier]
             share = reconstruct(*remainder(residues, earlier))
             if share is None or share.denominator % last == 0:
                 return None
-            if field.number(share) != found[last][1][column].get(k, 0):
+            if field.number(share) != eliminations[last][1][column].get(k, 0):
                 return None
             if share:
                 lifted[column][k] = share
@@ -265,8 +358,8 @@ def _annihilate(
     """
     for row in rows:
         for column, terms in relations.items():
-            whole = row[column] if column >= 0 else 0
-            misfit = whole - sum(share * row[k] for k, share in terms.items())
+            total = row[column] if column >= 0 else 0
+            misfit = total - sum(share * row[k] for k, share in terms.items())
             if (misfit if prime is None else misfit % prime) != 0:
                 return False
     return True

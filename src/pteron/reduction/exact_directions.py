@@ -54,19 +54,19 @@ class Notes:
             self._recognised(name, value, exact)
         return exact
 
-    def direction(self, name: str, given: Array) -> ExactVector:
+    def direction(self, name: str, vector: Array) -> ExactVector:
         """Return a unit vector in exact numbers, of unit length exactly."""
-        simple = [direction_cosine(float(c)) for c in given]
+        simple = [direction_cosine(float(c)) for c in vector]
         known = [c for c in simple if c is not None]
         if len(known) == 3 and sum(c.square for c in known) == 1:
-            for axis, value, exact in zip("xyz", given, known, strict=True):
+            for axis, value, exact in zip("xyz", vector, known, strict=True):
                 if exact.s != 1 or abs(float(exact) - float(value)) > _NOISE:
                     self._recognised(f"{name}.{axis}", float(value), exact)
             return (known[0], known[1], known[2])
-        vector = rational_unit(given)
-        for axis, value, exact in zip("xyz", given, vector, strict=True):
+        unit = rational_unit(vector)
+        for axis, value, exact in zip("xyz", vector, unit, strict=True):
             self._approximated(f"{name}.{axis}", float(value), exact)
-        return vector
+        return unit
 
     def planar(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
         """Return a vector in the platform's plane; its exact length is kept where it is simple."""
@@ -82,8 +82,8 @@ class Notes:
 
     def _recognised(self, name: str, value: float, exact: Surd) -> None:
         error = abs(float(exact) - value)
-        told = f"off by {error:.0e}" if error else "to the last digit"
-        self.recognised.append(f"{name} = {exact} ({told})")
+        difference = f"off by {error:.0e}" if error else "to the last digit"
+        self.recognised.append(f"{name} = {exact} ({difference})")
 
     def _approximated(self, name: str, value: float, exact: Surd) -> None:
         error = abs(float(exact) - value)
@@ -91,15 +91,15 @@ class Notes:
             self.approximated.append(f"{name} (off by {error:.0e})")
 
 
-def exact_directions(given: dict[str, Array], notes: Notes) -> dict[str, ExactVector]:
+def exact_directions(vectors: dict[str, Array], notes: Notes) -> dict[str, ExactVector]:
     """Return unit vectors in exact numbers; one parallel to another becomes plus or minus it."""
     exact: dict[str, ExactVector] = {}
-    for name, vector in given.items():
-        for earlier, kept in exact.items():
-            if np.linalg.norm(np.cross(vector, given[earlier])) < PARALLEL:
-                sense = Fraction(round(float(vector @ given[earlier])))
-                exact[name] = times(kept, sense)
-                error = float(np.linalg.norm(vector - float(sense) * given[earlier]))
+    for name, vector in vectors.items():
+        for earlier, parallel in exact.items():
+            if np.linalg.norm(np.cross(vector, vectors[earlier])) < PARALLEL:
+                sense = Fraction(round(float(vector @ vectors[earlier])))
+                exact[name] = times(parallel, sense)
+                error = float(np.linalg.norm(vector - float(sense) * vectors[earlier]))
                 if error > _NOISE:
                     notes.recognised.append(f"{name} parallel to {earlier} (off by {error:.0e})")
                 break
@@ -114,17 +114,17 @@ def times(vector: ExactVector, factor: Fraction) -> ExactVector:
     return x.times(factor), y.times(factor), z.times(factor)
 
 
-def rational_unit(given: Array) -> ExactVector:
+def rational_unit(vector: Array) -> ExactVector:
     """Return a rational unit vector near one given; components that are zero stay zero.
 
     It is projected from the pole opposite to its largest component, rounded, and projected back.
     """
-    pole = int(np.argmax(np.abs(given)))
-    sign = Fraction(1 if given[pole] > 0 else -1)
+    pole = int(np.argmax(np.abs(vector)))
+    sign = Fraction(1 if vector[pole] > 0 else -1)
     others = [i for i in range(3) if i != pole]
     plane: list[Fraction] = []
     for i in others:
-        t = float(given[i]) / (1.0 + abs(float(given[pole])))
+        t = float(vector[i]) / (1.0 + abs(float(vector[pole])))
         plane.append(Fraction(0) if abs(t) < PARALLEL else Fraction(t).limit_denominator(FINE))
     square: Fraction = sum((t * t for t in plane), Fraction(0))
     result = [Fraction(0)] * 3
@@ -134,26 +134,26 @@ def rational_unit(given: Array) -> ExactVector:
     return (Surd(result[0]), Surd(result[1]), Surd(result[2]))
 
 
-def lost_right_angles(given: dict[str, Array], exact: dict[str, ExactVector]) -> list[str]:
+def lost_right_angles(vectors: dict[str, Array], exact: dict[str, ExactVector]) -> list[str]:
     """Return in words the right angles between directions that their exact numbers lost."""
     return [
         f"{a} at a right angle to {b}"
-        for (a, u), (b, v) in combinations(given.items(), 2)
+        for (a, u), (b, v) in combinations(vectors.items(), 2)
         if abs(float(u @ v)) < PARALLEL and not _perpendicular(exact[a], exact[b])
     ]
 
 
-def near_relations(given: dict[str, Array]) -> list[str]:
+def near_relations(vectors: dict[str, Array]) -> list[str]:
     """Return in words the pairs of directions that are nearly parallel or at right angles."""
-    found = []
-    for (a, u), (b, v) in combinations(given.items(), 2):
+    relations = []
+    for (a, u), (b, v) in combinations(vectors.items(), 2):
         for relation, angle in (
             ("at a right angle", abs(float(u @ v))),
             ("parallel", float(np.linalg.norm(np.cross(u, v)))),
         ):
             if PARALLEL <= angle < _NEARLY:
-                found.append(f"{a} and {b} are not {relation}, by {angle:.0e} rad")
-    return found
+                relations.append(f"{a} and {b} are not {relation}, by {angle:.0e} rad")
+    return relations
 
 
 def _perpendicular(a: ExactVector, b: ExactVector) -> bool:

@@ -70,15 +70,15 @@ class ExactLeg:
     def within(self, field: Field[Element]) -> dict[str, list[Element]]:
         """Return the quantities and the platform point in a field, by name."""
         d = [c.within(field) for c in self.direction]
-        found = {}
+        elements = {}
         for name, value in self.values.items():
             if value:
-                found[name] = [number.within(field) for number in value]
+                elements[name] = [number.within(field) for number in value]
             else:
                 program = _plane_axis(*pole([float(c) for c in self.direction]))
-                found[name] = evaluate(program, field, [d])[0]
+                elements[name] = evaluate(program, field, [d])[0]
         points = {"platform_point": self.platform_point, "fixed_offset": (ZERO, ZERO, ZERO)}
-        return found | {k: [number.within(field) for number in v] for k, v in points.items()}
+        return elements | {k: [number.within(field) for number in v] for k, v in points.items()}
 
 
 @dataclass(frozen=True)
@@ -145,8 +145,8 @@ class ExactGeometry:
             for values in leg.within(field).values()
             for number in values
         ]
-        rest = (*self.axes, *self.platform.values(), self.gravity)
-        return numbers + [number.within(field) for vector in rest for number in vector]
+        vectors = (*self.axes, *self.platform.values(), self.gravity)
+        return numbers + [number.within(field) for vector in vectors for number in vector]
 
 
 @lru_cache(maxsize=6)
@@ -180,14 +180,16 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
         for name, vector in unit.items()
         if not any(n[1:] == name[1:] and n < name and (unit[n] == vector).all() for n in unit)
     }
-    own: dict[str, tuple[Surd, ...]] = {"center": (ZERO,) * 3}
-    own |= {n: (Surd(Fraction(v[0])),) for n, v in platform.quantities.items() if len(v) == 1}
+    platform_values: dict[str, tuple[Surd, ...]] = {"center": (ZERO,) * 3}
+    platform_values |= {
+        n: (Surd(Fraction(v[0])),) for n, v in platform.quantities.items() if len(v) == 1
+    }
     # The whole machine but its platform's frame turns with a joint that has axes of its own.
     axes = _rational_rotation(frame) if "second_axis" in platform.quantities else UNIT
-    quantities = {name: (own | exact)[name] for name in platform.quantities}
+    quantities = {name: (platform_values | exact)[name] for name in platform.quantities}
     missed = lost_right_angles(distinct, exact), near_relations(distinct)
-    told = map(tuple[str, ...], (notes.recognised, notes.approximated, *missed))
-    return ExactGeometry(legs, gravity, quantities, axes, platform.tilts, frame, *told)
+    remarks = map(tuple[str, ...], (notes.recognised, notes.approximated, *missed))
+    return ExactGeometry(legs, gravity, quantities, axes, platform.tilts, frame, *remarks)
 
 
 def _exact_leg(
@@ -214,8 +216,8 @@ def _exact_leg(
             if robot.platform.planes and abs(at @ frame @ leg.plane_normal) < PARALLEL:
                 # Planes of legs that meet in one line do so exactly.
                 x, y, _ = exact[f"d{i + 1}"]
-                along = _fraction(float(at[1] * float(x) - at[0] * float(y))).q
-                values[q.name] = y.times(-along), x.times(along), values[q.name][2]
+                distance = _fraction(float(at[1] * float(x) - at[0] * float(y))).q
+                values[q.name] = y.times(-distance), x.times(distance), values[q.name][2]
         elif q.role == "direction":
             directions.append(exact[f"{q.symbol}{i + 1}"])
             values[q.name] = directions[-1]
@@ -278,5 +280,5 @@ def _rational_rotation(frame: Array) -> tuple[ExactVector, ...]:
 
 def _simplicity(frame: Array, vectors: list[Array]) -> int:
     """Return a score of simple components: 3 for a zero, 2 for a rational, 1 for a root."""
-    found = (direction_cosine(float(c)) for vector in vectors for c in frame @ vector)
-    return sum(3 if c.q == 0 else 2 if c.s == 1 else 1 for c in found if c is not None)
+    components = (direction_cosine(float(c)) for vector in vectors for c in frame @ vector)
+    return sum(3 if c.q == 0 else 2 if c.s == 1 else 1 for c in components if c is not None)

@@ -82,8 +82,8 @@ def rational_rows(
         placed = list(vector)
         for i, (leg, at) in enumerate(zip(topology.legs, places, strict=False)):
             sizes = {q.name: len(q.value) for q in leg.quantities}
-            own = {name: vector[at[name] : at[name] + size] for name, size in sizes.items()}
-            closed = leg.closing(own, rng)
+            leg_values = {name: vector[at[name] : at[name] + size] for name, size in sizes.items()}
+            closed = leg.closing(leg_values, rng)
             if closed is None:
                 return []
             w, sigma = closed
@@ -134,14 +134,14 @@ class _DegreeField:
         self.degrees: list[int] = []
         self.names: dict[Any, int] = {}
 
-    def of(self, numerator: int, powers: dict[int, int], *told: Any) -> _Degree:
+    def of(self, numerator: int, powers: dict[int, int], *operation: Any) -> _Degree:
         """Return a value that is computed by the operation and operands `told`."""
-        return _Degree(numerator, powers, self.names.setdefault(told, len(self.names)))
+        return _Degree(numerator, powers, self.names.setdefault(operation, len(self.names)))
 
     def over(self, powers: Mapping[int, int], a: _Degree) -> int:
         """Return the degree of a value's numerator over a multiple of its denominator."""
-        more = (n - a.powers.get(k, 0) for k, n in powers.items())
-        pairs = zip(powers, more, strict=True)
+        missing = (n - a.powers.get(k, 0) for k, n in powers.items())
+        pairs = zip(powers, missing, strict=True)
         return a.numerator + sum(self.degrees[k] * n for k, n in pairs)
 
     def number(self, value: Fraction | int) -> _Degree:
@@ -152,8 +152,8 @@ class _DegreeField:
 
     def add(self, a: _Degree, b: _Degree) -> _Degree:
         powers = common_powers((a, b))
-        found = max(self.over(powers, a), self.over(powers, b))
-        return self.of(found, powers, "add", a.name, b.name)
+        degree = max(self.over(powers, a), self.over(powers, b))
+        return self.of(degree, powers, "add", a.name, b.name)
 
     def subtract(self, a: _Degree, b: _Degree) -> _Degree:
         return self.add(a, b)._replace(name=self.of(0, {}, "subtract", a.name, b.name).name)
@@ -167,9 +167,9 @@ class _DegreeField:
         self.degrees += [0] * (inverse + 1 - len(self.degrees))
         self.degrees[inverse] = b.numerator
         powers = {k: n - b.powers.get(k, 0) for k, n in a.powers.items()}
-        left = {k: n for k, n in b.powers.items() if n > a.powers.get(k, 0)}
+        surplus = {k: n for k, n in b.powers.items() if n > a.powers.get(k, 0)}
         numerator = a.numerator + sum(
-            self.degrees[k] * (n - a.powers.get(k, 0)) for k, n in left.items()
+            self.degrees[k] * (n - a.powers.get(k, 0)) for k, n in surplus.items()
         )
         powers = {k: n for k, n in powers.items() if n > 0}
         powers[inverse] = powers.get(inverse, 0) + 1
@@ -183,11 +183,11 @@ class _DegreeField:
 
 def common_powers(values: Iterable[_Degree]) -> dict[int, int]:
     """Return the least common denominator of some values, as powers of divisors."""
-    found: dict[int, int] = {}
+    powers: dict[int, int] = {}
     for value in values:
         for k, n in value.powers.items():
-            found[k] = max(n, found.get(k, 0))
-    return found
+            powers[k] = max(n, powers.get(k, 0))
+    return powers
 
 
 @lru_cache(maxsize=8)

@@ -28,10 +28,10 @@ _FACTORED = 60
 """Operations up to which a share is factored, to be read; longer ones only cost minutes."""
 
 
-def terms_of(kept: int, given: Shares) -> dict[int, Share]:
+def terms_of(column: int, shares: Shares) -> dict[int, Share]:
     """Return the terms of a kept column's base parameter, columns with shares, itself first."""
-    own: dict[int, Share] = {kept: Fraction(1)}
-    return own | {j: given[j][kept] for j in sorted(given) if given[j].get(kept, 0) != 0}
+    terms: dict[int, Share] = {column: Fraction(1)}
+    return terms | {j: shares[j][column] for j in sorted(shares) if shares[j].get(column, 0) != 0}
 
 
 def as_text(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:

@@ -135,9 +135,9 @@ def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int
     names = [column.name for column in columns]
     unknown = [name for name in keep if name not in names]
     if isinstance(keep, str) or unknown:
-        given = keep if isinstance(keep, str) else unknown[0]
+        wrong = keep if isinstance(keep, str) else unknown[0]
         raise ModelError(
-            f"keep: {given!r} is no list of parameter names; they are {', '.join(names)}"
+            f"keep: {wrong!r} is no list of parameter names; they are {', '.join(names)}"
         )
     first = [names.index(name) for name in dict.fromkeys(keep)]
     return first + [column for column in default if column not in first]  # Section 5 (b)

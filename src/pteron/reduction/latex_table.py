@@ -42,12 +42,12 @@ def latex_table(
         Significant digits of the values.
     """
     rows = [
-        rf"    {i} & ${_broken(one, plain)}$ & ${_number(value, digits)}$ & {_unit(unit)} \\"
-        for i, (one, plain, value, unit) in enumerate(
+        rf"    {i} & ${_broken(text, plain)}$ & ${_number(value, digits)}$ & {_unit(unit)} \\"
+        for i, (text, plain, value, unit) in enumerate(
             zip(sums, printed, values, units, strict=True), start=1
         )
     ]
-    fractions = any(r"\frac" in one for one in sums)
+    fractions = any(r"\frac" in text for text in sums)
     lines = [
         *(_NEEDS, r"\begin{table}", r"  \centering"),
         *([r"  \renewcommand{\arraystretch}{1.4}"] if fractions else []),
@@ -85,13 +85,13 @@ def _width(printed: str) -> int:
 
 def _terms(text: str) -> list[str]:
     """Return the terms of a sum with their signs; what is in brackets belongs to its term."""
-    found, depth = [""], 0
+    terms, depth = [""], 0
     for k, letter in enumerate(text):
         depth += (letter in "({") - (letter in ")}")
         if not depth and letter in "+-" and text[k - 1 : k + 2] == f" {letter} ":
-            found.append("")
-        found[-1] += letter
-    return found
+            terms.append("")
+        terms[-1] += letter
+    return terms
 
 
 def _number(value: float, digits: int) -> str:

@@ -56,21 +56,25 @@ def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed:
     rank = int((values > _TOLERANCE * values[0]).sum())
     null = vectors[rank:].T
     dropped = independent(null.T, list(reversed(order)), len(order) - rank)[0]
-    kept = sorted(set(order) - set(dropped))
-    shares = -np.linalg.solve(null[dropped].T, null[kept].T).T if dropped else np.empty((rank, 0))
+    base_columns = sorted(set(order) - set(dropped))
+    shares = (
+        -np.linalg.solve(null[dropped].T, null[base_columns].T).T
+        if dropped
+        else np.empty((rank, 0))
+    )
     gap = values[rank - 1] / values[0], np.max(values[rank:], initial=0.0) / values[0]
-    return _grouping("svd", kept, dropped, shares, scaled, gap)
+    return _grouping("svd", base_columns, dropped, shares, scaled, gap)
 
 
 def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
     """Return the grouping from a QR decomposition with the columns in the order of preference."""
     scaled = _scaled_regressor(robot, sharing, seed)
-    kept, norms = independent(scaled.matrix, order)
-    kept = sorted(kept)
-    dropped = [column for column in order if column not in kept]
-    shares = _least_squares(scaled, kept, dropped)
-    gap = min(norms[k] for k in kept), max((norms[k] for k in dropped), default=0.0)
-    return _grouping("qr", kept, dropped, shares, scaled, gap)
+    base_columns, norms = independent(scaled.matrix, order)
+    base_columns = sorted(base_columns)
+    dropped = [column for column in order if column not in base_columns]
+    shares = _least_squares(scaled, base_columns, dropped)
+    gap = min(norms[k] for k in base_columns), max((norms[k] for k in dropped), default=0.0)
+    return _grouping("qr", base_columns, dropped, shares, scaled, gap)
 
 
 def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRank:
@@ -78,21 +82,25 @@ def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRa
     scaled = _scaled_regressor(robot, sharing, seed)
     values = np.linalg.svd(scaled.matrix, compute_uv=False)
     relative = values / values[0]
-    kept = relative > _TOLERANCE
-    dropped = float(relative[~kept].max(initial=scaled.dropped))
-    return NumericalRank(int(kept.sum()), float(relative[kept][-1]), dropped)
+    is_significant = relative > _TOLERANCE
+    dropped = float(relative[~is_significant].max(initial=scaled.dropped))
+    return NumericalRank(int(is_significant.sum()), float(relative[is_significant][-1]), dropped)
 
 
 def fitted_shares(
-    robot: Manipulator, sharing: Array, kept: list[int], dropped: list[int], seed: int
+    robot: Manipulator, sharing: Array, base_columns: list[int], dropped: list[int], seed: int
 ) -> Shares:
     """Return the shares of columns known to depend on the kept ones, by least squares."""
     scaled = _scaled_regressor(robot, sharing, seed)
-    return _given(kept, dropped, _least_squares(scaled, kept, dropped), scaled)
+    return _unscaled_shares(
+        base_columns, dropped, _least_squares(scaled, base_columns, dropped), scaled
+    )
 
 
-def _least_squares(scaled: _Scaled, kept: list[int], dropped: list[int]) -> Array:
-    shares = np.linalg.lstsq(scaled.matrix[:, kept], scaled.matrix[:, dropped], rcond=None)[0]
+def _least_squares(scaled: _Scaled, base_columns: list[int], dropped: list[int]) -> Array:
+    shares = np.linalg.lstsq(scaled.matrix[:, base_columns], scaled.matrix[:, dropped], rcond=None)[
+        0
+    ]
     return np.asarray(shares, dtype=float)
 
 
@@ -158,24 +166,29 @@ def independent(
     taken: list[int] = []
     norms: dict[int, float] = {}
     for column in order:
-        rest = matrix[:, column]
+        remainder = matrix[:, column]
         for _ in range(2):
-            rest = rest - basis @ (basis.T @ rest)
-        norms[column] = float(np.linalg.norm(rest))
+            remainder = remainder - basis @ (basis.T @ remainder)
+        norms[column] = float(np.linalg.norm(remainder))
         if norms[column] > least and len(taken) != most:
             taken.append(column)
-            basis = np.column_stack([basis, rest / norms[column]])
+            basis = np.column_stack([basis, remainder / norms[column]])
     return taken, norms
 
 
 def _grouping(
-    method: str, kept: list[int], dropped: list[int], shares: Array, scaled: _Scaled, gap: _Gap
+    method: str,
+    base_columns: list[int],
+    dropped: list[int],
+    shares: Array,
+    scaled: _Scaled,
+    gap: _Gap,
 ) -> Grouping:
     """Assemble the grouping."""
-    misfit = scaled.matrix[:, dropped] - scaled.matrix[:, kept] @ shares
+    misfit = scaled.matrix[:, dropped] - scaled.matrix[:, base_columns] @ shares
     certificate = NumericalCertificate(
         method=method,
-        rank=len(kept),
+        rank=len(base_columns),
         columns=scaled.matrix.shape[1],
         states=scaled.states,
         tolerance=_TOLERANCE,
@@ -183,16 +196,20 @@ def _grouping(
         largest_dropped=max(float(gap[1]), scaled.dropped),
         residual=float(np.abs(misfit).max(initial=0.0)),
     )
-    return Grouping(tuple(kept), _given(kept, dropped, shares, scaled), certificate)
+    return Grouping(
+        tuple(base_columns), _unscaled_shares(base_columns, dropped, shares, scaled), certificate
+    )
 
 
-def _given(kept: list[int], dropped: list[int], shares: Array, scaled: _Scaled) -> Shares:
+def _unscaled_shares(
+    base_columns: list[int], dropped: list[int], shares: Array, scaled: _Scaled
+) -> Shares:
     """Undo the scaling of the columns; shares that are rounding only are left out."""
     scale = scaled.lengths
     return {
         column: {
             k: float(shares[i, j] * scale[column] / scale[k])
-            for i, k in enumerate(kept)
+            for i, k in enumerate(base_columns)
             if abs(shares[i, j]) > _TOLERANCE and np.isfinite(scale[column])
         }
         for j, column in enumerate(dropped)

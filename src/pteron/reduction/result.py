@@ -184,12 +184,12 @@ class BaseParameters:
     @property
     def shared_symbols(self) -> dict[str, tuple[str, ...]]:
         """The geometric symbols that stand for several values, equal but for their sign."""
-        found: dict[str, tuple[str, ...]] = {}
+        bearers: dict[str, tuple[str, ...]] = {}
         for name, value in self._named.items():
             bearer = str(value).lstrip("-")
             if bearer not in (name, "0"):
-                found[bearer] = (*found.get(bearer, ()), name)
-        return found
+                bearers[bearer] = (*bearers.get(bearer, ()), name)
+        return bearers
 
     def expressions(
         self, form: Form = "text", *, symbols: Symbols = False, digits: int = 4

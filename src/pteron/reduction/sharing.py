@@ -60,8 +60,8 @@ def share(
 
 def default_order(columns: Sequence[Parameter]) -> list[int]:
     """Return the numbers of the columns in order of preference: the first are kept first."""
-    given = {(parameter.kind, parameter.body) for parameter in columns}
-    preference = PREFERENCE if given <= set(PREFERENCE) else TILTING_PREFERENCE
+    kinds = {(parameter.kind, parameter.body) for parameter in columns}
+    preference = PREFERENCE if kinds <= set(PREFERENCE) else TILTING_PREFERENCE
 
     def rank(column: int) -> tuple[int, int]:
         parameter = columns[column]

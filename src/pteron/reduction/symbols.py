@@ -27,8 +27,8 @@ def named_values(geometry: ExactGeometry, *, shared: bool = True) -> dict[str, A
         if value.q == 0:
             named[name] = Integer(0)
             continue
-        bearer, held = first.setdefault(value.square if shared else name, (name, value))
-        sign = 1 if (held.q > 0) == (value.q > 0) else -1
+        bearer, first_value = first.setdefault(value.square if shared else name, (name, value))
+        sign = 1 if (first_value.q > 0) == (value.q > 0) else -1
         named[name] = sign * Symbol(bearer)
     return named
 
@@ -40,8 +40,8 @@ def algebraic_values(geometry: ExactGeometry) -> dict[str, Any]:
 
 def symbolic_shares(
     columns: Sequence[Parameter],
-    kept: Sequence[int],
-    found: Sequence[Transfer],
+    base_columns: Sequence[int],
+    mass_transfers: Sequence[Transfer],
     extra: Sequence[Mapping[int, Any]],
     symbols: Mapping[str, Any],
 ) -> dict[int, dict[int, Any]]:
@@ -60,11 +60,11 @@ def symbolic_shares(
     symbols : mapping
         What is put for the geometry: SymPy symbols, or exact numbers.
     """
-    dropped = [j for j in range(len(columns)) if j not in kept]
-    order = [*dropped, *kept]
+    dropped = [j for j in range(len(columns)) if j not in base_columns]
+    order = [*dropped, *base_columns]
     vectors: list[Mapping[int, Any]] = [
         {columns.index(column): entry for column, entry in transfer.evaluate(symbols).items()}
-        for transfer in found
+        for transfer in mass_transfers
     ]
     rows = [[sympify(vector.get(j, 0)) for j in order] for vector in (*vectors, *extra)]
     matrix = DomainMatrix.from_list_sympy(len(rows), len(order), rows, extension=True).to_field()
@@ -75,7 +75,7 @@ def symbolic_shares(
     return {
         j: {
             k: -solved[row, len(dropped) + place]
-            for place, k in enumerate(kept)
+            for place, k in enumerate(base_columns)
             if solved[row, len(dropped) + place] != 0
         }
         for row, j in enumerate(dropped)

@@ -41,39 +41,39 @@ class Transfer:
 
 def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer]:
     """Return the transfers of a machine, for columns that legs may share in groups."""
-    found: list[Transfer] = []
+    grouped: list[Transfer] = []
     for group in dict.fromkeys(p.legs for p in columns if p.legs):
         place = {(p.kind, p.body): p for p in columns if p.legs == group}
         suffix = next(iter(place.values())).suffix
         legs = [robot.legs[leg - 1] for leg in group]
-        own = [leg.transfers(robot.gravity) for leg in legs]
-        for transfer in own[0]:
+        leg_transfers = [leg.transfers(robot.gravity) for leg in legs]
+        for transfer in leg_transfers[0]:
             # What legs share must hold for each of them, with the same lengths.
             symbols = {s for _, names in transfer.entries.values() for s in names}
             sizes = {tuple(q.value for q in leg.quantities if q.symbol in symbols) for leg in legs}
-            if len(sizes) == 1 and all(transfer in others for others in own):
+            if len(sizes) == 1 and all(transfer in others for others in leg_transfers):
                 entries = {
                     place[key]: Mul(factor, *(Symbol(f"{s}{group[0]}") for s in names))
                     for key, (factor, names) in transfer.entries.items()
                 }
-                found.append(Transfer(transfer.reason.format(suffix), entries))
+                grouped.append(Transfer(transfer.reason.format(suffix), entries))
         platform = {p.kind: p for p in columns if p.body == PLATFORM}
         for letter in legs[0].equations_class.rides:
             mass = place["m", letter]
             shares: dict[Parameter, Any] = {mass: Integer(1)}
             for leg in group:
-                given = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
-                point = [Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in given]
+                coordinates = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
+                point = [Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in coordinates]
                 for kind, share in robot.platform.inertia.shares_of_point(*point).items():
                     shares[platform[kind]] = shares.get(platform[kind], Integer(0)) - share
             name = f"{legs[0].names[letter]}{mass.suffix}"
-            found.append(Transfer(f"{name} and platform carry the platform point", shares))
+            grouped.append(Transfer(f"{name} and platform carry the platform point", shares))
     if robot.platform.center is not None:
-        found.append(
+        grouped.append(
             Transfer("the platform turns about a fixed point", {platform["m"]: Integer(1)})
         )
     if not robot.platform.angles:
         reason = "the platform does not turn"
         turning = (p for p in columns if p.body == PLATFORM and p.kind != "m")
-        found += [Transfer(reason, {p: Integer(1)}) for p in turning]
-    return found
+        grouped += [Transfer(reason, {p: Integer(1)}) for p in turning]
+    return grouped

@@ -209,14 +209,14 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
 
 def _slices(robot: Manipulator, home: Array, volume: ReachVolume | None) -> tuple[ReachSlice, ...]:
     """Return the slices through home; those over two lengths are of one width, to be compared."""
-    found = []
+    slices = []
     for plane in slice_planes(robot):
         extent = None
         if volume is not None and set(plane) <= set(robot.platform.lengths):
             half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
             extent = _extent(volume.box, plane, [half] * 3)
-        found.append(reach_slice(robot, home, plane, extent=extent))
-    return tuple(found)
+        slices.append(reach_slice(robot, home, plane, extent=extent))
+    return tuple(slices)
 
 
 def _tilt(robot: Manipulator, home: Array) -> float | None:
@@ -249,9 +249,9 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
         plane, box = "xz" if upright else "xy", volume.box
         half = (0.5 + _RIM) * (box[1] - box[0])
         extent = _extent(box, plane, half.tolist())
-        whole = reach_slice(robot, home, plane, extent=extent, points=_FINE)
+        wide_cut = reach_slice(robot, home, plane, extent=extent, points=_FINE)
         # The box holds the whole reach: this plane may reach a small part of it.
-        cut = reach_slice(robot, home, plane, extent=reached(whole), points=_FINE)
+        cut = reach_slice(robot, home, plane, extent=reached(wide_cut), points=_FINE)
     type_i = numeric(robot, "reach")(cut.poses)[1].min(axis=-1)
     type_ii = _type_ii(robot, cut.poses)
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))

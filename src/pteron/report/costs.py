@@ -78,7 +78,7 @@ def fewer(value: float, reference: float, less: str = "fewer") -> str:
     return f"{abs(percent):.0f} % {less if percent >= 0.0 else 'more'}"
 
 
-def dense_operations(base: BaseParameters, kept: Sequence[int]) -> int:
+def dense_operations(base: BaseParameters, base_columns: Sequence[int]) -> int:
     """Return the operations of Eq. (15) for some of its columns, every matrix taken as full.
 
     A product (a, b) (b, c) counts a c (2 b - 1), an elimination with c right sides about
@@ -86,8 +86,10 @@ def dense_operations(base: BaseParameters, kept: Sequence[int]) -> int:
     one of six; the platform's columns need no product.
     """
     m: int = base.robot.freedom
-    of_legs = [parameter for parameter in (base.parameters[k] for k in kept) if parameter.legs]
+    of_legs = [
+        parameter for parameter in (base.parameters[k] for k in base_columns) if parameter.legs
+    ]
     alone = sum(base.robot.legs[p.legs[0] - 1].bodies[p.body].kinds == ("m",) for p in of_legs)
     products = m * alone * (2 * m - 1) + m * (len(of_legs) - alone) * (2 * 6 - 1)
-    elimination = round(2.0 * m * m * m / 3.0) + 2 * m * m * len(kept)
-    return products + elimination + m * (2 * len(kept) - 1)
+    elimination = round(2.0 * m * m * m / 3.0) + 2 * m * m * len(base_columns)
+    return products + elimination + m * (2 * len(base_columns) - 1)

@@ -9,22 +9,22 @@ from pteron.plots import Ability, force_speed_figure, power_figure
 from pteron.report.motion_frames import few
 
 
-def force_speed(found: Sizing) -> Figure:
+def force_speed(sizing: Sizing) -> Figure:
     """Return force over speed of each drive, within what the machine's file says that it can do."""
-    joints = [leg.joint for leg in found.robot.legs]
-    some = few(len(found.time))
+    joints = [leg.joint for leg in sizing.robot.legs]
+    some = few(len(sizing.time))
     return force_speed_figure(
-        found.speeds[some],
-        found.forces[some],
+        sizing.speeds[some],
+        sizing.forces[some],
         units=[(f"{joint.unit}/s", joint.force_unit) for joint in joints],
         abilities=[
-            Ability(drive.max_speed, drive.max_force, drive.rated_force) for drive in found.drives
+            Ability(drive.max_speed, drive.max_force, drive.rated_force) for drive in sizing.drives
         ],
-        rms=(found.rms_speeds, found.rms_forces),
+        rms=(sizing.rms_speeds, sizing.rms_forces),
     )
 
 
-def power(found: Sizing) -> Figure:
+def power(sizing: Sizing) -> Figure:
     """Return the power of each drive over time, and their sum."""
-    some = few(len(found.time))
-    return power_figure(found.time[some], found.power[some])
+    some = few(len(sizing.time))
+    return power_figure(sizing.time[some], sizing.power[some])

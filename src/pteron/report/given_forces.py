@@ -14,31 +14,31 @@ _CLEAR = 0.1
 of a good drive and no smoothing of a log is as large, while a payload is."""
 
 
-def force_doubts(robot: Manipulator, given: Playback) -> tuple[str, ...]:
+def force_doubts(robot: Manipulator, playback: Playback) -> tuple[str, ...]:
     """Return a warning where the forces in a motion's file are clearly those of another load.
 
     A report shows the forces that the machine needs. The reader of a file that was made with a
     payload would otherwise take them for the file's.
     """
-    motion, loaded = given.motion, ""
-    if given.payload:
-        loaded = f"its column payload has up to {given.payload:g} kg"
-    if given.forces is None:
-        return (f"{given.source}: {loaded}: is that in the machine?",) if loaded else ()
+    motion, loaded = playback.motion, ""
+    if playback.payload:
+        loaded = f"its column payload has up to {playback.payload:g} kg"
+    if playback.forces is None:
+        return (f"{playback.source}: {loaded}: is that in the machine?",) if loaded else ()
     path = motion.pose, motion.velocity, motion.acceleration
     needed = np.asarray(drive_forces(robot, *path, smooth=True))
-    differences = _rms(given.forces - needed)
+    differences = _rms(playback.forces - needed)
     leg = int(differences.argmax())
     # The largest force of all legs is the measure: a leg that bears nothing has only noise.
-    if differences[leg] <= _CLEAR * max(_rms(needed).max(), _rms(given.forces).max()):
+    if differences[leg] <= _CLEAR * max(_rms(needed).max(), _rms(playback.forces).max()):
         return ()
-    there, here = (np.abs(forces[:, leg]).max() for forces in (given.forces, needed))
+    there, here = (np.abs(forces[:, leg]).max() for forces in (playback.forces, needed))
     unit = robot.legs[leg].joint.force_unit
     why = loaded or "was it made with a payload or a tool?"
     return (
-        f"{given.source or 'the motion'}: its forces are not those that {robot.name} needs for it, "
-        f"which are shown: the peak of leg {leg + 1} is {there:.4g} {unit} there and {here:.4g} "
-        f"{unit} here; {why} (pteron report has --payload and --tool)",
+        f"{playback.source or 'the motion'}: its forces are not those that {robot.name} needs for "
+        f"it, which are shown: the peak of leg {leg + 1} is {there:.4g} {unit} there and "
+        f"{here:.4g} {unit} here; {why} (pteron report has --payload and --tool)",
     )
 
 

@@ -91,26 +91,26 @@ def frames(
     Frames
         Samples of the motion; where it has too few, moments between them, with forces in between.
     """
-    wanted = int(np.clip(np.ceil(_A_SECOND * motion.duration), _FEWEST, _MOST))
-    even = np.linspace(motion.time[0], motion.time[-1], wanted + 1)
+    count = int(np.clip(np.ceil(_A_SECOND * motion.duration), _FEWEST, _MOST))
+    even = np.linspace(motion.time[0], motion.time[-1], count + 1)
     closed = is_closed(motion)
-    if len(motion.time) > wanted:
+    if len(motion.time) > count:
         middles = (motion.time[:-1] + motion.time[1:]) / 2.0
         rows = np.unique(np.searchsorted(middles, even))
         rows = rows[: len(rows) - int(closed)]
-        time, given = motion.time[rows], None if forces is None else forces[rows]
+        time, frame_forces = motion.time[rows], None if forces is None else forces[rows]
         pose, velocity, acceleration = (
             part[rows] for part in (motion.pose, motion.velocity, motion.acceleration)
         )
     else:
         time = even[: len(even) - int(closed)]
-        given = None if forces is None else _between(motion.time, forces, time)
+        frame_forces = None if forces is None else _between(motion.time, forces, time)
         pose, velocity, acceleration = motion.at(time)
-    if given is None:
-        given = drive_forces(robot, pose, velocity, acceleration, smooth=True)
-    held = joint_points(robot, motion.pose[0] if still is None else still)
-    found = time - motion.time[0], pose, joint_points(robot, pose), given
-    return Frames(*found, motion.duration, closed, held, joint_guides(robot, pose))
+    if frame_forces is None:
+        frame_forces = drive_forces(robot, pose, velocity, acceleration, smooth=True)
+    still_points = joint_points(robot, motion.pose[0] if still is None else still)
+    moments = time - motion.time[0], pose, joint_points(robot, pose), frame_forces
+    return Frames(*moments, motion.duration, closed, still_points, joint_guides(robot, pose))
 
 
 def is_closed(motion: Motion) -> bool:

@@ -74,54 +74,56 @@ def shown(robot: Manipulator, recorded: Playback) -> ShownMotion:
 
 def motion_page(robot: Manipulator, recorded: Playback) -> str:
     """Return the page of a motion, as HTML without any reference to another file or address."""
-    found = shown(robot, recorded)
+    motion_shown = shown(robot, recorded)
     joints = [leg.joint for leg in robot.legs]
-    whose, told = _forces_told(found)
+    whose, origin = _forces_told(motion_shown)
     name = f" of {recorded.source}" if recorded.source else ""
     time = recorded.motion.time
     turned = angles_text(robot, recorded.motion.pose[0])
     begins = f"begins ({turned})" if turned else "begins"
-    made = template("motion.html.j2", count=lambda number: f"{number:,}".replace(",", "\u202f"))
-    return made.render(
+    document = template("motion.html.j2", count=lambda number: f"{number:,}".replace(",", "\u202f"))
+    return document.render(
         **stage(
             robot,
-            found.frames,
+            motion_shown.frames,
             doing=f"in the motion{name}",
             still=f"Where the motion {begins}, with its way.",
             picture_title=f"{robot.name} where the motion begins",
             force_title=f"{whose} {force(joints).name}",
         ),
-        found=found,
+        found=motion_shown,
         playback=recorded,
         motion=recorded.motion,
         speed=speed(joints),
         joint=nouns(joints),
-        figures=_figures(found),
-        told=told,
+        figures=_figures(motion_shown),
+        told=origin,
         tooled=any(robot.platform.tool),
         loads={
-            "peak": np.abs(found.forces).max(axis=0),
-            "speed": np.abs(found.rates).max(axis=0),
-            "power": (found.forces * found.rates).sum(axis=1).max(initial=0.0),
-            "rms": np.sqrt(np.trapezoid(found.forces**2, time, axis=0) / recorded.motion.duration),
+            "peak": np.abs(motion_shown.forces).max(axis=0),
+            "speed": np.abs(motion_shown.rates).max(axis=0),
+            "power": (motion_shown.forces * motion_shown.rates).sum(axis=1).max(initial=0.0),
+            "rms": np.sqrt(
+                np.trapezoid(motion_shown.forces**2, time, axis=0) / recorded.motion.duration
+            ),
         },
     )
 
 
-def _forces_told(found: ShownMotion) -> tuple[str, str]:
+def _forces_told(motion_shown: ShownMotion) -> tuple[str, str]:
     """Return the origin of the forces on the page: in a word, and in a clause."""
-    if found.given and found.playback.log:
+    if motion_shown.given and motion_shown.playback.log:
         return "Measured", "as they were measured."
-    if found.given:
+    if motion_shown.given:
         return "Given", "those of the table."
-    if found.driven:
+    if motion_shown.driven:
         return "Drive", "what the drives must give, friction and motors included."
     return "Actuator", "what the bodies take; friction is left out."
 
 
-def _figures(found: ShownMotion) -> dict[str, Figure]:
+def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
     """Return the pictures, by their names in the template."""
-    robot, motion, at = found.robot, found.playback.motion, found.frames
+    robot, motion, at = motion_shown.robot, motion_shown.playback.motion, motion_shown.frames
     machine = robot_figure(
         at.still,
         at.guides,
@@ -133,10 +135,10 @@ def _figures(found: ShownMotion) -> dict[str, Figure]:
     time = motion.time[some] - motion.time[0]
     return {
         "robot": machine,
-        "forces": forces_figure(time, found.forces[some], ylabel=force(joints).axis),
+        "forces": forces_figure(time, motion_shown.forces[some], ylabel=force(joints).axis),
         "joints": _over_time(at.time, at.points.coordinates, coordinate(joints)),
-        "power": power_figure(time, found.forces[some] * found.rates[some]),
-        "rates": _over_time(time, found.rates[some], speed(joints)),
+        "power": power_figure(time, motion_shown.forces[some] * motion_shown.rates[some]),
+        "rates": _over_time(time, motion_shown.rates[some], speed(joints)),
     }
 
 

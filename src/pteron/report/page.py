@@ -47,7 +47,7 @@ def page(report: Report) -> str:
     """Return the page of a report, as HTML without any reference to another file or address."""
     robot = report.robot
     joints, standard = [leg.joint for leg in robot.legs], report.standard
-    made = template(
+    document = template(
         "page.html.j2",
         degrees=lambda angle, places=1: fixed(float(np.degrees(angle)), places),
         lettered=lettered,
@@ -60,7 +60,7 @@ def page(report: Report) -> str:
     point, way = "the tool's centre point" if tooled else "P", "cycle" if standard else "motion"
     turned = angles_text(robot, report.home)
     home = f"home pose ({turned})" if turned else "home pose"
-    return made.render(
+    return document.render(
         **stage(
             robot,
             report.shown,
@@ -102,7 +102,7 @@ def page(report: Report) -> str:
 def lettered(text: str) -> Markup:
     """Return an account of a leg with its vectors bold and its Greek letters Greek."""
     safe = str(escape(text)).replace(" . ", " \u00b7 ").replace(" - ", " \u2212 ")
-    greek = {name: found.symbol for name, found in COORDINATES.items()} | SYMBOLS
+    greek = {name: letters.symbol for name, letters in COORDINATES.items()} | SYMBOLS
     for name, symbol in greek.items():
         safe = safe.replace(name, symbol)
     safe = re.sub(r"(?<![;'])\b([rdekps])\b", r"<b>\1</b>", safe)
@@ -111,10 +111,10 @@ def lettered(text: str) -> Markup:
 
 def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
     """Return one leg of each kind, and the legs of that kind, from 1."""
-    found: dict[str, list[int]] = {}
+    legs_of_kinds: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
-        found.setdefault(leg.type, []).append(i)
-    return [(robot.legs[members[0] - 1], members) for members in found.values()]
+        legs_of_kinds.setdefault(leg.type, []).append(i)
+    return [(robot.legs[members[0] - 1], members) for members in legs_of_kinds.values()]
 
 
 def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
@@ -134,8 +134,10 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
         role, texts = roles[name], []
         for leg in robot.legs:
             # A direction that the file leaves out may be another one's, or none.
-            given = [q.value for q in leg.quantities if q.name == name and q.role == "direction"]
-            value: Any = given[0] if given else getattr(leg, name, None)
+            directions = [
+                q.value for q in leg.quantities if q.name == name and q.role == "direction"
+            ]
+            value: Any = directions[0] if directions else getattr(leg, name, None)
             if value is None:
                 texts.append("\u2013")
             elif role in ("length", "number"):
@@ -153,14 +155,14 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
 
 def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]:
     """Return every body: its name, its leg, from 0, and its mass, centre of mass and moment I."""
-    found: list[tuple[str, int | None, Inertia]] = [
+    inertias: list[tuple[str, int | None, Inertia]] = [
         (leg.names[letter], i, inertia)
         for i, leg in enumerate(robot.legs)
         for letter, inertia in leg.bodies.items()
     ]
     platform = robot.platform
-    found.append(("platform", None, platform.inertia))
-    rows = [(name, i, with_center(inertia)) for name, i, inertia in found]
+    inertias.append(("platform", None, platform.inertia))
+    rows = [(name, i, with_center(inertia)) for name, i, inertia in inertias]
     for bar in platform.bars:
         x, y, _ = bar.hinge
         rows.append(("bar at its hinge", None, {"m": bar.mass, "mgx": x, "mgy": y}))
@@ -173,41 +175,43 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
 
 def _letters(robot: Manipulator) -> list[tuple[str, str]]:
     """Return the letters of the legs' bodies, with the names that they stand for."""
-    found: dict[str, list[str]] = {}
+    names_of_letters: dict[str, list[str]] = {}
     for leg in robot.legs:
         for letter in leg.bodies:
-            found.setdefault(letter, []).append(leg.names[letter])
-    return [(letter, " or ".join(dict.fromkeys(names))) for letter, names in found.items()]
+            names_of_letters.setdefault(letter, []).append(leg.names[letter])
+    return [
+        (letter, " or ".join(dict.fromkeys(names))) for letter, names in names_of_letters.items()
+    ]
 
 
 def _reasons(robot: Manipulator) -> list[str]:
     """Return why parameters group, as the legs and the platform have it."""
-    own = [transfer.reason for leg in robot.legs for transfer in leg.transfers(robot.gravity)]
+    transfers = [transfer.reason for leg in robot.legs for transfer in leg.transfers(robot.gravity)]
     rides = [
         f"{leg.names[letter]} and platform carry the platform point"
         for leg in robot.legs
         for letter in leg.equations_class.rides
     ]
-    still = [] if robot.platform.angles else ["the platform does not turn"]
-    return list(dict.fromkeys(reason.format("") for reason in (*own, *rides, *still)))
+    unturned = [] if robot.platform.angles else ["the platform does not turn"]
+    return list(dict.fromkeys(reason.format("") for reason in (*transfers, *rides, *unturned)))
 
 
 def _weighed(report: Report) -> list[str]:
     """Return the measures of angles, as lengths, in the condition number of the Jacobian."""
     legs, radius = report.robot.legs, report.jacobian.radius
     followers = [legs[i].joint.noun for i in _followers(report.robot)]
-    found = []
+    measures = []
     if any(leg.goes_round for leg in legs):
-        found.append("a crank's angle measured as the way of its end")
+        measures.append("a crank's angle measured as the way of its end")
     if radius is not None:
         whose = "P" if report.robot.platform.tilts else "its axis"
         way = f"a point {fixed(1e3 * radius)} mm from {whose} (the root mean square distance"
         if report.robot.platform.slides:
             way = f"what slides, {fixed(1e3 * radius)} mm/rad (the root mean square"
         angle = "angles" if report.robot.platform.tilts else "angle \u03c6"
-        found.append(f"the platform's {angle} as the way of {way} of the platform points)")
-    found += [f"the {noun}'s angle as \u03c6, whatever its ratio" for noun in followers]
-    return found
+        measures.append(f"the platform's {angle} as the way of {way} of the platform points)")
+    measures += [f"the {noun}'s angle as \u03c6, whatever its ratio" for noun in followers]
+    return measures
 
 
 def _followers(robot: Manipulator) -> list[int]:
@@ -233,7 +237,7 @@ def _figures(report: Report) -> dict[str, Any]:
     half = cycle.duration / 2.0 if standard else None
     some = few(len(cycle.time))
     forces = forces_figure(cycle.time[some], report.forces[some], turning_point=half, ylabel=label)
-    made: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "robot": machine,
         "forces": forces,
         "force_speed": force_speed(report.sizing),
@@ -244,14 +248,14 @@ def _figures(report: Report) -> dict[str, Any]:
         turns = cycle.pose[:, at.coordinate]
         used = (float(turns.min()), float(turns.max())) if standard else None
         home = float(report.home[at.coordinate])
-        made["orientations"] = regularity_figure(
+        figures["orientations"] = regularity_figure(
             at.angles, at.type_ii, at.singular, home=home, used=used
         )
     if report.measures is not None:
         measures = report.measures.type_i, report.measures.type_ii
         cut = report.measures.cut
-        made["measures"] = [measure_figure(cut, measure, path=path) for measure in measures]
-    return made
+        figures["measures"] = [measure_figure(cut, measure, path=path) for measure in measures]
+    return figures
 
 
 def _without_rounding(base: BaseParameters) -> Array:
@@ -266,10 +270,10 @@ def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
     """Return the sums in symbols and the symbols' values in m; None if none, or too long."""
     key = base.robot, base.parameters, base.kept, base.certificate.method, version("sympy")
     packages = "kinematics", "reduction", "report", "short_numbers"
-    found = kept_result(("symbols", *key), packages, partial(_in_symbols, base))
-    if found is None:
+    texts = kept_result(("symbols", *key), packages, partial(_in_symbols, base))
+    if texts is None:
         return None
-    sums, lengths = found
+    sums, lengths = texts
     return {
         "sums": [Markup(line) for line in sums],
         "lengths": [(Markup(name), value) for name, value in lengths],

@@ -50,7 +50,7 @@ class JointQuantity:
 def coordinate(joints: Sequence[ActuatedJoint]) -> JointQuantity:
     """Return the joint coordinates, as people read them."""
     names = _distinct(joint.coordinate for joint in joints)
-    name = ", ".join(SYMBOLS.get(one, one) for one in names)
+    name = ", ".join(SYMBOLS.get(letter, letter) for letter in names)
     shown = [SHOWN[joint.unit] for joint in joints]
     return JointQuantity(
         name, tuple(unit for unit, _ in shown), tuple(factor for _, factor in shown)

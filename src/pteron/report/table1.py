@@ -75,10 +75,10 @@ def rows(robot: RobotLike = "quadrupteron") -> tuple[Row, ...]:
 
 def agree(printed: str, computed: str) -> bool:
     """Say whether two sums agree, as `Row` has it."""
-    given, found = terms(printed), terms(computed)
-    return given.keys() == found.keys() and all(
-        round(float(found[name]), len(text.partition(".")[2])) == float(text)
-        for name, text in given.items()
+    printed_terms, computed_terms = terms(printed), terms(computed)
+    return printed_terms.keys() == computed_terms.keys() and all(
+        round(float(computed_terms[name]), len(text.partition(".")[2])) == float(text)
+        for name, text in printed_terms.items()
     )
 
 

@@ -63,7 +63,7 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
         units=_gain_units(tuning),
         forces=_force_units(robot),
         each={
-            name: np.min([getattr(one, name) for one in tuning.margins], axis=0)
+            name: np.min([getattr(margins, name) for margins in tuning.margins], axis=0)
             for name in ("gain", "phase", "delay")
         },
         at=at,
@@ -78,7 +78,8 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
             if len(trials) and name in trials["changed"]
         },
         changed={
-            name: told._replace(one=told.one.format(readings)) for name, told in _CHANGED.items()
+            name: change._replace(one=change.one.format(readings))
+            for name, change in _CHANGED.items()
         },
         length="rad" if robot.platform.angular.all() else "m",
         degrees=180.0 / np.pi,
@@ -87,12 +88,12 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
 
 def _gain_units(tuning: Tuning) -> list[str]:
     """Return the units of the gains of a joint, one for each kind; empty where joints differ."""
-    own = {(leg.joint.force_unit, leg.joint.unit) for leg in tuning.robot.legs}
+    units = {(leg.joint.force_unit, leg.joint.unit) for leg in tuning.robot.legs}
     if tuning.controller.what == "computed_torque":
         return ["1/s\u00b2", "1/s"]
-    if len(own) > 1:
+    if len(units) > 1:
         return ["", ""]
-    (force, unit) = own.pop()
+    (force, unit) = units.pop()
     first = f"{force}/{unit}" if isinstance(tuning.controller, Feedback) else "1/s"
     return [first, f"{force} s/{unit}"]
 

@@ -127,7 +127,7 @@ def prose(text: str) -> Markup:
     """Return a message with true signs; commands and options are code, in one piece."""
     signed = re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", str(escape(text)))
     signed = re.sub(r"(?<=\d) x (?=\w)", " \u00d7 ", signed).replace("^2", "²")
-    commands = re.sub(_COMMAND, lambda found: re.sub(r"\S+", _CODE, found[0]), signed)
+    commands = re.sub(_COMMAND, lambda command: re.sub(r"\S+", _CODE, command[0]), signed)
     return Markup(re.sub(r"(?<!<code>)--[a-z][a-z-]*(?: each)?", _CODE, commands))
 
 
@@ -163,6 +163,6 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         "symbol": lambda name: coordinate(name).symbol,
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),
     }
-    made = any_template(folder, name, **shared | filters)
-    made.globals.update(style=resource("page.css"), version=pteron.__version__)
-    return made
+    page_template = any_template(folder, name, **shared | filters)
+    page_template.globals.update(style=resource("page.css"), version=pteron.__version__)
+    return page_template

@@ -74,9 +74,9 @@ def followed(
     def tried(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
         way = joints + shares[:, None] * (target - joints)
         poses = follow(robot, way, pose, on_failure="nan")
-        apart = np.abs(inverse_kinematics(robot, poses, on_failure="nan") - way)
-        apart = np.where(rounds, np.abs((apart + np.pi) % turn - np.pi), apart)
-        return poses, allowed(robot, poses) & (apart <= _SAME_JOINT).all(axis=-1)
+        differences = np.abs(inverse_kinematics(robot, poses, on_failure="nan") - way)
+        differences = np.where(rounds, np.abs((differences + np.pi) % turn - np.pi), differences)
+        return poses, allowed(robot, poses) & (differences <= _SAME_JOINT).all(axis=-1)
 
     return _narrowed(tried, pose, _STEPS)
 

@@ -14,10 +14,10 @@ import socket
 def is_here(host: str) -> bool:
     """Say whether only this machine can reach a host's address."""
     try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+        addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         return False
-    return bool(host) and all(_is_loopback(str(address[0])) for *_, address in found)
+    return bool(host) and all(_is_loopback(str(address[0])) for *_, address in addresses)
 
 
 def refusal(host: str, here: bool, hosts: list[str], origins: list[str]) -> str | None:
@@ -29,21 +29,24 @@ def refusal(host: str, here: bool, hosts: list[str], origins: list[str]) -> str 
     """
     if len(hosts) != 1 or len(origins) > 1:
         return "one Host and at most one Origin expected"
-    asked = hosts[0].lower()
-    name = _name(asked)
+    requested_host = hosts[0].lower()
+    name = _name(requested_host)
     if here and not (name in ("localhost", host.lower()) or _is_loopback(name)):
         return "this page is for this machine alone, and was asked for by another name"
     # Tunnels may change the port, of both alike, and some add TLS.
-    if any(origin.lower() not in (f"http://{asked}", f"https://{asked}") for origin in origins):
+    if any(
+        origin.lower() not in (f"http://{requested_host}", f"https://{requested_host}")
+        for origin in origins
+    ):
         return "the page of another server asked for it"
     return None
 
 
-def _name(asked: str) -> str:
+def _name(header: str) -> str:
     """Return the name or address in a header `Host`, without its port."""
-    if asked.startswith("["):
-        return asked[1:].partition("]")[0]
-    return asked.partition(":")[0]
+    if header.startswith("["):
+        return header[1:].partition("]")[0]
+    return header.partition(":")[0]
 
 
 def _is_loopback(name: str) -> bool:

@@ -125,17 +125,17 @@ class Live:
             self.do("load", lambda: session.load(name, message))
             return
         try:
-            asked = json.loads(message)
-            if isinstance(asked, dict) and asked.get("do") == "file":
-                self._files[tab] = str(asked.get("name"))
+            request = json.loads(message)
+            if isinstance(request, dict) and request.get("do") == "file":
+                self._files[tab] = str(request.get("name"))
                 return
-            if isinstance(asked, dict) and asked.get("do") == "push":
-                self._push(str(asked.get("drives")))
+            if isinstance(request, dict) and request.get("do") == "push":
+                self._push(str(request.get("drives")))
                 return
             name, act = panel.action(session, message)
         except (DataError, ValueError, RecursionError) as error:
-            told = str(error)
-            self.do("refused", lambda: self._tell(told))
+            reason = str(error)
+            self.do("refused", lambda: self._tell(reason))
             return
         self.do(name, act)
 
@@ -214,9 +214,9 @@ class Live:
         return max(0.0, min(times)) if times else None
 
     def _acted(self, name: str, act: Callable[[], object]) -> None:
-        before, now = self._last, monotonic()
+        last_act, now = self._last, monotonic()
         if name.startswith(_UNDONE):
-            if before[0] != name or now - before[1] > _ONE:
+            if last_act[0] != name or now - last_act[1] > _ONE:
                 self.session.remember()
             self._last = name, now
         elif name == "undo":
@@ -248,22 +248,22 @@ class Live:
         scaled = state.robot, state.payload, session.title
         if self._scaled != scaled:
             self._scaled, self._scale = scaled, session.force_scale()
-        found = readings(state, None if push is None else push.forces)
-        moment = self._picture.moment(state, found.forces, self._scale, screws=session.screws)
+        numbers = readings(state, None if push is None else push.forces)
+        moment = self._picture.moment(state, numbers.forces, self._scale, screws=session.screws)
         spring = push.spring if push else None
         self._send(
             "state",
-            panel.values(session, found.joints)
+            panel.values(session, numbers.joints)
             | moment
             | {
                 "clock": monotonic(),
                 "message": state.message or panel.doing(session),
                 "warns": bool(state.message),
-                "readout": readout(state, found),
+                "readout": readout(state, numbers),
                 "plotted": {
-                    "forces": _finite(found.forces),
-                    "joints": panel.shown_joints(state.robot, found.joints),
-                    "power": _finite(found.power),
+                    "forces": _finite(numbers.forces),
+                    "joints": panel.shown_joints(state.robot, numbers.joints),
+                    "power": _finite(numbers.power),
                 },
                 "legend": self._picture.legend(self._scale),
                 "spring": spring and [seen(state.robot, end) for end in spring],
@@ -279,22 +279,22 @@ class Live:
         state, span = self.session.state, self.session.pose_range
         plane = choices(state.robot).get(self.session.plane)
         # A map shows where the machine is, too.
-        rest = [
+        fixed_coordinates = [
             value
             for name, value in zip(state.robot.coordinates, state.pose, strict=True)
             if not isinstance(plane, str) or name not in plane
         ]
-        key = (plane, state.robot, *np.round(rest, 9)) if plane else ()
+        key = (plane, state.robot, *np.round(fixed_coordinates, 9)) if plane else ()
         if key == self._sliced:
             return
         self._sliced = key
-        given = state.robot, state.pose
+        robot_and_pose = state.robot, state.pose
         map_, parts = "", []
         if isinstance(plane, str):
-            for color, rings in slice_parts(*given, plane, span):
+            for color, rings in slice_parts(*robot_and_pose, plane, span):
                 parts.append({"color": color, "rings": [seen(state.robot, r) for r in rings]})
         elif plane is not None:
-            map_ = slice_map(*given, plane, span)
+            map_ = slice_map(*robot_and_pose, plane, span)
         self._send("slice", {"parts": parts, "map": map_})
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -19,6 +21,9 @@ from pteron.viewer.pushing import DRIVES
 from pteron.viewer.session import SPEEDS, STANDARD, Session
 from pteron.viewer.slices import BEYOND, SERVES, choices
 from pteron.viewer.state import pose_factors, pose_units
+
+_Action = tuple[str, Callable[[], object]]
+"""The name of an action, which undoing goes by, and the action."""
 
 _NO_MODE = "none of them"
 """The choice shown where the pose is in no assembly mode of the list."""
@@ -48,13 +53,13 @@ def controls(session: Session) -> dict[str, Any]:
 
 
 def _sliders(names: Sequence[str], units: Sequence[str], ranges: Array) -> list[dict[str, Any]]:
-    found = []
+    sliders = []
     for name, unit, (low, high) in zip(names, units, ranges.T, strict=True):
         word, factor = SHOWN[unit]
         least, most = np.floor(10.0 * factor * low) / 10.0, np.ceil(10.0 * factor * high) / 10.0
         span = {"least": float(least), "most": float(max(most, least + 0.1))}
-        found.append({"name": name, "unit": word, **span})
-    return found
+        sliders.append({"name": name, "unit": word, **span})
+    return sliders
 
 
 def values(session: Session, joints: Array) -> dict[str, Any]:
@@ -86,7 +91,9 @@ def _where(robot: Manipulator, pose: Array) -> str:
     """Return a pose (m,) in a line, each unit once."""
     values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
     named = zip(robot.coordinates, values, units, strict=True)
-    groups = groupby(((f"{name} {fixed(x)}", unit) for name, x, unit in named), lambda one: one[1])
+    groups = groupby(
+        ((f"{name} {fixed(x)}", unit) for name, x, unit in named), lambda pair: pair[1]
+    )
     parts = ((" ".join(text for text, _ in group), unit) for unit, group in groups)
     return ", ".join(f"{text}{unit if unit == '°' else f' {unit}'}" for text, unit in parts)
 
@@ -99,8 +106,8 @@ def _label(robot: Manipulator, pose: Array) -> str:
 
 def shown_joints(robot: Manipulator, joints: Array) -> list[float]:
     """Return joint coordinates (n,) in mm and degrees."""
-    found: list[float] = (_joint_factors(robot) * joints).tolist()
-    return found
+    coordinates: list[float] = (_joint_factors(robot) * joints).tolist()
+    return coordinates
 
 
 def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any] | None:
@@ -144,7 +151,7 @@ def _pushed(session: Session) -> str:
     return ""
 
 
-def action(session: Session, text: str) -> tuple[str, Callable[[], object]]:
+def action(session: Session, text: str) -> _Action:
     """Return the name of what a page asks for, JSON, and the action itself.
 
     Raises
@@ -153,123 +160,137 @@ def action(session: Session, text: str) -> tuple[str, Callable[[], object]]:
         If it is nothing that a page asks for.
     """
     try:
-        asked = json.loads(text)
-        name = asked["do"]
-        found: tuple[str, Callable[[], object]] = _actions(session, asked)[name](asked)
-        return found
+        fields = json.loads(text)
+        return _ACTIONS[fields["do"]](_Request(session, fields))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError):
         raise DataError("the page asked for something unknown; load it again") from None
 
 
-def _actions(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    robot = session.state.robot
+@dataclass(frozen=True)
+class _Request:
+    """A request of a page: its fields, as JSON has them, and the session that it is made to.
 
-    def number(key: str) -> float:
-        value = float(asked[key])
-        if not np.isfinite(value):
+    Methods return the name of an action, which undoing goes by, and the action.
+    """
+
+    session: Session
+    fields: dict[str, Any]
+
+    @property
+    def robot(self) -> Manipulator:
+        """The machine that the page shows."""
+        return self.session.state.robot
+
+    def number(self, key: str) -> float:
+        """Return a finite number."""
+        number = float(self.fields[key])
+        if not np.isfinite(number):
             raise ValueError
-        return value
+        return number
 
-    def place(count: int) -> int:
-        i = int(asked["i"])
+    def index(self, count: int) -> int:
+        """Return the place of a slider among `count`."""
+        i = int(self.fields["i"])
         if not 0 <= i < count:
             raise IndexError
         return i
 
-    def point(key: str) -> Array:
-        x, y, z = (float(value) for value in asked[key])
+    def point(self, key: str) -> Array:
+        """Return a point (3,) of the picture in the base frame, m."""
+        x, y, z = (float(coordinate) for coordinate in self.fields[key])
         if not np.isfinite([x, y, z]).all():
             raise ValueError
-        return np.array([x, y, z]) @ view_frame(robot)
+        return np.array([x, y, z]) @ view_frame(self.robot)
 
-    def coordinate(_: Any) -> tuple[str, Callable[[], object]]:
-        i = place(robot.freedom)
-        value = number("value") / float(pose_factors(robot)[i])
-        return f"pose{i}", lambda: session.set_coordinate(i, value)
+    def coordinate(self) -> _Action:
+        i = self.index(self.robot.freedom)
+        amount = self.number("value") / float(pose_factors(self.robot)[i])
+        return f"pose{i}", lambda: self.session.set_coordinate(i, amount)
 
-    def joint(_: Any) -> tuple[str, Callable[[], object]]:
-        i = place(robot.joint_count)
-        value = number("value") / float(_joint_factors(robot)[i])
-        return f"joint{i}", lambda: session.set_joint(i, value)
+    def joint(self) -> _Action:
+        i = self.index(self.robot.joint_count)
+        amount = self.number("value") / float(_joint_factors(self.robot)[i])
+        return f"joint{i}", lambda: self.session.set_joint(i, amount)
 
-    def drag(_: Any) -> tuple[str, Callable[[], object]]:
-        axis, to = None if asked["axis"] is None else int(asked["axis"]), point("to")
+    def drag(self) -> _Action:
+        axis = None if self.fields["axis"] is None else int(self.fields["axis"])
+        to = self.point("to")
         if axis not in (None, 0, 1, 2):
             raise IndexError
-        return "drag", lambda: session.drag(axis, to)
+        return "drag", lambda: self.session.drag(axis, to)
 
-    def pull(_: Any) -> tuple[str, Callable[[], object]]:
-        grip, to, stiffness = point("grip"), point("to"), number("stiffness")
+    def pull(self) -> _Action:
+        grip, to, stiffness = self.point("grip"), self.point("to"), self.number("stiffness")
 
         def act() -> None:
-            if session.push is not None:
-                session.push.stiffness = min(max(stiffness, 0.0), 1e6)
-                session.push.pull(grip, to)
+            push = self.session.push
+            if push is not None:
+                push.stiffness = min(max(stiffness, 0.0), 1e6)
+                push.pull(grip, to)
 
         return "pull", act
 
-    def release(_: Any) -> tuple[str, Callable[[], object]]:
+    def release(self) -> _Action:
         def act() -> None:
-            if session.push is not None:
-                session.push.release()
+            if self.session.push is not None:
+                self.session.push.release()
 
         return "pull", act
 
-    def assembly(_: Any) -> tuple[str, Callable[[], object]]:
-        k = int(asked["i"])
+    def assembly(self) -> _Action:
+        k = int(self.fields["i"])
 
         def act() -> None:
-            poses = session.assemblies()[0]
+            poses = self.session.assemblies()[0]
             if 0 <= k < len(poses):
-                session.set_assembly(poses[k])
+                self.session.set_assembly(poses[k])
 
         return "assembly", act
 
-    def mode(_: Any) -> tuple[str, Callable[[], object]]:
-        elbows = {signs(mode): mode for mode in session.modes()}[asked["mode"]]
-        return "mode", lambda: session.set_working_mode(elbows)
+    def mode(self) -> _Action:
+        elbows = {signs(mode): mode for mode in self.session.modes()}[self.fields["mode"]]
+        return "mode", lambda: self.session.set_working_mode(elbows)
 
-    def speed(_: Any) -> tuple[str, Callable[[], object]]:
-        factor = SPEEDS[asked["speed"]]
-        return "speed", lambda: setattr(session, "speed", factor)
+    def speed(self) -> _Action:
+        factor = SPEEDS[self.fields["speed"]]
+        return "speed", lambda: setattr(self.session, "speed", factor)
 
-    def plane(_: Any) -> tuple[str, Callable[[], object]]:
-        choices(robot)[name := asked["plane"]]
-        return "plane", lambda: setattr(session, "plane", name)
+    def plane(self) -> _Action:
+        choices(self.robot)[name := self.fields["plane"]]
+        return "plane", lambda: setattr(self.session, "plane", name)
 
-    def seek(_: Any) -> tuple[str, Callable[[], object]]:
-        time = number("time")
+    def seek(self) -> _Action:
+        time = self.number("time")
 
         def act() -> None:
-            session.playing = False
-            session.seek(time)
+            self.session.playing = False
+            self.session.seek(time)
 
         return "time", act
 
-    def plain(name: str, act: Callable[[], object]) -> Any:
-        return lambda _: (name, act)
 
-    return {
-        "coordinate": coordinate,
-        "joint": joint,
-        "drag": drag,
-        "pull": pull,
-        "release": release,
-        "assembly": assembly,
-        "mode": mode,
-        "speed": speed,
-        "seek": seek,
-        "type": plain("type", lambda: session.type_pose(str(asked["text"]))),
-        "payload": plain("payload", lambda: session.set_payload(str(asked["text"]))),
-        "home": plain("home", session.go_home),
-        "screws": plain("screws", lambda: setattr(session, "screws", bool(asked["on"]))),
-        "plane": plane,
-        "undo": plain("undo", session.undo),
-        "standard": plain("load", session.load_standard),
-        "play": plain("play", lambda: session.play(on=bool(asked["on"]))),
-        "step": plain("step", lambda: session.step(-1 if asked["back"] else 1)),
-        "rest": plain("push", session.end_push),
-    }
+_ACTIONS: dict[str, Callable[[_Request], _Action]] = {
+    "coordinate": _Request.coordinate,
+    "joint": _Request.joint,
+    "drag": _Request.drag,
+    "pull": _Request.pull,
+    "release": _Request.release,
+    "assembly": _Request.assembly,
+    "mode": _Request.mode,
+    "speed": _Request.speed,
+    "seek": _Request.seek,
+    "plane": _Request.plane,
+    "type": lambda r: ("type", partial(r.session.type_pose, str(r.fields["text"]))),
+    "payload": lambda r: ("payload", partial(r.session.set_payload, str(r.fields["text"]))),
+    "home": lambda r: ("home", r.session.go_home),
+    "screws": lambda r: ("screws", partial(setattr, r.session, "screws", bool(r.fields["on"]))),
+    "undo": lambda r: ("undo", r.session.undo),
+    "standard": lambda r: ("load", r.session.load_standard),
+    "play": lambda r: ("play", partial(r.session.play, on=bool(r.fields["on"]))),
+    "step": lambda r: ("step", partial(r.session.step, -1 if r.fields["back"] else 1)),
+    "rest": lambda r: ("push", r.session.end_push),
+}
+"""What a page may ask for, by the field `do` of its request."""
 
 
 def _joint_factors(robot: Manipulator) -> Array:
@@ -277,8 +298,8 @@ def _joint_factors(robot: Manipulator) -> Array:
 
 
 def _tenths(array: Array) -> list[float]:
-    found: list[float] = (np.round(array, 1) + 0.0).tolist()
-    return found
+    rounded: list[float] = (np.round(array, 1) + 0.0).tolist()
+    return rounded
 
 
 def signs(mode: Any) -> str:

@@ -95,13 +95,13 @@ class Picture:
         stands = {"N": (square, "the length of a square"), "N m": (1.0, "half a turn")}
         units = [leg.joint.force_unit for leg in self._robot.legs]
         sizes = dict(zip(units, scale, strict=True))
-        told = [
+        scales = [
             f"{words} stands for {significant(share * sizes[unit])} {unit}"
             for unit, (share, words) in stands.items()
             if unit in sizes
         ]
         bent = ", round its axis the way it turns" if "N m" in sizes else ""
-        return f"arrows: what each drive gives{bent}; {', '.join(told)}"
+        return f"arrows: what each drive gives{bent}; {', '.join(scales)}"
 
     def _arrow(self, points: Array, color: str | int, radius: float) -> Arrow:
         return seen(self._robot, points), color, radius
@@ -112,7 +112,7 @@ class Picture:
             screws = joint_screws(state.robot, state.pose)
         except PteronError:
             return []
-        found, length = list[Arrow](), _SCREW * self.size
+        arrows, length = list[Arrow](), _SCREW * self.size
         for i, guide in enumerate(self._guides):
             for j, screw in enumerate(screws[i]):
                 at = points.links[i][0] if guide.slides and j == 0 else points.chain[i, j]
@@ -121,35 +121,35 @@ class Picture:
                 if np.isfinite([*at, *axis]).all() and axis.any():
                     way = length * axis / np.linalg.norm(axis)
                     look = ("ink", _SCREW_RADIUS) if turns else ("warning", _SLIDING_RADIUS)
-                    found.append(self._arrow(np.array([at - way, at + way]), *look))
-        return found
+                    arrows.append(self._arrow(np.array([at - way, at + way]), *look))
+        return arrows
 
     def _forces(self, points: JointPoints, forces: Array, scale: Array) -> list[Arrow]:
         """Return the drives' forces; a torque's arrow goes round its axis, from the crank on.
 
         A ram's begins at its base joint, along it.
         """
-        found = list[Arrow]()
+        arrows = list[Arrow]()
         shares = np.nan_to_num(forces) / scale
         for i, (line, guide) in enumerate(zip(points.links, self._guides, strict=True)):
-            along = line[-1] - line[0]
-            axis = along / np.linalg.norm(along) if points.rams[i] else guide.axis
+            leg_vector = line[-1] - line[0]
+            axis = leg_vector / np.linalg.norm(leg_vector) if points.rams[i] else guide.axis
             if self._robot.legs[i].joint.force_unit == "N m":
                 angle = np.clip(_TURN * shares[i], -_WHOLE, _WHOLE)
                 path = line[0] + _BEND * self.size * _round(axis, line[1] - line[0], angle)
-                found.append(self._arrow(path, i, _BENT_RADIUS))
+                arrows.append(self._arrow(path, i, _BENT_RADIUS))
             else:
                 way = _FORCE * self.size * np.clip(shares[i], -_MOST, _MOST) * axis
-                found.append(self._arrow(np.array([line[0], line[0] + way]), i, _FORCE_RADIUS))
-        return found
+                arrows.append(self._arrow(np.array([line[0], line[0] + way]), i, _FORCE_RADIUS))
+        return arrows
 
 
 def _round(axis: Array, arm: Array, angle: float) -> Array:
     """Return unit vectors (K, 3) across an axis, turned by up to an angle from an arm's side on."""
-    across = np.cross(axis, arm)
-    if np.linalg.norm(across) < 1e-6 * np.linalg.norm(arm):  # an arm along the axis has no side
-        across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
-    across /= np.linalg.norm(across)
+    normal = np.cross(axis, arm)
+    if np.linalg.norm(normal) < 1e-6 * np.linalg.norm(arm):  # an arm along the axis has no side
+        normal = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    normal /= np.linalg.norm(normal)
     turns = np.linspace(0.0, angle, _BENDS)[:, None]
-    found: Array = np.cos(turns) * np.cross(across, axis) + np.sin(turns) * across
-    return found
+    directions: Array = np.cos(turns) * np.cross(normal, axis) + np.sin(turns) * normal
+    return directions

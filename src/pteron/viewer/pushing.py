@@ -61,13 +61,13 @@ class Push:
     """
 
     def __init__(self, robot: Manipulator, pose: Array, drives: str) -> None:
-        self._robot, still = robot, np.zeros_like(pose)
+        self._robot, zeros = robot, np.zeros_like(pose)
         self._law: Law | None = None
         if (controller := DRIVES[drives]) is not None:
             self._law = controller.law(robot)
         self._wanted = pose
-        self._memory = np.empty(0) if self._law is None else self._law.memory(pose, still)
-        self._begin(pose, still)
+        self._memory = np.empty(0) if self._law is None else self._law.memory(pose, zeros)
+        self._begin(pose, zeros)
         self._step = allowed_step(robot, pose, _STEP, usual=True)
         bodies = [body for leg in robot.legs for body in leg.bodies.values()]
         self._mass = sum(body.values[0] for body in (*bodies, robot.platform.joined))
@@ -82,19 +82,19 @@ class Push:
         self._arm: Array | None = None
         self._held = np.zeros(3)
         self._move(_PERIOD)  # the first call compiles
-        self._begin(pose, still)
+        self._begin(pose, zeros)
 
     @property
     def spring(self) -> tuple[Array, Array] | None:
         """The spring's ends, m."""
         return None if self._arm is None else (self._grip()[0], self._held)
 
-    def pull(self, grip: Array, held: Array) -> None:
-        """Attach the spring at `grip` (3,), m, if it is loose; hold its end at `held` (3,), m."""
+    def pull(self, grip: Array, spring_end: Array) -> None:
+        """Attach the spring at `grip` (3,), m, if it is loose; hold its end (3,), m."""
         if self._arm is None:
             place, axes = self._robot.platform.at(self.pose)
             self._arm = axes @ (grip - place)
-        self._held = held
+        self._held = spring_end
 
     def release(self) -> None:
         """Let the spring go."""
@@ -107,21 +107,21 @@ class Push:
         energy than it would have had behind it.
         """
         self.stops, robot = "", self._robot
-        for rest in range(max(1, round(span / _PERIOD)), 0, -1):
-            before, rates = self.pose, self.velocity
+        for periods in range(max(1, round(span / _PERIOD)), 0, -1):
+            last_pose, rates = self.pose, self.velocity
             self._control()
-            whole = self._move(_PERIOD)
-            if whole and allowed(robot, self.pose):
+            succeeded = self._move(_PERIOD)
+            if succeeded and allowed(robot, self.pose):
                 continue
             # A limit is handled once for the rest of the span: a slide takes milliseconds.
-            whole = whole and self._move((rest - 1) * _PERIOD)
-            energy = self._energy(self.pose, self.velocity) if whole else np.nan
+            succeeded = succeeded and self._move((periods - 1) * _PERIOD)
+            energy = self._energy(self.pose, self.velocity) if succeeded else np.nan
             if not np.isfinite(energy):
-                energy = self._energy(before, rates)
-            wanted = self.pose if np.isfinite(self.pose).all() else before
-            last, beyond = nearest(robot, before, wanted)
-            self.stops = what_stops(robot, wanted if beyond is None else beyond)
-            slide = (last - before) / (rest * _PERIOD)
+                energy = self._energy(last_pose, rates)
+            target = self.pose if np.isfinite(self.pose).all() else last_pose
+            last, beyond = nearest(robot, last_pose, target)
+            self.stops = what_stops(robot, target if beyond is None else beyond)
+            slide = (last - last_pose) / (periods * _PERIOD)
             resting = self._energy(last, 0.0 * slide)
             most, kinetic = max(energy - resting, 0.0), self._energy(last, slide) - resting
             self._begin(last, slide * np.sqrt(most / kinetic) if kinetic > most else slide)
@@ -136,9 +136,9 @@ class Push:
         """Integrate over a span, s, under constant forces; return whether all of it succeeded."""
         count = int(np.ceil(span / self._step - 1e-9))
         state, step = (self.pose, self.velocity), span / max(count, 1)
-        given = self._robot, *state, self.forces, step, count, self._wrench()
-        self.pose, self.velocity, self._drives, whole = advance(*given, drives=self._drives)
-        return bool(whole)
+        stepping = self._robot, *state, self.forces, step, count, self._wrench()
+        self.pose, self.velocity, self._drives, succeeded = advance(*stepping, drives=self._drives)
+        return bool(succeeded)
 
     def _energy(self, pose: Array, velocity: Array) -> float:
         """Return the energy of bodies, rotors and spring in a state, J; NaN where there is none."""
@@ -157,8 +157,8 @@ class Push:
             return
         joints = inverse_kinematics(self._robot, self.pose)
         rates = joint_rates(self._robot, self.pose, self.velocity).actuated
-        still = np.zeros_like(self.pose)
-        forces, self._memory = self._law(self._wanted, still, still, joints, rates, self._memory)
+        zeros = np.zeros_like(self.pose)
+        forces, self._memory = self._law(self._wanted, zeros, zeros, joints, rates, self._memory)
         # At a singularity of type II the law has no forces: the last ones stay.
         self.forces = np.where(np.isfinite(forces), forces, self.forces)
 

@@ -29,25 +29,25 @@ PLACES = 2
 """Decimal places of a force."""
 
 
-def readout(state: ViewerState, found: Readings) -> str:
+def readout(state: ViewerState, numbers: Readings) -> str:
     """Return the numbers of a state as HTML."""
-    legs, leg, joint = state.robot.legs, found.type_i.argmin(), found.clearances.argmin()
+    legs, leg, joint = state.robot.legs, numbers.type_i.argmin(), numbers.clearances.argmin()
     forces = (
         "\u2013" if np.isnan(force) else f"{fixed(force, PLACES)} {leg.joint.force_unit}"
-        for leg, force in zip(legs, found.forces, strict=True)
+        for leg, force in zip(legs, numbers.forces, strict=True)
     )
     units = [leg.joint.unit for leg in legs]
-    cells = [map(readable, found.joints, units)]
-    limited = not np.isnan(found.shares).all()
+    cells = [map(readable, numbers.joints, units)]
+    limited = not np.isnan(numbers.shares).all()
     margins = {
-        f"leg {leg + 1} to its end (type I)": float(found.type_i[leg]),
-        "to where drives lose hold (type II)": found.type_ii,
-        f"leg {joint + 1} to a joint's limit": float(found.clearances[joint]),
+        f"leg {leg + 1} to its end (type I)": float(numbers.type_i[leg]),
+        "to where drives lose hold (type II)": numbers.type_ii,
+        f"leg {joint + 1} to a joint's limit": float(numbers.clearances[joint]),
     }
     headings = ["leg", nouns([leg.joint for leg in legs]), "drive"]
     if has_readings(state.robot):
         headings.insert(2, "reads")
-        cells.append(map(readable, to_readings(state.robot, found.joints), units))
+        cells.append(map(readable, to_readings(state.robot, numbers.joints), units))
     return _template().render(
         colors=_COLORS,
         headings=[*headings, "of its most"] if limited else headings,
@@ -55,14 +55,14 @@ def readout(state: ViewerState, found: Readings) -> str:
             zip(
                 LEG_COLORS,
                 zip(*cells, forces, strict=True),
-                map(_share, found.shares),
+                map(_share, numbers.shares),
                 strict=False,
             )
         ),
         limited=limited,
-        condition=found.condition,
+        condition=numbers.condition,
         margins=[(name, at, level(at), _WORDS[level(at)]) for name, at in margins.items()],
-        fault=found.fault,
+        fault=numbers.fault,
     )
 
 

@@ -143,22 +143,22 @@ class Server:
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"Refused: {reason}.\n")
         if getattr(request, "method", "GET") != "GET":  # old websockets refuses others itself
             only = "Only GET is answered.\n"
-            found = connection.respond(http.HTTPStatus.METHOD_NOT_ALLOWED, only)
-            found.headers["Allow"] = "GET"
-            return found
+            response = connection.respond(http.HTTPStatus.METHOD_NOT_ALLOWED, only)
+            response.headers["Allow"] = "GET"
+            return response
         path = request.path.partition("?")[0]
         room = self._rooms.get(path)
         if room is None:
-            told = f"No page here; try {next(iter(self._rooms))}\n"
-            return connection.respond(http.HTTPStatus.NOT_FOUND, told)
+            hint = f"No page here; try {next(iter(self._rooms))}\n"
+            return connection.respond(http.HTTPStatus.NOT_FOUND, hint)
         if "Upgrade" in request.headers:
             return None
-        found = connection.respond(http.HTTPStatus.OK, room() if callable(room) else room.page())
-        del found.headers["Content-Type"]
-        found.headers["Content-Type"] = "text/html; charset=utf-8"
-        found.headers["Cache-Control"] = "no-store"
-        found.headers["Content-Security-Policy"] = _FRAMES
-        return found
+        response = connection.respond(http.HTTPStatus.OK, room() if callable(room) else room.page())
+        del response.headers["Content-Type"]
+        response.headers["Content-Type"] = "text/html; charset=utf-8"
+        response.headers["Cache-Control"] = "no-store"
+        response.headers["Content-Security-Policy"] = _FRAMES
+        return response
 
     def _handle(self, connection: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed
@@ -200,8 +200,8 @@ def free_port(host: str, port: int) -> int:
     for candidate in tried:
         if all(_is_free(family, address[0], candidate) for family, *_, address in addresses):
             return candidate
-    told = f"none of {port} to {tried[-1]} is free" if len(tried) > 1 else f"{port} is taken"
-    raise DataError(f"port: {told}; give another --port")
+    reason = f"none of {port} to {tried[-1]} is free" if len(tried) > 1 else f"{port} is taken"
+    raise DataError(f"port: {reason}; give another --port")
 
 
 def _is_free(family: int, address: Any, port: int) -> bool:

@@ -215,10 +215,10 @@ class Session:
 
     def set_working_mode(self, elbows: Sequence[int]) -> bool:
         """Put the elbows on given sides; say whether the machine is another one now."""
-        before = self.state.robot
+        last_robot = self.state.robot
         self._rest()
         self.state = in_working_mode(self.state, elbows)
-        if self.state.robot == before:
+        if self.state.robot == last_robot:
             return False
         state, dropped = self.state, self.motion is not None
         self.motion, self.title, self.time = None, "", 0.0
@@ -266,8 +266,8 @@ class Session:
 
     def load(self, name: str, data: bytes) -> None:
         """Take a motion from a file's name and content; it plays from its beginning."""
-        found = motion_of_file(self.state.robot, name, data, self.state.pose)
-        self.take(found, name)
+        motion = motion_of_file(self.state.robot, name, data, self.state.pose)
+        self.take(motion, name)
 
     def load_standard(self) -> None:
         """Take the standard pick-and-place cycle about the home pose."""
@@ -320,12 +320,12 @@ class Session:
         ends = np.array([pose, pose])
         for i, (low, high) in enumerate(self.pose_range.T):
             for row, end in enumerate((low, high)):
-                along = np.tile(pose, (_ALONG, 1))
-                along[:, i] = np.linspace(pose[i], end, _ALONG)
-                free = allowed(robot, along)
-                ends[row, i] = along[-1 if free.all() else max(0, int(free.argmin()) - 1), i]
+                line = np.tile(pose, (_ALONG, 1))
+                line[:, i] = np.linspace(pose[i], end, _ALONG)
+                free = allowed(robot, line)
+                ends[row, i] = line[-1 if free.all() else max(0, int(free.argmin()) - 1), i]
         joints = self.state.joints
-        found = np.array([joints, joints])
+        joint_ends = np.array([joints, joints])
         for i in range(len(joints)):
             for row in range(2):
                 if busy():
@@ -333,8 +333,8 @@ class Session:
                 target = joints.copy()
                 target[i] = self.joint_range[row, i]
                 last = followed(robot, pose, joints, target)[0]
-                found[row, i] = inverse_kinematics(robot, last)[i]
-        return ends, found
+                joint_ends[row, i] = inverse_kinematics(robot, last)[i]
+        return ends, joint_ends
 
     def force_scale(self) -> Array:
         """Return the force of each leg's drive, (n,), whose arrow has the usual length.
@@ -342,8 +342,8 @@ class Session:
         The largest of the motion, or at rest in the home pose; legs of one unit share a scale.
         """
         loaded = self.state.loaded
-        still = np.zeros_like(self.home)
-        states = [(self.home, still, still)]
+        zeros = np.zeros_like(self.home)
+        states = [(self.home, zeros, zeros)]
         if self.motion is not None:
             states += list(
                 zip(self.motion.pose, self.motion.velocity, self.motion.acceleration, strict=True)
@@ -358,10 +358,10 @@ class Session:
 def _rotation(start: Array, end: Array) -> Array:
     """Return the least rotation (3, 3) that turns one direction to another."""
     a, b = start / np.linalg.norm(start), end / max(float(np.linalg.norm(end)), 1e-12)
-    across, cosine = np.cross(a, b), float(a @ b)
+    normal, cosine = np.cross(a, b), float(a @ b)
     if cosine < -1.0 + 1e-9:
         return np.eye(3)
     cross = np.array(
-        [[0, -across[2], across[1]], [across[2], 0, -across[0]], [-across[1], across[0], 0]]
+        [[0, -normal[2], normal[1]], [normal[2], 0, -normal[0]], [-normal[1], normal[0], 0]]
     )
     return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + cosine))

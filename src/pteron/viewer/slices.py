@@ -54,18 +54,18 @@ def slice_parts(
     extent = _sides(robot, pose, plane, (*map(float, span[:, i]), *map(float, span[:, j])))
     cut = reach_slice(robot, pose, plane, extent=extent, points=POINTS)
     legs = cut.leg_margins.min(axis=-1)
-    found = []
+    parts = []
     for field, color in ((cut.margin, SERVES), (np.minimum(legs, -cut.margin), BEYOND)):
         rings = _rings(cut.first, cut.second, field)
-        found.append((color, [_in_space(robot, pose, i, j, ring) for ring in rings]))
-    return found
+        parts.append((color, [_in_space(robot, pose, i, j, ring) for ring in rings]))
+    return parts
 
 
 def slice_map(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> str:
     """Return the map of a slice along an angle, in HTML; see `slice_parts`, `reach_figure`."""
     i, j = (robot.coordinates.index(name) for name in plane)
-    (left, right), (low, high) = (map(float, span[:, k]) for k in (i, j))
-    cut = reach_slice(robot, pose, plane, extent=(left, right, low, high), points=POINTS)
+    (first_low, first_high), (low, high) = (map(float, span[:, k]) for k in (i, j))
+    cut = reach_slice(robot, pose, plane, extent=(first_low, first_high, low, high), points=POINTS)
     return str(svg(reach_figure(cut), name="slice", title=f"Reach over {' and '.join(plane)}"))
 
 
@@ -73,21 +73,24 @@ def _sides(
     robot: Manipulator, pose: Array, plane: str, sides: tuple[float, ...]
 ) -> tuple[float, float, float, float]:
     """Return the extent of what the legs reach; a side where it goes on stays as it is."""
-    left, right, low, high = sides
-    wide, tall = right - left, high - low
-    extent = left - wide, right + wide, low - tall, high + tall
+    first_low, first_high, low, high = sides
+    wide, tall = first_high - first_low, high - low
+    extent = first_low - wide, first_high + wide, low - tall, high + tall
     cut = reach_slice(robot, pose, plane, extent=extent, points=_COARSE)
-    held = cut.leg_margins.min(axis=-1) >= 0.0
-    found = list[float]()
-    for values, axis, ends in ((cut.first, 0, (left, right)), (cut.second, 1, (low, high))):
-        at, step = np.flatnonzero(held.any(axis=axis)), float(values[1] - values[0])
+    is_reached = cut.leg_margins.min(axis=-1) >= 0.0
+    extent_ends = list[float]()
+    for values, axis, ends in (
+        (cut.first, 0, (first_low, first_high)),
+        (cut.second, 1, (low, high)),
+    ):
+        at, step = np.flatnonzero(is_reached.any(axis=axis)), float(values[1] - values[0])
         if not len(at):
             at = np.array([0, len(values) - 1])
-        found += [
+        extent_ends += [
             ends[0] if at[0] == 0 else float(values[at[0]]) - step,
             ends[1] if at[-1] == len(values) - 1 else float(values[at[-1]]) + step,
         ]
-    return found[0], found[1], found[2], found[3]
+    return extent_ends[0], extent_ends[1], extent_ends[2], extent_ends[3]
 
 
 def _rings(first: Array, second: Array, field: Array) -> list[Array]:

@@ -48,8 +48,8 @@ def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Arr
     def missing(there: Array) -> float:
         return float(np.linalg.norm(weights * (target - there)))
 
-    whole = missing(start)
-    radius = max(min(0.25 * whole, _STRIDE * max(leg.size for leg in robot.legs)), 1e-9)
+    distance = missing(start)
+    radius = max(min(0.25 * distance, _STRIDE * max(leg.size for leg in robot.legs)), 1e-9)
     for _ in range(_ROUNDS):
         step = _step(robot, pose, target - pose, weights)
         length = float(np.linalg.norm(weights * step))
@@ -61,11 +61,11 @@ def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Arr
             trial = trial + _step(robot, trial, np.zeros_like(trial), weights)
         if not allowed(robot, trial):
             trial = farthest(robot, pose, trial)[0]
-        if missing(trial) < missing(pose) - _LEAST * whole:
+        if missing(trial) < missing(pose) - _LEAST * distance:
             pose = trial
         else:
             radius *= 0.25
-            if radius < _LEAST * whole:
+            if radius < _LEAST * distance:
                 break
     return pose, farthest(robot, pose, target)[1]
 
@@ -91,13 +91,13 @@ def _step(robot: Manipulator, pose: Array, wish: Array, weights: Array) -> Array
     if not (least > 0.0).any():
         return wish
     rows = np.vstack([slopes.T, least])
-    found, _ = scipy.optimize.nnls(
+    multipliers, _ = scipy.optimize.nnls(
         rows, np.append(np.zeros(len(pose)), 1.0), maxiter=50 * rows.shape[1]
     )
-    rest = rows @ found - np.append(np.zeros(len(pose)), 1.0)
-    if abs(rest[-1]) < 1e-12:
+    residual = rows @ multipliers - np.append(np.zeros(len(pose)), 1.0)
+    if abs(residual[-1]) < 1e-12:
         return np.zeros_like(wish)
-    return np.asarray(wish - rest[:-1] / rest[-1] / weights)
+    return np.asarray(wish - residual[:-1] / residual[-1] / weights)
 
 
 def _margins(robot: Manipulator, poses: Array) -> Array:

@@ -53,8 +53,8 @@ class ViewerState:
     @property
     def joints(self) -> Array:
         """The joint coordinates (n,), m or rad."""
-        found: Array = inverse_kinematics(self.robot, self.pose)
-        return found
+        coordinates: Array = inverse_kinematics(self.robot, self.pose)
+        return coordinates
 
     @property
     def loaded(self) -> Manipulator:
@@ -70,8 +70,8 @@ class ViewerState:
 
 def at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
     """Return a machine at rest in a pose, by default its home pose."""
-    found = home_pose(robot) if pose is None else pose
-    return ViewerState(robot, found, np.zeros_like(found), np.zeros_like(found))
+    rest_pose = home_pose(robot) if pose is None else pose
+    return ViewerState(robot, rest_pose, np.zeros_like(rest_pose), np.zeros_like(rest_pose))
 
 
 def moved(state: ViewerState, target: Array) -> ViewerState:
@@ -81,9 +81,9 @@ def moved(state: ViewerState, target: Array) -> ViewerState:
     last, beyond = nearest(state.robot, state.pose, target)
     if beyond is None:
         return _rest(state, target)
-    rest = told_rest(state.robot, last, target)
+    distance = told_rest(state.robot, last, target)
     why = what_stops(state.robot, beyond)
-    return _rest(state, last, f"{why}. The platform is {rest} from the pose asked for.")
+    return _rest(state, last, f"{why}. The platform is {distance} from the pose asked for.")
 
 
 def joint_moved(state: ViewerState, i: int, value: float) -> ViewerState:
@@ -113,10 +113,10 @@ def assembly_poses(state: ViewerState) -> Array:
 
 def current_assembly(state: ViewerState, poses: Array) -> int | None:
     """Return the place of the machine's pose among those of its assembly modes, or None."""
-    apart = np.abs(poses - state.pose)
-    around = np.abs((apart + np.pi) % (2.0 * np.pi) - np.pi)
-    apart = np.where(state.robot.wraps, around, apart)
-    near = np.flatnonzero((apart <= _SAME_POSE).all(axis=-1))
+    differences = np.abs(poses - state.pose)
+    around = np.abs((differences + np.pi) % (2.0 * np.pi) - np.pi)
+    differences = np.where(state.robot.wraps, around, differences)
+    near = np.flatnonzero((differences <= _SAME_POSE).all(axis=-1))
     return int(near[0]) if len(near) else None
 
 
@@ -191,8 +191,8 @@ def metres_hint(robot: Manipulator, pose: Array) -> str:
     meant = np.where(lengths, 1e3 * pose, pose)
     if not 0.0 < np.abs(typed).max(initial=0.0) < _METRES or not allowed(robot, meant):
         return ""
-    told, mm = (" ".join(f"{x:g}" for x in np.round(v, 9)) for v in (typed, 1e3 * typed))
-    return f"Lengths are typed in mm: is {told} in m? That is {mm} here."
+    metres, millimetres = (" ".join(f"{x:g}" for x in np.round(v, 9)) for v in (typed, 1e3 * typed))
+    return f"Lengths are typed in mm: is {metres} in m? That is {millimetres} here."
 
 
 def pose_factors(robot: Manipulator) -> Array:
@@ -206,14 +206,14 @@ def pose_units(robot: Manipulator) -> str:
     return " and ".join(dict.fromkeys(words[unit] for unit in robot.units))
 
 
-def _number(text: str, name: str, wanted: str) -> float:
+def _number(text: str, name: str, expected: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
         comma = "; write the decimal sign as a point" if "," in text else ""
-        raise DataError(f"{name}: {shown(text)} given, {wanted} expected{comma}")
+        raise DataError(f"{name}: {shown(text)} given, {expected} expected{comma}")
     return value
 
 
@@ -229,5 +229,5 @@ def stopped(state: ViewerState, message: str = "") -> ViewerState:
 
 
 def _rest(state: ViewerState, pose: Array, message: str = "") -> ViewerState:
-    still = np.zeros_like(pose)
-    return replace(state, pose=pose, velocity=still, acceleration=still, message=message)
+    zeros = np.zeros_like(pose)
+    return replace(state, pose=pose, velocity=zeros, acceleration=zeros, message=message)

@@ -46,25 +46,25 @@ class Viewer:
         rooms: dict[str, Any] = {"/": live}
         if beside:
             every = (live, *beside)
-            rooms = {"/": lambda: _side_by_side([one.name for one in every])}
-            rooms |= {f"/{k}": one for k, one in enumerate(every, start=1)}
+            rooms = {"/": lambda: _side_by_side([page.name for page in every])}
+            rooms |= {f"/{k}": page for k, page in enumerate(every, start=1)}
         self._server: Server | None = Server(host, port, rooms)
         self.port = self._server.port
         shown = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
         self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{self.port}"
         self.beside: tuple[Viewer, ...] = tuple(
-            self._of(one, f"{self.url}/{k}", self.port) for k, one in enumerate(beside, start=2)
+            self._of(page, f"{self.url}/{k}", self.port) for k, page in enumerate(beside, start=2)
         )
-        for one in (live, *beside):
-            one.start()
+        for page in (live, *beside):
+            page.start()
 
     @classmethod
     def _of(cls, live: Live, url: str, port: int) -> Viewer:
         """Return the viewer of a machine whose page another one serves."""
-        found = cls.__new__(cls)
-        found._live, found._server, found.beside = live, None, ()
-        found.url, found.port = url, port
-        return found
+        viewer = cls.__new__(cls)
+        viewer._live, viewer._server, viewer.beside = live, None, ()
+        viewer.url, viewer.port = url, port
+        return viewer
 
     def __enter__(self) -> Self:
         return self
@@ -99,8 +99,8 @@ class Viewer:
 
     def play(self, motion: Motion | Simulation, title: str = "motion") -> None:
         """Play a motion, or what a simulation did, again and again."""
-        found = motion.motion if isinstance(motion, Simulation) else motion
-        self._live.do("load", lambda: self._live.session.take(found, title))
+        path = motion.motion if isinstance(motion, Simulation) else motion
+        self._live.do("load", lambda: self._live.session.take(path, title))
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until all that was asked for is done and sent to the page; say whether it is.
@@ -114,8 +114,8 @@ class Viewer:
 
     def close(self) -> None:
         """End the page; tabs say that the server is gone."""
-        for one in (self, *self.beside):
-            one._live.stop()
+        for viewer in (self, *self.beside):
+            viewer._live.stop()
         if self._server is not None:
             self._server.stop()
             self._server = None
@@ -191,7 +191,7 @@ def view(
     """
     session = _session(robot, payload, motion)
     live = Live(session, _compared(session, compare, enlarge))
-    others = [Live(_session(one, payload, motion), None) for one in beside]
+    others = [Live(_session(machine, payload, motion), None) for machine in beside]
     return Viewer(live, host, port, others)
 
 
@@ -216,10 +216,10 @@ def _compared(
     robot, other = session.state.robot, as_manipulator(compare)
     expect_alike(robot, other)
     if enlarge is None:
-        one, there = (joint_points(each, session.home) for each in (robot, other))
+        points, other_points = (joint_points(each, session.home) for each in (robot, other))
         paths = (guide.path for guide in joint_guides(robot, session.home))
-        size = float(np.ptp(np.vstack([*one.links, *paths]), axis=0).max())
-        enlarge = enlargement(greatest_difference(one, there), size)
+        size = float(np.ptp(np.vstack([*points.links, *paths]), axis=0).max())
+        enlarge = enlargement(greatest_difference(points, other_points), size)
     return other, enlarge
 
 

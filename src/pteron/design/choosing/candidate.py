@@ -95,56 +95,58 @@ class Candidate:
         return asdict(self)
 
 
-def judged(case: Case, found: list[Rating]) -> Candidate:
+def judged(case: Case, ratings: list[Rating]) -> Candidate:
     """Return the best design of a search that can be proved, or why there is none."""
     objectives = case.job.objectives
     first, second = shown_objectives(objectives)[:2]
     good = sorted(
-        (r for r in found if not r.misses), key=lambda r: (r.figures[first], r.figures[second])
+        (r for r in ratings if not r.misses), key=lambda r: (r.figures[first], r.figures[second])
     )
-    counts = len(found), len(good)
+    counts = len(ratings), len(good)
     if not good:
-        nearest = min(found, key=lambda one: one.cost(objectives[0]))
+        nearest = min(ratings, key=lambda rating: rating.cost(objectives[0]))
         return Candidate(case.kind.name, False, tuple(nearest.told.values()), *counts)
     why, tight = "", None
-    for one in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
-        proofs, one.robot = proofs_of(case, one)
+    for rating in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
+        proofs, rating.robot = proofs_of(case, rating)
         bad = next((p for p in proofs if p.counterexample is not None), None)
-        why = str(bad) if bad is not None else _beyond(case, one)
+        why = str(bad) if bad is not None else _beyond(case, rating)
         if not why:
-            made = _candidate(case, one, proofs, counts, front(good, shown_objectives(objectives)))
-            why = _exceeded(case, made)
-            if not why and made.least_margin >= case.job.motors.margin:
-                return made
+            candidate = _candidate(
+                case, rating, proofs, counts, front(good, shown_objectives(objectives))
+            )
+            why = _exceeded(case, candidate)
+            if not why and candidate.least_margin >= case.job.motors.margin:
+                return candidate
             # Where no design keeps the whole margin between the search's places, the best serves.
-            tight = tight or (None if why else made)
+            tight = tight or (None if why else candidate)
     return tight or Candidate(case.kind.name, False, (f"no proof ({why})",), *counts)
 
 
-def _beyond(case: Case, one: Rating) -> str:
+def _beyond(case: Case, rating: Rating) -> str:
     """Return in words where a design leaves its room between the poses of its search; note it."""
-    robot = one.robot
+    robot = rating.robot
     assert robot is not None  # it keeps all that is asked
 
     def taken(poses: Array) -> Array:
-        return case.room.taken(robot, one.middle + poses, one.middle)
+        return case.room.taken(robot, rating.middle + poses, rating.middle)
 
     sizes, misses = case.room.within(case.worst(robot, taken, DENSE)[0])
-    one.figures |= sizes
-    return "".join(f"not so: {told}" for _, told in list(misses.values())[:1])
+    rating.figures |= sizes
+    return "".join(f"not so: {words}" for _, words in list(misses.values())[:1])
 
 
-def _exceeded(case: Case, found: Candidate) -> str:
+def _exceeded(case: Case, candidate: Candidate) -> str:
     """Return in words what a design exceeds between the poses of its search; empty for nothing."""
-    job, figures = case.job, found.figures
+    job, figures = case.job, candidate.figures
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
-    for name, asked in bounds.items():
-        if asked is not None and figures[name] > asked.most:
-            return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * asked.most:g} mm asked"
+    for name, limit in bounds.items():
+        if limit is not None and figures[name] > limit.most:
+            return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * limit.most:g} mm asked"
     if figures["clearance"] < job.floors.clearance:
         return f"not so: a clearance of {1e3 * figures['clearance']:.3g} mm"
-    least = found.least_margin
-    return f"not so: the drives' margin is {least:.3g} at {found.worst}" if least < 1.0 else ""
+    least = candidate.least_margin
+    return f"not so: the drives' margin is {least:.3g} at {candidate.worst}" if least < 1.0 else ""
 
 
 def shown_objectives(objectives: Sequence[str]) -> list[str]:
@@ -154,31 +156,31 @@ def shown_objectives(objectives: Sequence[str]) -> list[str]:
 
 
 def _candidate(
-    case: Case, one: Rating, proofs: list[Proof], counts: tuple[int, int], best: list[Rating]
+    case: Case, rating: Rating, proofs: list[Proof], counts: tuple[int, int], best: list[Rating]
 ) -> Candidate:
-    robot = one.robot
+    robot = rating.robot
     assert robot is not None  # it keeps all that is asked
     carrying = case.loaded(robot)
-    figures = dict(one.figures)
-    time = case.kind.numbers(one.values).get("time")
-    margins = margins_of(case, carrying, one.middle, time)
+    figures = dict(rating.figures)
+    time = case.kind.numbers(rating.values).get("time")
+    margins = margins_of(case, carrying, rating.middle, time)
     figures |= margins.figures
 
     def least(values_of: Callable[[Array], ArrayLike]) -> float:
         def column(poses: Array) -> Array:
-            return np.reshape(values_of(one.middle + poses), (-1, 1))
+            return np.reshape(values_of(rating.middle + poses), (-1, 1))
 
         return float(case.worst(robot, column, DENSE, _WORST)[0][0])
 
     figures["clearance"] = least(lambda poses: clearance(robot, poses).least)
-    if (asked := case.job.accuracy) is not None:
-        given = _tolerances(case, one)
-        figures["error"] = -least(lambda poses: -greatest_errors(asked, robot, poses, given))
+    if (accuracy := case.job.accuracy) is not None:
+        errors = _tolerances(case, rating)
+        figures["error"] = -least(lambda poses: -greatest_errors(accuracy, robot, poses, errors))
     if case.job.stiffness is not None:
-        springs = elasticity(case.sections(one), [o.gearbox.stiffness for o in one.options])
+        springs = elasticity(case.sections(rating), [o.gearbox.stiffness for o in rating.options])
         stiff = least(lambda poses: stiffness(robot, poses, springs).least)
         figures["deflection"] = float(case.job.stiffness.force / stiff)
-    times = _reached(case, carrying, one, margins.place)
+    times = _reached(case, carrying, rating, margins.place)
     objectives = shown_objectives(case.job.objectives)
     return Candidate(
         case.kind.name,
@@ -186,26 +188,26 @@ def _candidate(
         (),
         *counts,
         told(case, proofs),
-        _clear_words(case, robot, one.middle),
+        _clear_words(case, robot, rating.middle),
         _dimensions(robot),
         {name: value for name, value in (figures | times).items() if np.isfinite(value)},
-        tuple(option.name for option in one.options),
+        tuple(option.name for option in rating.options),
         margins.worst,
         tuple({name: r.figures[name] for name in objectives} for r in best),
         text_of(replace(robot, name=f"{case.kind.name}-chosen")),
-        tuple(one.middle.tolist()),
+        tuple(rating.middle.tolist()),
     )
 
 
 def _clear_words(case: Case, robot: Manipulator, middle: Array) -> str:
     least, samples = case.job.floors.clearance, sample_poses(case.job, robot, DENSE)
     count = len(samples) + len(case.between)
-    kept = f"come nearer than {1e3 * least:g} mm" if least else "touch"
+    distance_words = f"come nearer than {1e3 * least:g} mm" if least else "touch"
     if not len(case.between) and is_clear(case, robot, middle):
-        return f"proved: no two links, guides or the platform {kept}"
+        return f"proved: no two links, guides or the platform {distance_words}"
     return (
         f"at {count} sample poses and about the worst of them no two links, guides or the "
-        f"platform {kept}: seen there, without a proof"
+        f"platform {distance_words}: seen there, without a proof"
     )
 
 
@@ -215,37 +217,39 @@ def _dimensions(robot: Manipulator) -> dict[str, float]:
     flat = np.eye(3) - np.outer(axis, axis)
     guides = np.array([leg.guide_point for leg in robot.legs])
     points = np.array([np.array(g.platform_point) @ frame + g.fixed_offset for g in robot.legs])
-    found = {
+    sizes = {
         "base radius": float(np.linalg.norm((guides - guides.mean(axis=0)) @ flat, axis=1).max()),
         "platform radius": float(np.linalg.norm(points @ flat, axis=1).max()),
     }
     words = {"upper": "crank", "lower": "rod"}
     for quantity in (q for leg in robot.legs for q in leg.quantities if q.role == "length"):
         word = words.get(quantity.name.split("_")[0], quantity.name)
-        found[word] = max(found.get(word, 0.0), float(quantity.value[0]))
+        sizes[word] = max(sizes.get(word, 0.0), float(quantity.value[0]))
     strokes = [g.limits[1] - g.limits[0] for g in robot.legs if g.limits and g.joint.unit == "m"]
-    return found | ({"stroke": max(strokes)} if strokes else {})
+    return sizes | ({"stroke": max(strokes)} if strokes else {})
 
 
-def _tolerances(case: Case, one: Rating) -> Tolerances:
+def _tolerances(case: Case, rating: Rating) -> Tolerances:
     """Return the tolerances of a design with its drives."""
-    asked = case.job.accuracy
-    assert asked is not None  # who asks has some
-    gears = np.array([(o.gearbox.ratio, o.gearbox.backlash) for o in one.options])
-    return tolerances(asked, joint_errors(asked, *gears.T).tolist())
+    accuracy = case.job.accuracy
+    assert accuracy is not None  # who asks has some
+    gears = np.array([(o.gearbox.ratio, o.gearbox.backlash) for o in rating.options])
+    return tolerances(accuracy, joint_errors(accuracy, *gears.T).tolist())
 
 
 def _reached(
-    case: Case, robot: Manipulator, one: Rating, place: tuple[Places, int] | None
+    case: Case, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
 ) -> dict[str, float]:
     """Return the shortest time of the cycle at its worst place with these drives, s."""
     if place is None:
         return {}
     cycle, k = place
-    path = _Moved(cycle.at(np.array([k])), one.middle)
+    path = _Moved(cycle.at(np.array([k])), rating.middle)
     # Drives are left what the margin asks for.
-    share, own = case.job.motors.margin, limits_of(robot)
-    limits = replace(own, force=own.force / share, speed=own.speed / share)
+    share, drive_limits = case.job.motors.margin, limits_of(robot)
+    limits = replace(
+        drive_limits, force=drive_limits.force / share, speed=drive_limits.speed / share
+    )
     with suppress(PteronError):  # TOPP-RA is an extra
         return {"shortest_time": time_optimal(robot, path, limits).duration}
     return {}

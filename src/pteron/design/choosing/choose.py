@@ -67,16 +67,20 @@ class Choice:
 
     def robots(self) -> dict[str, str]:
         """Return the machines' files by their names."""
-        return {f"{one.kind}.toml": one.robot for one in self.candidates if one.serves}
+        return {
+            f"{candidate.kind}.toml": candidate.robot
+            for candidate in self.candidates
+            if candidate.serves
+        }
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data, SI units."""
-        found = {
+        contents = {
             "objectives": list(self.job.objectives),
-            "kinds": [one.data() for one in self.candidates],
+            "kinds": [candidate.data() for candidate in self.candidates],
             "job": self.job.model_dump(mode="json", exclude_none=True),
         }
-        return dict(json_ready(found))
+        return dict(json_ready(contents))
 
 
 def choose_machine(
@@ -121,30 +125,30 @@ def choose_machine(
         cannot be read, or a price is asked for of motors that have none.
     """
     cases = cases_of(job)
-    kept = _Kept(None if folder is None else Path(folder) / _KEPT, job, cases)
-    found = {name: known for name in cases if (known := kept.find(name)) is not None}
-    resumed = tuple(found)
-    shares = {name: float(name in found) for name in cases}
+    store = _Kept(None if folder is None else Path(folder) / _KEPT, job, cases)
+    candidates = {name: known for name in cases if (known := store.find(name)) is not None}
+    resumed = tuple(candidates)
+    shares = {name: float(name in candidates) for name in cases}
 
     def tell(name: str, share: float) -> None:
-        shares[name] = share if name in found else _SEARCH * share
+        shares[name] = share if name in candidates else _SEARCH * share
         if progress is not None:
             progress(sum(shares.values()) / len(shares), name)
 
-    left = {name: case for name, case in cases.items() if name not in found}
+    remaining = {name: case for name, case in cases.items() if name not in candidates}
     if begun is not None:
-        begun(tuple(left), resumed)
-    if progress is not None and left:  # what was done before is not this run's
-        progress(sum(shares.values()) / len(shares), next(iter(left)))
-    for name, candidate in _searched(left, workers, tell):
-        found[name] = candidate
-        kept.keep(candidate)
+        begun(tuple(remaining), resumed)
+    if progress is not None and remaining:  # what was done before is not this run's
+        progress(sum(shares.values()) / len(shares), next(iter(remaining)))
+    for name, candidate in _searched(remaining, workers, tell):
+        candidates[name] = candidate
+        store.keep(candidate)
         tell(name, 1.0)
         if finished is not None:
             finished(candidate)
     objective = job.objectives[0]
     order = sorted(
-        found.values(), key=lambda v: (not v.serves, v.figures.get(objective, np.inf), v.kind)
+        candidates.values(), key=lambda v: (not v.serves, v.figures.get(objective, np.inf), v.kind)
     )
     return Choice(job, tuple(order), resumed)
 
@@ -171,13 +175,13 @@ def cases_of(job: Job) -> dict[str, Case]:
     needed = 2.0 * float(job.workspace.half.max())
     tool = job.payload.tool
     kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
-    found = {kind.name: Case(job, kind, options) for kind in kinds}
-    for case in found.values():
+    cases = {kind.name: Case(job, kind, options) for kind in kinds}
+    for case in cases.values():
         try:
             case.loaded(case.kind.robot)
         except PteronError as error:
             raise DataError(f"payload: {error}") from None
-    return found
+    return cases
 
 
 def _driven(name: str, options: Mapping[str, Options], job: Job) -> bool:
@@ -210,14 +214,14 @@ def _searched(
         jobs = {
             pool.submit(_in_process, case, k): name for k, (name, case) in enumerate(cases.items())
         }
-        names, left = list(cases), set(jobs)
-        while left:
-            ready, left = wait(left, timeout=0.5, return_when=FIRST_COMPLETED)
+        names, pending = list(cases), set(jobs)
+        while pending:
+            ready, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
             for name, share in zip(names, done[:], strict=True):
                 if share:
                     tell(name, share)
-            for one in ready:
-                yield jobs[one], one.result()
+            for future in ready:
+                yield jobs[future], future.result()
 
 
 _shares: Any = None

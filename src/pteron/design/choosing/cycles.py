@@ -78,8 +78,8 @@ class Places:
         shift, count = self.shifts[k], len(self.robot.platform.lengths)
         at = ", ".join(f"{1e3 * x:+.0f}" for x in shift[:count])
         angles = zip(self.robot.coordinates[count:], np.degrees(shift[count:]), strict=True)
-        told = "".join(f", {name} {angle:+.0f} deg" for name, angle in angles if angle)
-        return f"{self.name} at ({at}) mm{told}, turned by {np.degrees(self.turns[k]):.0f} deg"
+        tilts = "".join(f", {name} {angle:+.0f} deg" for name, angle in angles if angle)
+        return f"{self.name} at ({at}) mm{tilts}, turned by {np.degrees(self.turns[k]):.0f} deg"
 
     def some(self) -> Places:
         """Return the cycle at the greatest number of places of a search, evenly chosen."""
@@ -135,24 +135,24 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
 def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
     name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
-    given = np.array(cycle.points)
-    points[:, : job.lengths] = given[:, : job.lengths]
-    angles = given[:, job.lengths :]
+    rows = np.array(cycle.points)
+    points[:, : job.lengths] = rows[:, : job.lengths]
+    angles = rows[:, job.lengths :]
     points[:, robot.freedom - angles.shape[1] :] = angles
     # The path is that of the tool, which is at P of this machine.
     bare = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
     path: Path = line_path(bare, points, cycle.corner)
     path = there_and_back(path) if cycle.back else path
     poses = path.at(np.linspace(0.0, path.length, _IN_CYCLE))[0]
-    kept = list(_fitting(job, robot, poses, cycle.anywhere))
-    if not kept:
-        size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(wide(given[:, : job.lengths]), axis=0))
+    fitting = list(_fitting(job, robot, poses, cycle.anywhere))
+    if not fitting:
+        size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(wide(rows[:, : job.lengths]), axis=0))
         room = " x ".join(f"{2e3 * x:.0f}" for x in job.workspace.half)
         where = "" if cycle.anywhere else " where it is (anywhere = false)"
         raise DataError(
             f"cycles[{k}]: {size} mm does not fit into the workspace of {room} mm{where}"
         )
-    shifts, turns = np.array([s for s, _ in kept]), np.array([t for _, t in kept])
+    shifts, turns = np.array([s for s, _ in fitting]), np.array([t for _, t in fitting])
     times = cycle.duration, cycle.dwell, cycle.share or 0.0
     return Places(name, robot, path, shifts, turns, *times, cycle.anywhere)
 
@@ -165,7 +165,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
     """
     half, count = job.workspace.half, len(cycle.robot.platform.lengths)
     poses = cycle.path.at(np.linspace(0.0, cycle.path.length, _IN_CYCLE))[0]
-    path, last, found = wide(poses[:, :count]), poses[:, -1], []
+    path, last, neighbours = wide(poses[:, :count]), poses[:, -1], []
     limits = np.full((2, cycle.robot.freedom), np.nan)
     steps = np.zeros(cycle.robot.freedom)
     steps[:count] = part * half[:count]
@@ -186,9 +186,11 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
         shifts = cycle.shifts[k] + (ways if cycle.anywhere else 0.0 * ways[:1])
         for shift in np.unique(np.fmax(np.fmin(shifts, limits[1]), limits[0]), axis=0):
             if (share := _share(job, turned, wide([shift[:count]])[0])) is not None:
-                found.append((np.append(share * shift[:count], shift[count:]), turn))
+                neighbours.append((np.append(share * shift[:count], shift[count:]), turn))
     return replace(
-        cycle, shifts=np.array([s for s, _ in found]), turns=np.array([t for _, t in found])
+        cycle,
+        shifts=np.array([s for s, _ in neighbours]),
+        turns=np.array([t for _, t in neighbours]),
     )
 
 
@@ -209,8 +211,12 @@ def _fitting(
     half, count = job.workspace.half, len(robot.platform.lengths)
     path = wide(poses[:, :count])
     directions = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS if anywhere else [0.0]
-    own = poses[:, count:]
-    around = list(_angles(job, robot, own)) if anywhere and own.size else [np.zeros(own.shape[1])]
+    angles_of_path = poses[:, count:]
+    around = (
+        list(_angles(job, robot, angles_of_path))
+        if anywhere and angles_of_path.size
+        else [np.zeros(angles_of_path.shape[1])]
+    )
     for turn in directions:
         turned = _turned(path, turn)
         low, high = -half - turned.min(axis=0), half - turned.max(axis=0)
@@ -229,12 +235,12 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
 
     A cycle that tilts by itself keeps its tilts.
     """
-    own = np.zeros((1, angles.shape[1])) if angles[:, :-1].any() else tilts(job, robot)
+    tilted = np.zeros((1, angles.shape[1])) if angles[:, :-1].any() else tilts(job, robot)
     last, ends = angles[:, -1], {0.0}
     if job.workspace.turn is not None:
         ends = {job.workspace.turn[0] - last.min(), job.workspace.turn[1] - last.max()}
     for end in sorted(ends):
-        yield from shifted(own, float(end))
+        yield from shifted(tilted, float(end))
 
 
 def _share(job: Job, path: Array, shift: Array) -> float | None:

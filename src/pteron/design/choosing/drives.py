@@ -78,19 +78,25 @@ def read_gearboxes(path: str | Path) -> tuple[Gearbox, ...]:
         prices(path, len(table)),
         strict=True,
     )
-    found = [
+    gearboxes = [
         Gearbox(name, joint, price=price, **dict(zip(_NUMBERS, numbers, strict=True)))
         for name, joint, numbers, price in rows
     ]
-    for k, one in enumerate(found):
-        if one.joint not in ("rad", "m"):
-            raise DataError(f'{table.place(k)}: joint: {one.joint!r} given, "rad" or "m" expected')
-        if not one.ratio > 0.0 or min(one.inertia, one.backlash) < 0.0 or not one.stiffness > 0.0:
+    for k, gearbox in enumerate(gearboxes):
+        if gearbox.joint not in ("rad", "m"):
+            raise DataError(
+                f'{table.place(k)}: joint: {gearbox.joint!r} given, "rad" or "m" expected'
+            )
+        if (
+            not gearbox.ratio > 0.0
+            or min(gearbox.inertia, gearbox.backlash) < 0.0
+            or not gearbox.stiffness > 0.0
+        ):
             raise DataError(
                 f"{table.place(k)}: ratio and stiffness above 0, inertia and backlash of 0 or more "
                 "expected"
             )
-    return tuple(found)
+    return tuple(gearboxes)
 
 
 def prices(path: str | Path, count: int) -> list[float]:
@@ -101,11 +107,11 @@ def prices(path: str | Path, count: int) -> list[float]:
     table = read_table(path)
     if "price" not in table.columns:
         return [np.nan] * count
-    found = table.numbers(("price",))[:, 0]
-    if (found < 0.0).any():
-        k = int(found.argmin())
-        raise DataError(f"{table.place(k)}: price: {found[k]:g} given, 0 or more expected")
-    return list(map(float, found))
+    column = table.numbers(("price",))[:, 0]
+    if (column < 0.0).any():
+        k = int(column.argmin())
+        raise DataError(f"{table.place(k)}: price: {column[k]:g} given, 0 or more expected")
+    return list(map(float, column))
 
 
 def _price(path: str | Path, motor: Mapping[str, Any]) -> float:
@@ -161,30 +167,32 @@ class Options:
         friction: float,
     ) -> Options:
         """Return them by price or, where one has none, by rated power."""
-        found = [
+        options = [
             Option(motor, gearbox, price + gearbox.price, friction)
             for motor, price in motors
             for gearbox in gearboxes
             if gearbox.joint == joint
         ]
-        priced = all(np.isfinite(one.price) for one in found)
-        return cls(tuple(sorted(found, key=lambda one: one.price if priced else power(one))))
+        priced = all(np.isfinite(option.price) for option in options)
+        return cls(
+            tuple(sorted(options, key=lambda option: option.price if priced else power(option)))
+        )
 
     @cached_property
     def numbers(self) -> Array:
         """Ratio, inertia, rated and peak torque, speed, backlash, stiffness and price (8, O)."""
         rows = [
             (
-                one.gearbox.ratio,
-                one.motor.rotor_inertia + one.gearbox.inertia,
-                one.motor.rated_torque * (1.0 - one.friction),
-                one.motor.peak_torque - one.friction * one.motor.rated_torque,
-                one.motor.max_speed,
-                one.gearbox.backlash,
-                one.gearbox.stiffness,
-                one.price,
+                option.gearbox.ratio,
+                option.motor.rotor_inertia + option.gearbox.inertia,
+                option.motor.rated_torque * (1.0 - option.friction),
+                option.motor.peak_torque - option.friction * option.motor.rated_torque,
+                option.motor.max_speed,
+                option.gearbox.backlash,
+                option.gearbox.stiffness,
+                option.price,
             )
-            for one in self.all
+            for option in self.all
         ]
         return np.array(rows).T
 
@@ -222,22 +230,22 @@ class JointLoads:
     def margins(self, options: Options, legs: Sequence[int]) -> Array:
         """Return what options can do over what legs ask: rated, peak torque, speed, (3, O)."""
         ratio, inertia, rated, peak, speed, *_ = options.numbers
-        one, i, j = list(legs), ratio[:, None], inertia[:, None]
+        chosen, i, j = list(legs), ratio[:, None], inertia[:, None]
         worst_squares = []
         for part in self.squares:
-            f, mixed, a = np.moveaxis(part[None, :, one], -1, 0)
+            f, mixed, a = np.moveaxis(part[None, :, chosen], -1, 0)
             square = f / i[..., None] ** 2 + 2.0 * j[..., None] * mixed
             worst_squares.append((square + (j * i)[..., None] ** 2 * a).max(axis=1))
         square = in_duty(np.array(worst_squares), self.shares).max(axis=1)
-        found = [rated / np.sqrt(np.maximum(square, 1e-30))]
-        force, rise = (part[:, one].ravel() for part in (self.forces, self.accelerations))
+        margins = [rated / np.sqrt(np.maximum(square, 1e-30))]
+        force, rise = (part[:, chosen].ravel() for part in (self.forces, self.accelerations))
         force, rise = _outermost(force, rise)
         worst = np.abs(force / i + j * i * rise).max(axis=1, initial=0.0)
-        f, a = self.everywhere[:, one]
+        f, a = self.everywhere[:, chosen]
         worst = np.maximum(worst, (f / i + j * i * a).max(axis=1))
-        found.append(peak / np.maximum(worst, 1e-15))
-        fastest = float(self.speeds[one].max())
-        return np.array([*found, speed / np.maximum(ratio * fastest, 1e-15)])
+        margins.append(peak / np.maximum(worst, 1e-15))
+        fastest = float(self.speeds[chosen].max())
+        return np.array([*margins, speed / np.maximum(ratio * fastest, 1e-15)])
 
 
 def in_duty(worst: Array, shares: Array) -> Array:
@@ -260,5 +268,7 @@ def read_lists(
     motors: Path, gearboxes: Path
 ) -> tuple[list[tuple[Motor, float]], tuple[Gearbox, ...]]:
     """Return the motors with their prices, and the gearboxes, of two files."""
-    found = read_motors(motors)
-    return list(zip(found, prices(motors, len(found)), strict=True)), read_gearboxes(gearboxes)
+    listed_motors = read_motors(motors)
+    return list(
+        zip(listed_motors, prices(motors, len(listed_motors)), strict=True)
+    ), read_gearboxes(gearboxes)

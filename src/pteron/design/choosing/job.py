@@ -46,13 +46,13 @@ OBJECTIVES = {
 """The objectives that a machine can be chosen for, less being better, with units."""
 
 
-def _named_once(given: list[str], known: Collection[str]) -> list[str]:
-    for k, name in enumerate(given):
+def _named_once(names: list[str], known: Collection[str]) -> list[str]:
+    for k, name in enumerate(names):
         if name not in known:
             raise ValueError(f"{shown(name)} is none of {', '.join(known)}")
-        if name in given[:k]:
+        if name in names[:k]:
             raise ValueError(f"{shown(name)} given twice")
-    return given
+    return names
 
 
 class Job(Table):
@@ -78,13 +78,13 @@ class Job(Table):
 
     @field_validator("objectives")
     @classmethod
-    def _known_objectives(cls, given: list[str]) -> list[str]:
-        return _named_once(given, OBJECTIVES)
+    def _known_objectives(cls, names: list[str]) -> list[str]:
+        return _named_once(names, OBJECTIVES)
 
     @field_validator("kinds")
     @classmethod
-    def _known_kinds(cls, given: list[str] | None) -> list[str] | None:
-        return given and _named_once(given, KINDS)
+    def _known_kinds(cls, names: list[str] | None) -> list[str] | None:
+        return names and _named_once(names, KINDS)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -124,9 +124,9 @@ class Job(Table):
         cell, space, sides = self.cell, self.workspace, 2.0 * self.workspace.half
         at = np.array(space.center or (0.0, 0.0, 0.0))
         if cell.footprint is not None and (sides[:2] > cell.footprint).any():
-            given = " x ".join(f"{1e3 * x:g}" for x in cell.footprint)
+            footprint = " x ".join(f"{1e3 * x:g}" for x in cell.footprint)
             yield (
-                f"cell: a footprint of {given} mm has no room for the workspace, "
+                f"cell: a footprint of {footprint} mm has no room for the workspace, "
                 f"{' x '.join(f'{1e3 * x:g}' for x in sides[:2])} mm"
             )
         if cell.height is not None and sides[2] > cell.height:
@@ -164,15 +164,15 @@ class Job(Table):
         low, high = float(angles[:, -1].min()), float(angles[:, -1].max())
         allowed = space.turn or (0.0, 0.0)
         if low < allowed[0] or high > allowed[1]:
-            given = "not given" if space.turn is None else f"{list(space.turn)}"
+            range_text = "not given" if space.turn is None else f"{list(space.turn)}"
             yield (
-                f"it turns from {low:g} to {high:g} rad, and [workspace] turn is {given}; "
+                f"it turns from {low:g} to {high:g} rad, and [workspace] turn is {range_text}; "
                 f"at least [{min(low, 0.0):g}, {max(high, 0.0):g}] is needed"
             )
         tilt = float(np.arccos(np.cos(angles[:, :-1]).prod(axis=1)).max())
         if tilt > (space.tilt or 0.0) + 1e-9:
-            given = "not given" if space.tilt is None else f"{space.tilt:g}"
-            yield f"it tilts by {tilt:.4g} rad, and [workspace] tilt is {given}; give so much"
+            range_text = "not given" if space.tilt is None else f"{space.tilt:g}"
+            yield f"it tilts by {tilt:.4g} rad, and [workspace] tilt is {range_text}; give so much"
 
     @property
     def lengths(self) -> int:
@@ -201,6 +201,6 @@ def read_job(path: str | Path) -> Job:
         If it cannot be read, has unknown keys or contradicts itself; all its faults are listed.
     """
     source = shown(str(path), bare=True, longest=1000)
-    found = validated(Job, read_toml(path, DataError, _ABSENT), source, DataError)
-    found._folder = Path(path).parent
-    return found
+    job = validated(Job, read_toml(path, DataError, _ABSENT), source, DataError)
+    job._folder = Path(path).parent
+    return job

@@ -27,31 +27,31 @@ _TURNS = 7.0
 """Angle, rad, from which a turn was probably given in degrees."""
 
 
-def _near(given: Any) -> Any:
+def _near(coordinates: Any) -> Any:
     """Refuse lengths, m, that are too large for a cell."""
-    lengths = np.abs(given).ravel()
+    lengths = np.abs(coordinates).ravel()
     if lengths.max() > _FAR:
         raise ValueError(f"{lengths.max():g} m given: are these mm?")
-    return given
+    return coordinates
 
 
-def _fine(given: float) -> float:
+def _fine(error: float) -> float:
     """Refuse errors, m, that are too large for a machine."""
-    if given > _COARSE:
-        raise ValueError(f"{given:g} m given: is this mm?")
-    return given
+    if error > _COARSE:
+        raise ValueError(f"{error:g} m given: is this mm?")
+    return error
 
 
-def _leaning(given: float) -> float:
-    if given >= _LEANS:
-        raise ValueError(f"{given:g} rad given, below {_LEANS:g} expected: is this in degrees?")
-    return given
+def _leaning(angle: float) -> float:
+    if angle >= _LEANS:
+        raise ValueError(f"{angle:g} rad given, below {_LEANS:g} expected: is this in degrees?")
+    return angle
 
 
-def _near_points(given: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+def _near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Refuse points whose first two coordinates, lengths in m, are too large for a cell."""
-    _near([point[:2] for point in given])
-    return given
+    _near([point[:2] for point in points])
+    return points
 
 
 Names = Annotated[list[str], BeforeValidator(listed), Field(min_length=1)]
@@ -92,20 +92,20 @@ class WorkspaceTable(Table):
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
         keys = ("size", "radius", "height", "poses")
-        given = [key for key in keys if getattr(self, key) is not None]
-        if given not in (["size"], ["radius", "height"], ["poses"]):
+        keys_present = [key for key in keys if getattr(self, key) is not None]
+        if keys_present not in (["size"], ["radius", "height"], ["poses"]):
             raise ValueError(
-                f"{', '.join(given) or 'nothing'} given; a box has size, a cylinder radius and "
-                "height, anything else a list of poses"
+                f"{', '.join(keys_present) or 'nothing'} given; a box has size, a cylinder radius "
+                "and height, anything else a list of poses"
             )
-        if self.poses is not None and {len(one) for one in self.poses} not in ({2}, {3}):
+        if self.poses is not None and {len(vector) for vector in self.poses} not in ({2}, {3}):
             raise ValueError("poses: each has x y, or x y z")
         _near(self.poses or 0.0)
         if self.turn is not None and not self.turn[0] < self.turn[1]:
             raise ValueError(f"turn: {list(self.turn)} given, [low, high] expected, rad")
         if self.turn is not None and max(map(abs, self.turn)) > _TURNS:
             raise ValueError(f"turn: {list(self.turn)} rad given: are these degrees?")
-        if self.directions is not None and not all(one[2] > 0.0 for one in self.directions):
+        if self.directions is not None and not all(vector[2] > 0.0 for vector in self.directions):
             raise ValueError("directions: each leads upwards; z above 0 expected")
         return self
 

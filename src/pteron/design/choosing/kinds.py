@@ -63,14 +63,14 @@ class Kind:
 
         So are ball joints, whose cones follow from a machine's proportions.
         """
-        found = load(self.name)
+        template = load(self.name)
         legs = []
-        for leg in found.legs:
+        for leg in template.legs:
             cones = (f"{end}_cone" for end in ("base", "tip", "platform"))
             ends = dict.fromkeys(cone for cone in cones if hasattr(leg, cone))
             legs.append(replace(leg, **ends | ({"limits": None} if slides(leg) else {})))
-        platform = replace(found.platform, tool=self.tool)
-        return replace(found, legs=tuple(legs), platform=platform, radii=None)
+        platform = replace(template.platform, tool=self.tool)
+        return replace(template, legs=tuple(legs), platform=platform, radii=None)
 
     @cached_property
     def like(self) -> Manipulator:
@@ -80,19 +80,19 @@ class Kind:
     @cached_property
     def reach(self) -> tuple[Array, float]:
         """The catalog machine's home pose, and the radius of its reach, m."""
-        found = load(self.name)
-        return home_pose(found), float(search_ball(found)[1])
+        template = load(self.name)
+        return home_pose(template), float(search_ball(template)[1])
 
     @cached_property
     def variables(self) -> dict[str, tuple[float, float]]:
         """The numbers by name, with the least and the greatest value; sizes and times as logs."""
         dimensions, places = KINDS[self.name]
         size = self.needed / self.reach[1]
-        found = {"size": (np.log(_SIZE[0] * size), np.log(_SIZE[1] * size))}
-        found |= dict.fromkeys(dimensions.split(), (np.log(_RATIO[0]), np.log(_RATIO[1])))
-        found |= dict.fromkeys(places, (-0.6, 0.6))
-        found |= {key: (0.0, len(stock) - 1e-9) for key, stock in self._choices.items()}
-        return found | ({"time": (np.log(0.05), np.log(5.0))} if self.free else {})
+        ranges = {"size": (np.log(_SIZE[0] * size), np.log(_SIZE[1] * size))}
+        ranges |= dict.fromkeys(dimensions.split(), (np.log(_RATIO[0]), np.log(_RATIO[1])))
+        ranges |= dict.fromkeys(places, (-0.6, 0.6))
+        ranges |= {key: (0.0, len(stock) - 1e-9) for key, stock in self._choices.items()}
+        return ranges | ({"time": (np.log(0.05), np.log(5.0))} if self.free else {})
 
     @property
     def stocks(self) -> dict[str, list[str]]:
@@ -129,30 +129,30 @@ class Kind:
         ModelError
             If there is no such machine.
         """
-        given = self.numbers(values)
-        size, (home, reach) = given["size"], self.reach
+        numbers = self.numbers(values)
+        size, (home, reach) = numbers["size"], self.reach
         middle = np.where(self.robot.platform.angular, 0.0, size * home)
         for i, letter in enumerate(self.robot.coordinates):
-            if letter in given and letter in "xyz":
-                middle[i] += given[letter] * size * reach
+            if letter in numbers and letter in "xyz":
+                middle[i] += numbers[letter] * size * reach
             elif letter == "x" or (letter == "y" and "z" in KINDS[self.name][1]):
                 middle[i] = 0.0
-        return _built(self.robot, given, self._stock(values), self.links), middle
+        return _built(self.robot, numbers, self._stock(values), self.links), middle
 
     def cut(self, values: Array) -> dict[str, str]:
         """Return what a design's upper and lower links are cut from."""
-        given = self.numbers(values)
-        return {key: names[int(given.get(key, 0.0))] for key, names in self.stocks.items()}
+        numbers = self.numbers(values)
+        return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
     def _stock(self, values: Array) -> dict[str, Stock]:
         return {key: Stock.of(name) for key, name in self.cut(values).items()}
 
     def with_travel(self, leg: Any, travel: tuple[float, float], values: Array) -> Any:
         """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""
-        found = replace(leg, limits=travel)
+        limited = replace(leg, limits=travel)
         if slides(leg):
-            return found
-        return found.with_bodies(_bodies(found, 1.0, self._stock(values), self.links))
+            return limited
+        return limited.with_bodies(_bodies(limited, 1.0, self._stock(values), self.links))
 
 
 def slides(leg: Any) -> bool:
@@ -166,22 +166,22 @@ def _lengths(leg: Any) -> set[str]:
 
 
 def _built(
-    robot: Manipulator, given: Mapping[str, float], stocks: Mapping[str, Stock], links: LinksTable
+    robot: Manipulator, numbers: Mapping[str, float], stocks: Mapping[str, Stock], links: LinksTable
 ) -> Manipulator:
     """Return a machine of another size, proportions and parts.
 
     Lengths grow with the size, other inertias than those of links, platform and carriages with
     its powers.
     """
-    size, platform = given["size"], robot.platform
+    size, platform = numbers["size"], robot.platform
     axis, frame = np.array(platform.axis), np.array(platform.frame)
     flat = np.eye(3) - np.outer(axis, axis)
-    wider = np.eye(3) + (given.get("base_radius", 1.0) - 1.0) * flat
-    outer = np.eye(3) + (given.get("platform_radius", 1.0) - 1.0) * flat
+    wider = np.eye(3) + (numbers.get("base_radius", 1.0) - 1.0) * flat
+    outer = np.eye(3) + (numbers.get("platform_radius", 1.0) - 1.0) * flat
     about = np.mean([leg.guide_point for leg in robot.legs], axis=0)
     legs, radius = [], 0.03
     for leg in robot.legs:
-        found: dict[str, Any] = {}
+        dimensions: dict[str, Any] = {}
         lengths = _lengths(leg)
         for key, values in leg.metres.items():
             parts = np.array(values)
@@ -192,9 +192,9 @@ def _built(
             elif key == "fixed_offset":
                 parts = outer @ parts
             if key in lengths and key.startswith("upper"):
-                parts = given.get("crank", 1.0) * parts
-            found[key] = float(size * parts[0]) if key in lengths else tuple(size * parts)
-        other = replace(leg, **found)
+                parts = numbers.get("crank", 1.0) * parts
+            dimensions[key] = float(size * parts[0]) if key in lengths else tuple(size * parts)
+        other = replace(leg, **dimensions)
         at = np.array(other.platform_point) @ frame + other.fixed_offset
         radius = max(radius, float(np.linalg.norm(flat @ at)))
         legs.append(other.with_bodies(_bodies(other, size, stocks, links)))
@@ -216,17 +216,17 @@ def _bodies(
     leg: Any, size: float, stocks: Mapping[str, Stock], links: LinksTable
 ) -> dict[str, Any]:
     """Return the bodies of a leg: links cut from stock, a carriage, or grown with the size."""
-    found = {}
+    bodies = {}
     for letter, body in leg.bodies.items():
         powers = (_POWERS["I" if k[0] == "I" else "g" if "g" in k else "m"] for k in body.kinds)
         grown = [v * size**p for v, p in zip(body.values, powers, strict=True)]
-        found[letter] = body.of_values(grown)
+        bodies[letter] = body.of_values(grown)
         if slides(leg) and letter == "p":
-            found[letter] = body.of_values([links.carriage] + [0.0] * (len(grown) - 1))
-    return found | cut_links(leg, stocks)
+            bodies[letter] = body.of_values([links.carriage] + [0.0] * (len(grown) - 1))
+    return bodies | cut_links(leg, stocks)
 
 
-def fitting_kinds(asked: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
+def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
     """Return the kinds that can do a motion; of those asked for all must.
 
     Raises
@@ -234,8 +234,8 @@ def fitting_kinds(asked: Sequence[str] | None, lengths: int, turn: bool, tilt: b
     DataError
         If one that is asked for cannot do it, or none can.
     """
-    faults, found = [], []
-    for name in KINDS if asked is None else asked:
+    faults, kinds = [], []
+    for name in KINDS if names is None else names:
         platform = load(name).platform
         lacks = [
             text
@@ -247,11 +247,11 @@ def fitting_kinds(asked: Sequence[str] | None, lengths: int, turn: bool, tilt: b
             if holds
         ]
         if not lacks:
-            found.append(name)
-        elif asked is not None:
+            kinds.append(name)
+        elif names is not None:
             faults.append(f"kinds: {name} {' and '.join(lacks)}, but the job asks for more")
-    if not found and not faults:
+    if not kinds and not faults:
         faults.append("no kind of machine in the catalog has these freedoms")
     if faults:
         raise DataError(told(faults))
-    return found
+    return kinds

@@ -48,11 +48,11 @@ class Margins:
     worst: str = ""
     place: tuple[Places, int] | None = None
 
-    def take(self, name: str, limits: Array, asked: Array) -> Array:
+    def take(self, name: str, limits: Array, loads: Array) -> Array:
         """Return the margins (B,), limits (n,) over loads (B, n), and keep the least."""
-        found = np.asarray((limits / np.maximum(asked, _NOTHING)).min(axis=-1))
-        self.note(name, float(found.min()))
-        return found
+        margins = np.asarray((limits / np.maximum(loads, _NOTHING)).min(axis=-1))
+        self.note(name, float(margins.min()))
+        return margins
 
     def note(self, name: str, margin: float) -> None:
         """Keep a margin if it is the least of its name."""
@@ -71,7 +71,7 @@ def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None
         np.array([getattr(drive, name) or np.inf for drive in drives])
         for name in ("max_force", "rated_force", "max_speed")
     )
-    found, squares, shares = Margins(), [], case.shares(time)
+    least_margins, squares, shares = Margins(), [], case.shares(time)
     for cycle in case.every_cycle:
         duration = cycle.duration or time or 1.0
         places, greatest = cycle.both_ways(), np.zeros(robot.joint_count)
@@ -83,40 +83,43 @@ def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None
             means = (means + cycle.dwell * forces[:, -1] ** 2) / (duration + cycle.dwell)
             greatest = np.maximum(greatest, means.max(axis=0))
             every = [
-                found.take("peak_margin", most, np.abs(forces).max(axis=1)),
-                found.take("speed_margin", fastest, np.abs(rates).max(axis=1)),
+                least_margins.take("peak_margin", most, np.abs(forces).max(axis=1)),
+                least_margins.take("speed_margin", fastest, np.abs(rates).max(axis=1)),
             ]
             if not len(shares):
-                every.append(found.take("rated_margin", rated, np.sqrt(means)))
-            if np.min(every) < found.least:
+                every.append(least_margins.take("rated_margin", rated, np.sqrt(means)))
+            if np.min(every) < least_margins.least:
                 k = int(np.min(every, axis=0).argmin())
-                found.least, found.place = float(np.min(every)), (places, k)
-                found.worst = places.words(k)
+                least_margins.least, least_margins.place = float(np.min(every)), (places, k)
+                least_margins.worst = places.words(k)
             worst = np.unique(np.argsort([*every, *-means.T], axis=1)[:, :_KEPT])
             places = near_places(case.job, places, worst, 0.5 ** (step + 1))
         squares.append(greatest)
     if len(shares):
         load = np.sqrt(in_duty(np.array(squares), shares))
-        least = float(found.take("rated_margin", rated, load[None])[0])
-        if least < found.least:
-            found.least, found.worst = least, "the rated torque of the whole duty cycle"
-    asked = case.job.motion
-    if asked.acceleration or asked.speed:
-        speed = max(asked.speed, _NOTHING)
+        least = float(least_margins.take("rated_margin", rated, load[None])[0])
+        if least < least_margins.least:
+            least_margins.least, least_margins.worst = (
+                least,
+                "the rated torque of the whole duty cycle",
+            )
+    required = case.job.motion
+    if required.acceleration or required.speed:
+        speed = max(required.speed, _NOTHING)
 
         def in_any_direction(places: Array) -> Array:
             poses = middle + places
-            forces = worst_forces(robot, poses, speed, asked.acceleration)
+            forces = worst_forces(robot, poses, speed, required.acceleration)
             loads = np.hstack([forces, worst_speeds(robot, poses, speed)])
             return np.append(most, fastest) / np.maximum(loads, _NOTHING)
 
         margins, where = about_the_worst(case.job, robot, in_any_direction, DENSE, keep=2)
-        found.note("peak_margin", float(margins[: len(most)].min()))
-        found.note("speed_margin", float(margins[len(most) :].min()))
-        if margins.min() < found.least:
+        least_margins.note("peak_margin", float(margins[: len(most)].min()))
+        least_margins.note("speed_margin", float(margins[len(most) :].min()))
+        if margins.min() < least_margins.least:
             worst_pose = middle + where[int(margins.argmin())]
             place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
             at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
-            found.least = float(margins.min())
-            found.worst = f"the motion in any direction, at ({at}) mm"
-    return found
+            least_margins.least = float(margins.min())
+            least_margins.worst = f"the motion in any direction, at ({at}) mm"
+    return least_margins

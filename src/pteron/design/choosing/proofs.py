@@ -48,8 +48,8 @@ class TurnedTool:
 
     def holds(self, poses: Array) -> NDArray[np.bool_]:
         """Return which poses (..., m) lie in it."""
-        rest = np.zeros_like(poses)
-        return self.of_tool.holds(tool_motion(self.platform, poses, rest, rest)[0])
+        zeros = np.zeros_like(poses)
+        return self.of_tool.holds(tool_motion(self.platform, poses, zeros, zeros)[0])
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
         """Return which boxes with corners (B, m) certainly have none of these poses."""
@@ -63,24 +63,24 @@ class TurnedTool:
         """
         platform, angular = self.platform, self.platform.angular
         middle, half = 0.5 * (low + high)[:, angular], 0.5 * (high - low)[:, -1:]
-        rest = np.zeros_like(middle)
+        zeros = np.zeros_like(middle)
         at, away = np.zeros_like(low), np.zeros_like(low)
-        at[:, ~angular] = arm_motion(platform, middle, rest, rest)[0]
+        at[:, ~angular] = arm_motion(platform, middle, zeros, zeros)[0]
         away[:, ~angular] = (1.0 + 1e-12) * np.hypot(*platform.tool[:2]) * half
         return at, away
 
 
-def proofs_of(case: Case, one: Rating) -> tuple[list[Proof], Manipulator]:
+def proofs_of(case: Case, rating: Rating) -> tuple[list[Proof], Manipulator]:
     """Return proofs of the workspace, and the machine, its guides and rams lengthened if needed."""
-    robot, floors = one.robot, case.job.floors
+    robot, floors = rating.robot, case.job.floors
     assert robot is not None  # a design that keeps all requirements has one
-    found: list[Proof] = []
+    proofs: list[Proof] = []
     for _ in range(4):
-        found = [
+        proofs = [
             prove(robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_BOXES)
-            for region in regions(case, robot, one.middle)
+            for region in regions(case, robot, rating.middle)
         ]
-        causes = {c.leg for proof in found if not proof.holds for c in proof.causes}
+        causes = {c.leg for proof in proofs if not proof.holds for c in proof.causes}
         ended = {i for i in causes if i and robot.legs[i - 1].joint.unit == "m"}
         if not ended:
             break
@@ -89,9 +89,9 @@ def proofs_of(case: Case, one: Rating) -> tuple[list[Proof], Manipulator]:
             low, high = legs[i - 1].limits or (0.0, 0.0)
             spare = _LONGER * (high - low)
             travel = low - spare, high + spare
-            legs[i - 1] = case.kind.with_travel(legs[i - 1], travel, one.values)
+            legs[i - 1] = case.kind.with_travel(legs[i - 1], travel, rating.values)
         robot = replace(robot, legs=tuple(legs))
-    return found, robot
+    return proofs, robot
 
 
 def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
@@ -104,23 +104,23 @@ def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
         return [Box(tuple(pose), tuple(pose)) for pose in middle + case.poses]
     if space.turn is not None and not space.tilts and space.radius is None:
         return [_turning(case, robot, middle)]
-    found: list[Region] = []
+    boxes: list[Region] = []
     half = np.zeros(robot.freedom)
     half[:count] = case.half[:count]
     for pose in middle + with_tool_in_the_middle(robot, orientations(case.job, robot)):
         if space.radius is not None and space.height is not None:
-            found.append(Cylinder(tuple(pose.tolist()), space.radius, space.height))
+            boxes.append(Cylinder(tuple(pose.tolist()), space.radius, space.height))
         else:
-            found.append(Box(tuple((pose - half).tolist()), tuple((pose + half).tolist())))
-    return found
+            boxes.append(Box(tuple((pose - half).tolist()), tuple((pose + half).tolist())))
+    return boxes
 
 
 def _turning(case: Case, robot: Manipulator, middle: Array) -> Region:
     """Return the box of positions and turns of a workspace with a range of turns."""
     platform, count = robot.platform, len(robot.platform.lengths)
     assert case.job.workspace.turn is not None  # the caller has checked it
-    rest = np.zeros((1, robot.freedom))
-    level = tool_motion(platform, middle[None], rest, rest)[0][0]
+    zeros = np.zeros((1, robot.freedom))
+    level = tool_motion(platform, middle[None], zeros, zeros)[0][0]
     low, high = level.copy(), level.copy()
     low[:count] -= case.half[:count]
     high[:count] += case.half[:count]
@@ -138,19 +138,23 @@ def told(case: Case, proofs: Sequence[Proof]) -> str:
             "of all"
         )
     if space.poses is not None:
-        kept = f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+        statement = (
+            f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+        )
         between = f"; so do the cycles between them at {len(case.between)} samples"
-        return kept + (between if len(case.between) else "")
-    one = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
-    found = f"every {one} keeps reach, limits and floors, by intervals over {boxes} boxes"
-    return f"proved at the sampled tilts alone: {found}" if space.tilt else f"proved: {found}"
+        return statement + (between if len(case.between) else "")
+    noun = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
+    statement = f"every {noun} keeps reach, limits and floors, by intervals over {boxes} boxes"
+    return (
+        f"proved at the sampled tilts alone: {statement}" if space.tilt else f"proved: {statement}"
+    )
 
 
 def is_clear(case: Case, robot: Manipulator, middle: Array) -> bool:
     """Say whether it is proved that no two bodies come nearer than the least clearance."""
     radii, least = robot.radii or Radii(), case.job.floors.clearance / 2.0
     parts = (radii.guide, radii.upper, radii.lower, radii.platform)
-    asked = interference(robot, Radii(*(part + least for part in parts)))
-    whole = regions(case, robot, middle)
-    most = _BOXES_CLEAR // len(whole)
-    return all(prove(robot, region, given=asked, most=most).holds for region in whole)
+    required = interference(robot, Radii(*(part + least for part in parts)))
+    workspace = regions(case, robot, middle)
+    most = _BOXES_CLEAR // len(workspace)
+    return all(prove(robot, region, given=required, most=most).holds for region in workspace)

@@ -131,30 +131,30 @@ class Case:
 
     def rate(self, values: Array) -> Rating:
         """Return how the machine of a design does the job; call it within `alike(kind.like)`."""
-        found = Rating(np.asarray(values, dtype=float))
+        rating = Rating(np.asarray(values, dtype=float))
         try:
-            robot, found.middle = self.kind.machine(values)
+            robot, rating.middle = self.kind.machine(values)
         except ModelError:
-            found.stage = 1
-            _miss(found, "machine", 1.0, "numbers that no machine has")
-            return found
-        found.robot = robot
+            rating.stage = 1
+            _miss(rating, "machine", 1.0, "numbers that no machine has")
+            return rating
+        rating.robot = robot
         for stage, judge in enumerate((self._reach, self._room, self._drive, self._rest), start=1):
-            judge(found)
-            if found.misses:
-                found.stage = stage
-                return found
-        return found
+            judge(rating)
+            if rating.misses:
+                rating.stage = stage
+                return rating
+        return rating
 
-    def _reach(self, found: Rating) -> None:
+    def _reach(self, rating: Rating) -> None:
         """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
-        robot, poses, floors = _of(found), found.middle + self.visited, self.job.floors
+        robot, poses, floors = _of(rating), rating.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
         if least >= 0.0:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
 
             def measures(places: Array) -> Array:
-                poses = found.middle + places
+                poses = rating.middle + places
                 squares, determinant, room = (
                     numeric(robot, name)(poses)[0]
                     for name in ("squared_type_i", "type_ii", "passive_room")
@@ -163,26 +163,26 @@ class Case:
                 every = np.column_stack([squares, signed, room])
                 return np.asarray(np.nan_to_num(every, nan=1.0))
 
-            lowest, found.worst = self.worst(robot, measures)
+            lowest, rating.worst = self.worst(robot, measures)
             legs_least, type_ii, room = np.split(lowest, [robot.joint_count, robot.joint_count + 1])
             least = float(legs_least.min())
-        found.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
+        rating.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
         if least < 0.0:
-            _miss(found, "reach", 1.0 - least, "a leg that does not reach the whole workspace")
+            _miss(rating, "reach", 1.0 - least, "a leg that does not reach the whole workspace")
             return
-        found.figures["type_ii"] = float(type_ii[0])
-        _below(found, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
-        _below(found, "type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
-        _below(found, "passive joints' margin to their limits", float(room.min()), 0.0)
+        rating.figures["type_ii"] = float(type_ii[0])
+        _below(rating, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
+        _below(rating, "type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
+        _below(rating, "passive joints' margin to their limits", float(room.min()), 0.0)
         joints = inverse_kinematics(robot, poses, on_failure="nan")
         if not np.isfinite(joints).all():
-            _miss(found, "reach", 1.0, "a leg that does not reach the whole workspace")
+            _miss(rating, "reach", 1.0, "a leg that does not reach the whole workspace")
             return
         shortest, longest = joints.min(axis=0), joints.max(axis=0)
         if self.job.workspace.tilt is not None:
             # Between the tilts of the samples rams are longer and shorter.
             def ends(places: Array) -> Array:
-                at = inverse_kinematics(robot, found.middle + places, on_failure="nan")
+                at = inverse_kinematics(robot, rating.middle + places, on_failure="nan")
                 return np.asarray(np.nan_to_num(np.hstack([at, -at]), nan=np.inf))
 
             shortest, longest = np.split(self.worst(robot, ends)[0], 2)
@@ -194,48 +194,48 @@ class Case:
                 travel = float(low - spare), float(high + spare)
                 if not slides(leg):
                     beyond = travel[1] - _TELESCOPE * travel[0]
-                    _below(found, "rams' margin to their shortest", -beyond / travel[1], 0.0)
-                if slides(leg) or not found.misses:
-                    leg = self.kind.with_travel(leg, travel, found.values)
+                    _below(rating, "rams' margin to their shortest", -beyond / travel[1], 0.0)
+                if slides(leg) or not rating.misses:
+                    leg = self.kind.with_travel(leg, travel, rating.values)
             elif leg.limits is not None:
                 half = 0.5 * (leg.limits[1] - leg.limits[0])
                 margin = min(low - leg.limits[0], leg.limits[1] - high) / half
-                _below(found, "joints' margin to their limits", float(margin), 0.01)
+                _below(rating, "joints' margin to their limits", float(margin), 0.01)
             legs.append(leg)
-        found.robot = replace(robot, legs=tuple(legs))
+        rating.robot = replace(robot, legs=tuple(legs))
 
-    def _room(self, found: Rating) -> None:
+    def _room(self, rating: Rating) -> None:
         """Judge the footprint, the height, what is to be kept out of, and whether links touch."""
-        figures, misses = self.room.judged(_of(found), found.middle + self.visited, found.middle)
-        found.figures |= figures
-        for name, (share, told) in misses.items():
-            _miss(found, name, share, told)
+        figures, misses = self.room.judged(_of(rating), rating.middle + self.visited, rating.middle)
+        rating.figures |= figures
+        for name, (share, words) in misses.items():
+            _miss(rating, name, share, words)
 
-    def _drive(self, found: Rating) -> None:
+    def _drive(self, rating: Rating) -> None:
         """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
-        robot = self.loaded(_of(found))
-        given = self.kind.numbers(found.values)
+        robot = self.loaded(_of(rating))
+        numbers = self.kind.numbers(rating.values)
         try:
-            loads, work = self.loads(robot, found, given.get("time"))
+            loads, work = self.loads(robot, rating, numbers.get("time"))
             errors = gives = None
             if self.job.accuracy is not None:
-                poses = found.middle + np.vstack([self.poses, found.worst])
+                poses = rating.middle + np.vstack([self.poses, rating.worst])
                 errors = unit_errors(self.job.accuracy, robot, poses)
             if self.job.stiffness is not None:
-                poses = found.middle + np.vstack([self.corners, found.worst])
-                gives = compliances(robot, poses, self.sections(found))
+                poses = rating.middle + np.vstack([self.corners, rating.worst])
+                gives = compliances(robot, poses, self.sections(rating))
         except PteronError:
-            _miss(found, "loads", 1.0, "a singularity or the edge of its reach on a cycle")
+            _miss(rating, "loads", 1.0, "a singularity or the edge of its reach on a cycle")
             return
         options: list[Option | None] = [None] * robot.joint_count
-        asked, near = self.job.motors.margin, 0.0
+        margin, near = self.job.motors.margin, 0.0
         for legs in self.groups:
             all_ = self.options[robot.legs[legs[0]].joint.unit]
             margins = loads.margins(all_, legs)
             shares = {
-                "rated torque": margins[0] / asked,
-                "peak torque": margins[1] / asked,
-                "motor speed": margins[2] / asked,
+                "rated torque": margins[0] / margin,
+                "peak torque": margins[1] / margin,
+                "motor speed": margins[2] / margin,
             }
             if self.job.accuracy is not None and errors is not None:
                 of_options = errors_with(self.job.accuracy, errors, *all_.numbers[[0, 5]])
@@ -251,28 +251,28 @@ class Case:
                 for name, share in shares.items():
                     if (part := float(share[best])) < 1.0:
                         much = f"{part:.0%}" if part >= 0.01 else "less than 1%"
-                        told = f"{name} {much} of what is asked, with {all_.all[best].name}"
-                        _miss(found, name, 1.0 / max(part, 1e-3) - 1.0, told)
+                        words = f"{name} {much} of what is asked, with {all_.all[best].name}"
+                        _miss(rating, name, 1.0 / max(part, 1e-3) - 1.0, words)
                 return
             first = int(good[0])
             if first:
                 near += float(1.0 - min(1.0, least[:first].max()))
             for leg in legs:
                 options[leg] = all_.all[first]
-        found.near = near / len(self.groups)
-        found.options = tuple(o for o in options if o is not None)
+        rating.near = near / len(self.groups)
+        rating.options = tuple(o for o in options if o is not None)
         legs_with = (
             replace(leg, drive=option.drive)
-            for leg, option in zip(_of(found).legs, found.options, strict=True)
+            for leg, option in zip(_of(rating).legs, rating.options, strict=True)
         )
-        found.robot = replace(_of(found), legs=tuple(legs_with))
-        friction = np.array([option.drive.coulomb for option in found.options])
-        found.figures |= {
-            "price": float(sum(o.price for o in found.options)),
-            "rated_power": float(sum(map(power, found.options))),
-            "moving_mass": moving_mass(found.robot),
+        rating.robot = replace(_of(rating), legs=tuple(legs_with))
+        friction = np.array([option.drive.coulomb for option in rating.options])
+        rating.figures |= {
+            "price": float(sum(o.price for o in rating.options)),
+            "rated_power": float(sum(map(power, rating.options))),
+            "moving_mass": moving_mass(rating.robot),
             "energy": self._energy([float((w + way @ friction).max()) for w, way in work]),
-            "cycle_time": given.get("time", 0.0),
+            "cycle_time": numbers.get("time", 0.0),
         }
 
     def worst(
@@ -287,8 +287,8 @@ class Case:
 
     def shares(self, time: float | None) -> Array:
         """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""
-        given = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
-        return np.array([share * whole for share, whole in given])
+        pairs = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
+        return np.array([share * duration for share, duration in pairs])
 
     def _energy(self, worst: Sequence[float]) -> float:
         """Return the energy of a cycle, J: on the mean of a duty cycle, or the greatest."""
@@ -297,24 +297,24 @@ class Case:
             return max(worst, default=0.0)
         return float(np.average(worst, weights=shares))
 
-    def _rest(self, found: Rating) -> None:
+    def _rest(self, rating: Rating) -> None:
         """Judge what else has a greatest value."""
         for name, most in self.job.most.model_dump().items():
-            _above(found, name, found.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
+            _above(rating, name, rating.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
 
     def loaded(self, robot: Manipulator) -> Manipulator:
         """Return a machine with the payload."""
         return self.job.payload.on(robot)
 
-    def sections(self, found: Rating) -> dict[str, Section]:
+    def sections(self, rating: Rating) -> dict[str, Section]:
         """Return the sections of a design's links."""
-        return link_sections(_of(found), self.kind.cut(found.values))
+        return link_sections(_of(rating), self.kind.cut(rating.values))
 
     def loads(
-        self, robot: Manipulator, found: Rating, time: float | None
+        self, robot: Manipulator, rating: Rating, time: float | None
     ) -> tuple[JointLoads, list[tuple[Array, Array]]]:
         """Return the loads of all cycles at all places, and of each the work and ways of joints."""
-        n, middle = robot.joint_count, found.middle
+        n, middle = robot.joint_count, rating.middle
         squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
         speeds = np.zeros(n)
         for cycle in self.cycles:
@@ -323,25 +323,29 @@ class Case:
             f = drive_forces(robot, *states)
             a = joint_accelerations(robot, *states).actuated
             v = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
-            held = cycle.dwell * np.stack([f[:, -1] ** 2, *[np.zeros_like(f[:, -1])] * 2], axis=-1)
+            dwelling = cycle.dwell * np.stack(
+                [f[:, -1] ** 2, *[np.zeros_like(f[:, -1])] * 2], axis=-1
+            )
             means = np.trapezoid(np.stack([f * f, f * a, a * a], axis=-1), axis=1)
             means = means * duration / (f.shape[1] - 1)
-            squares.append((means + held) / (duration + cycle.dwell))
+            squares.append((means + dwelling) / (duration + cycle.dwell))
             step = duration / (f.shape[1] - 1)
-            given = np.trapezoid(np.maximum(f * v, 0.0), axis=1).sum(axis=-1) * step
+            energy = np.trapezoid(np.maximum(f * v, 0.0), axis=1).sum(axis=-1) * step
             ways = np.trapezoid(np.abs(v), axis=1) * step
-            work.append((given, ways))
+            work.append((energy, ways))
             forces.append(f.reshape(-1, n))
             rises.append(a.reshape(-1, n))
             speeds = np.maximum(speeds, np.abs(v).max(axis=(0, 1)))
-        asked = self.job.motion
+        required = self.job.motion
         everywhere = np.zeros((2, n))
-        if asked.acceleration or asked.speed:
-            poses = middle + np.vstack([self.outline, found.worst])
+        if required.acceleration or required.speed:
+            poses = middle + np.vstack([self.outline, rating.worst])
             heavy = (replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
-            speed = max(asked.speed, 1e-6)
-            everywhere[0] = worst_forces(robot, poses, speed, asked.acceleration).max(axis=0)
-            spun = worst_forces(replace(robot, legs=tuple(heavy)), poses, speed, asked.acceleration)
+            speed = max(required.speed, 1e-6)
+            everywhere[0] = worst_forces(robot, poses, speed, required.acceleration).max(axis=0)
+            spun = worst_forces(
+                replace(robot, legs=tuple(heavy)), poses, speed, required.acceleration
+            )
             everywhere[1] = spun.max(axis=0) / _HEAVY
             speeds = np.maximum(speeds, worst_speeds(robot, poses, speed).max(axis=0))
         loads = JointLoads(
@@ -360,25 +364,25 @@ class Case:
         return middle + pose, velocity / duration, acceleration / duration**2
 
 
-def _of(found: Rating) -> Manipulator:
-    assert found.robot is not None  # the first stage has made it
-    return found.robot
+def _of(rating: Rating) -> Manipulator:
+    assert rating.robot is not None  # the first stage has made it
+    return rating.robot
 
 
-def _miss(found: Rating, name: str, share: float, told: str) -> None:
+def _miss(rating: Rating, name: str, share: float, words: str) -> None:
     """Note that a bound is missed."""
-    if share > found.misses.get(name, 0.0):
-        found.misses[name], found.told[name] = float(share), told
+    if share > rating.misses.get(name, 0.0):
+        rating.misses[name], rating.told[name] = float(share), words
 
 
-def _below(found: Rating, name: str, value: float, least: float, unit: str = "") -> None:
+def _below(rating: Rating, name: str, value: float, least: float, unit: str = "") -> None:
     if not value >= least:
         share = least - value if np.isfinite(value) else 1.0
-        _miss(found, name, share, f"{name} {value:.3g}{unit}, at least {least:.3g}{unit} asked")
+        _miss(rating, name, share, f"{name} {value:.3g}{unit}, at least {least:.3g}{unit} asked")
 
 
-def _above(found: Rating, name: str, value: float, most: float | None, unit: str) -> None:
+def _above(rating: Rating, name: str, value: float, most: float | None, unit: str) -> None:
     if most is not None and not value <= most:
         share = value / most - 1.0 if np.isfinite(value) else 1.0
         words = name.replace("_", " ")
-        _miss(found, name, share, f"{words} {value:.4g}{unit}, at most {most:g}{unit} asked")
+        _miss(rating, name, share, f"{words} {value:.4g}{unit}, at most {most:g}{unit} asked")

@@ -46,13 +46,13 @@ class Room:
         """
         floor = self._job.floors.clearance
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        figures, found = self.within(self._taken(robot, poses, points, middle).min(axis=0), _TIGHT)
+        figures, misses = self.within(self._taken(robot, poses, points, middle).min(axis=0), _TIGHT)
         clear = self._clearance(robot, poses, points)
         if clear < floor + _SPARE:
-            asked = f"at least {1e3 * floor:g} mm asked, and {1e3 * _SPARE:g} mm to spare"
-            told = f"clearance {1e3 * clear:.3g} mm, {asked}"
-            found["clearance"] = (floor + _SPARE - clear) / _CLOSE, told
-        return figures, found
+            requirement = f"at least {1e3 * floor:g} mm asked, and {1e3 * _SPARE:g} mm to spare"
+            words = f"clearance {1e3 * clear:.3g} mm, {requirement}"
+            misses["clearance"] = (floor + _SPARE - clear) / _CLOSE, words
+        return figures, misses
 
     def taken(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
         """Return the room that a machine takes at poses (N, 6 + boxes), from the tool's middle, m.
@@ -88,7 +88,7 @@ class Room:
         most = dict(zip(("width", "depth"), cell.footprint or (np.inf, np.inf), strict=True))
         most["height"] = cell.height or np.inf
         spare = f", and {1e3 * tight:g} mm to spare" if tight else ""
-        found: Misses = {
+        misses: Misses = {
             name: (
                 (figures[name] + tight) / m - 1.0,
                 f"{name} {figures[name]:.4g} m, at most {m:g} m asked{spare}",
@@ -100,11 +100,11 @@ class Room:
             at = np.array(self._job.workspace.center)
             beyond = float(np.maximum(cell.low - (at + low), at + high - cell.high).max())
             if beyond + tight > 0.0:
-                found["cell"] = beyond + tight, f"{_parts(beyond)} outside the cell{spare}"
+                misses["cell"] = beyond + tight, f"{_parts(beyond)} outside the cell{spare}"
         inside = -float(outside.min(initial=np.inf))
         if inside + tight > 0.0:
-            found["keep-out"] = inside + tight, f"{_parts(inside)} inside a keep-out box{spare}"
-        return figures, found
+            misses["keep-out"] = inside + tight, f"{_parts(inside)} inside a keep-out box{spare}"
+        return figures, misses
 
     def _clearance(self, robot: Manipulator, poses: Array, points: Array) -> float:
         """Return the least distance of bodies, m; `points` are those of the joints at the poses.
@@ -112,19 +112,19 @@ class Room:
         Guides, whose ends a program of many machines does not know, are measured to the links of
         other legs.
         """
-        radii, found = robot.radii, [np.inf]
+        radii, distances = robot.radii, [np.inf]
         assert radii is not None  # every design has them
         known = np.asarray(numeric(robot, "least_clearances")(poses)[0])
         for (a, b), values in zip(self._meetings, known.reshape(len(poses), -1).T, strict=True):
-            found.append(values.min() - getattr(radii, a) - getattr(radii, b))
+            distances.append(values.min() - getattr(radii, a) - getattr(radii, b))
         thick = radii.guide + max(radii.upper, radii.lower)
         for i, low, high in _guides(robot):
             others = np.delete(points, i, axis=-3)
             starts, ends = others[..., :-1, :].reshape(-1, 3), others[..., 1:, :].reshape(-1, 3)
             guide = (np.tile(end[:, None], len(starts)) for end in (low, high))
             squares = np.array(_squared_distances()(*guide, starts.T, ends.T))
-            found.append(float(np.sqrt(np.nanmin(squares))) - thick)
-        return float(min(found))
+            distances.append(float(np.sqrt(np.nanmin(squares))) - thick)
+        return float(min(distances))
 
     @cached_property
     def _meetings(self) -> list[tuple[Any, Any]]:

@@ -36,20 +36,20 @@ _ROUNDS = 4
 def of_platform(robot: Manipulator, *curve: Array) -> Curve:
     """Return places of the tool from the middle, and two derivatives, as those of P."""
     pose, first, second = pose_motion(robot.platform, *curve)
-    rest = np.zeros((1, robot.freedom))
-    return pose + tool_motion(robot.platform, rest, rest, rest)[0], first, second
+    zeros = np.zeros((1, robot.freedom))
+    return pose + tool_motion(robot.platform, zeros, zeros, zeros)[0], first, second
 
 
 def with_tool_in_the_middle(robot: Manipulator, angles: Array) -> Array:
     """Return poses (A, m) from the middle at which P is elsewhere, but the tool is there."""
-    found = np.zeros((len(angles), robot.freedom))
-    found[:, len(robot.platform.lengths) :] = angles
-    return of_platform(robot, found, np.zeros_like(found), np.zeros_like(found))[0]
+    poses = np.zeros((len(angles), robot.freedom))
+    poses[:, len(robot.platform.lengths) :] = angles
+    return of_platform(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
 
 
-def sample_poses(job: Job, robot: Manipulator, along: int | None = None) -> Array:
+def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Array:
     """Return poses (N, m) over the workspace and its orientations, from its middle."""
-    return _poses_at(job, robot, _places(job, robot, along or _along(job)))
+    return _poses_at(job, robot, _places(job, robot, count or _along(job)))
 
 
 def about_the_worst(
@@ -96,23 +96,23 @@ def _ways(steps: Array, count: int) -> Array:
     several = [(-1.0, 0.0, 1.0) if step else (0.0,) for step in steps]
     if not steps[count:-1].any():
         return np.array(list(product(*several)))
-    still = [(0.0,)] * len(steps)
-    parts = (several[:count] + still[count:], still[:count] + several[count:])
+    fixed = [(0.0,)] * len(steps)
+    parts = (several[:count] + fixed[count:], fixed[:count] + several[count:])
     return np.unique(np.vstack([list(product(*part)) for part in parts]), axis=0)
 
 
 def _into(job: Job, places: Array, count: int) -> Array:
     """Return places (N, m) brought into the workspace where they are outside."""
-    space, half, found = job.workspace, job.workspace.half[:count], places.copy()
+    space, half, clipped = job.workspace, job.workspace.half[:count], places.copy()
     if space.poses is None:
-        found[:, :count] = np.clip(found[:, :count], -half, half)
+        clipped[:, :count] = np.clip(clipped[:, :count], -half, half)
     if space.radius is not None:
-        found[:, :2] = _within(found[:, :2], space.radius)
+        clipped[:, :2] = _within(clipped[:, :2], space.radius)
     if space.tilt is not None:
-        found[:, count : count + 2] = _within(found[:, count : count + 2], space.tilt)
+        clipped[:, count : count + 2] = _within(clipped[:, count : count + 2], space.tilt)
     if space.turn is not None and space.directions is None:
-        found[:, -1] = np.clip(found[:, -1], *space.turn)
-    return np.unique(found, axis=0)
+        clipped[:, -1] = np.clip(clipped[:, -1], *space.turn)
+    return np.unique(clipped, axis=0)
 
 
 def _within(points: Array, radius: float) -> Array:
@@ -125,12 +125,12 @@ def _along(job: Job) -> int:
     return _ALONG_TILTED if job.workspace.tilts else _ALONG
 
 
-def _places(job: Job, robot: Manipulator, along: int) -> Array:
+def _places(job: Job, robot: Manipulator, count: int) -> Array:
     """Return places (N, m): of the tool from the middle, and angles of the platform.
 
     Of a cone of tilts the angles are how far the platform leans to x and to y, and its turn.
     """
-    points = _positions(job, along)[:, : len(robot.platform.lengths)]
+    points = _positions(job, count)[:, : len(robot.platform.lengths)]
     angles = orientations(job, robot)
     if job.workspace.tilt is not None:
         leans = [(*lean, turn) for turn in _turns(job) for lean in _leans(job.workspace.tilt)]
@@ -144,23 +144,23 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     if job.workspace.tilt is not None:
         angles = _leaning(robot, angles[:, :2])
         angles[:, -1] += places[:, -1]
-    found = with_tool_in_the_middle(robot, angles)
-    found[:, :count] += places[:, :count]
-    return found
+    poses = with_tool_in_the_middle(robot, angles)
+    poses[:, :count] += places[:, :count]
+    return poses
 
 
 def wide(rows: object) -> Array:
     """Return rows of two or three numbers with three."""
-    found = np.asarray(rows, dtype=float)
-    return np.pad(found, ((0, 0), (0, 3 - found.shape[1])))
+    array = np.asarray(rows, dtype=float)
+    return np.pad(array, ((0, 0), (0, 3 - array.shape[1])))
 
 
-def _positions(job: Job, along: int) -> Array:
+def _positions(job: Job, count: int) -> Array:
     space, half = job.workspace, job.workspace.half
     if space.poses is not None:
-        given = wide(space.poses)
-        return np.asarray(given - 0.5 * (given.min(axis=0) + given.max(axis=0)))
-    line = np.linspace(-1.0, 1.0, along)
+        points = wide(space.poses)
+        return np.asarray(points - 0.5 * (points.min(axis=0) + points.max(axis=0)))
+    line = np.linspace(-1.0, 1.0, count)
     upright = line if half[2] else np.zeros(1)
     if space.radius is None:
         return np.array(list(product(line, line, upright))) * half
@@ -187,11 +187,11 @@ def tilts(job: Job, robot: Manipulator) -> Array:
         return _leaning(robot, _leans(space.tilt))
     if space.directions is None:
         return np.zeros((1, count))
-    given = np.array(space.directions)
-    given /= np.linalg.norm(given, axis=1, keepdims=True)
-    away = np.linalg.norm(given[:, :2], axis=1, keepdims=True)
-    angle = np.arctan2(away, given[:, 2:])
-    return _leaning(robot, given[:, :2] / np.where(away > 0.0, away, 1.0) * angle)
+    directions = np.array(space.directions)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    away = np.linalg.norm(directions[:, :2], axis=1, keepdims=True)
+    angle = np.arctan2(away, directions[:, 2:])
+    return _leaning(robot, directions[:, :2] / np.where(away > 0.0, away, 1.0) * angle)
 
 
 def _leans(tilt: float) -> Array:

@@ -34,30 +34,30 @@ def search_kind(
     links is tried, and Nelder and Mead's method improves the other numbers. `progress` is called
     with the share of the evaluations that is done.
     """
-    found: list[Rating] = []
+    ratings: list[Rating] = []
     low, high = case.kind.ranges
     counts = case.kind.counts
     objectives = case.job.objectives
 
     def rated(units: Array) -> Rating:
-        found.append(case.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
+        ratings.append(case.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
         if progress is not None:
-            progress(len(found) / evaluations)
-        return found[-1]
+            progress(len(ratings) / evaluations)
+        return ratings[-1]
 
     with alike(case.kind.like):
         for k, objective in enumerate(objectives):
             rng = np.random.default_rng((seed, k))
             end = evaluations * (k + 1) // len(objectives)
-            _evolved(rated, found, rng, end, objective, (low, high))
-            start = min(found, key=lambda one: one.cost(objective))
-            _refined(rated, found, (start.values - low) / (high - low), end, objective, counts)
-    return found
+            _evolved(rated, ratings, rng, end, objective, (low, high))
+            start = min(ratings, key=lambda rating: rating.cost(objective))
+            _refined(rated, ratings, (start.values - low) / (high - low), end, objective, counts)
+    return ratings
 
 
 def _evolved(
     rated: Callable[[Array], Rating],
-    found: list[Rating],
+    ratings: list[Rating],
     rng: np.random.Generator,
     end: int,
     objective: str,
@@ -69,17 +69,17 @@ def _evolved(
     """
     size = len(ranges[0])
     count = _POPULATION * size
-    first = min(_SPREAD * count, (end - len(found)) // 2)
+    first = min(_SPREAD * count, (end - len(ratings)) // 2)
     strata = rng.permuted(np.tile(np.arange(max(first, 1)), (size, 1)), axis=1).T
     for units in (strata + rng.random(strata.shape)) / max(first, 1):
         rated(units)
     # The best so far, whichever objective they were sought for.
-    known = sorted(found, key=lambda one: one.cost(objective))[:count]
+    known = sorted(ratings, key=lambda rating: rating.cost(objective))[:count]
     low, high = ranges
-    units = np.array([(one.values - low) / (high - low) for one in known])
-    costs = np.array([one.cost(objective) for one in known])
-    start = len(found)
-    while len(units) > 1 and len(found) < end - int(_REFINED * (end - start)):
+    units = np.array([(rating.values - low) / (high - low) for rating in known])
+    costs = np.array([rating.cost(objective) for rating in known])
+    start = len(ratings)
+    while len(units) > 1 and len(ratings) < end - int(_REFINED * (end - start)):
         for i in range(len(units)):
             a, b = units[rng.choice(len(units), 2, replace=False)]
             weight = rng.uniform(*_WEIGHT)
@@ -95,7 +95,7 @@ def _evolved(
 
 def _refined(
     rated: Callable[[Array], Rating],
-    found: list[Rating],
+    ratings: list[Rating],
     start: Array,
     end: int,
     objective: str,
@@ -112,12 +112,12 @@ def _refined(
     free = counts == 0
     stocks = [(np.arange(count) + 0.5) / count for count in counts[~free]]
     least = np.inf
-    for choice in islice(product(*stocks), max(end - len(found), 0)):
+    for choice in islice(product(*stocks), max(end - len(ratings), 0)):
         trial = start.copy()
         trial[~free] = choice
         if (value := cost(trial)) < least:
             least, best = value, trial
-    while len(found) < end:
+    while len(ratings) < end:
         simplex = best[free] + np.vstack(
             [
                 np.zeros(free.sum()),
@@ -130,7 +130,7 @@ def _refined(
             trial[free] = np.clip(units, 0.0, 1.0)
             return trial
 
-        options = {"maxfev": end - len(found), "initial_simplex": simplex, "xatol": 1e-4}
+        options = {"maxfev": end - len(ratings), "initial_simplex": simplex, "xatol": 1e-4}
         answer = scipy.optimize.minimize(
             lambda units, whole=whole: cost(whole(units)),
             best[free],
@@ -142,8 +142,8 @@ def _refined(
 
 def front(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
     """Return the Pareto front: designs that keep all requirements and that no other dominates."""
-    good = [one for one in ratings if not one.misses]
-    costs = np.array([[one.figures[name] for name in objectives] for one in good])
+    good = [rating for rating in ratings if not rating.misses]
+    costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
     _, first = np.unique(costs, axis=0, return_index=True)
     return [
         good[k]

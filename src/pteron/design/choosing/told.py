@@ -22,33 +22,35 @@ _FIGURES = {
 """Figures of a candidate that are shown: their headings and factors."""
 
 
-def cells(one: Candidate) -> dict[str, str]:
+def cells(candidate: Candidate) -> dict[str, str]:
     """Return a row's numbers by their headings, rounded; of a machine that serves."""
-    found = {"margin": _ratio(one.least_margin)}
+    row = {"margin": _ratio(candidate.least_margin)}
     for name, (heading, factor) in _FIGURES.items():
-        if (value := one.figures.get(name)) is not None and (name != "cycle_time" or value):
-            found[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
-    return found
+        if (value := candidate.figures.get(name)) is not None and (name != "cycle_time" or value):
+            row[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
+    return row
 
 
-def drives(one: Candidate) -> str:
+def drives(candidate: Candidate) -> str:
     """Return motors and gearboxes in a line."""
-    return ", ".join(f"{count} x {name}" for name, count in Counter(one.drives).items())
+    return ", ".join(f"{count} x {name}" for name, count in Counter(candidate.drives).items())
 
 
-def dimensions(one: Candidate) -> str:
+def dimensions(candidate: Candidate) -> str:
     """Return the dimensions of a machine in a line, mm."""
-    own = ", ".join(f"{name} {1e3 * value:.0f}" for name, value in one.dimensions.items())
-    whole = (f"{1e3 * one.figures[name]:.0f}" for name in ("width", "depth", "height"))
-    return f"{own}; it moves within {' x '.join(whole)}"
+    lengths = ", ".join(f"{name} {1e3 * value:.0f}" for name, value in candidate.dimensions.items())
+    extents = (f"{1e3 * candidate.figures[name]:.0f}" for name in ("width", "depth", "height"))
+    return f"{lengths}; it moves within {' x '.join(extents)}"
 
 
-def margins(one: Candidate) -> str:
+def margins(candidate: Candidate) -> str:
     """Return the drives' margins and the place of the least, in a line."""
     names = {f"{name}_margin": word for name, word in MARGINS.items()}
-    known = {word: one.figures[name] for name, word in names.items() if name in one.figures}
-    told = ", ".join(f"{word} {_ratio(value)}" for word, value in known.items())
-    return f"{told}; least at {one.worst}" if one.worst else told
+    known = {
+        word: candidate.figures[name] for name, word in names.items() if name in candidate.figures
+    }
+    ratios = ", ".join(f"{word} {_ratio(value)}" for word, value in known.items())
+    return f"{ratios}; least at {candidate.worst}" if candidate.worst else ratios
 
 
 def _ratio(value: float) -> str:
@@ -58,48 +60,48 @@ def _ratio(value: float) -> str:
 
 def asked(job: Job) -> list[str]:
     """Return what a job asks for, a line each, as it was asked."""
-    space, found = job.workspace, []
-    found.append(space.words)
+    space, lines = job.workspace, []
+    lines.append(space.words)
     if space.turn is not None:
-        found.append(f"turn from {space.turn[0]:g} to {space.turn[1]:g} rad")
+        lines.append(f"turn from {space.turn[0]:g} to {space.turn[1]:g} rad")
     if space.tilt is not None:
-        found.append(f"tilt of {space.tilt:g} rad to every side")
+        lines.append(f"tilt of {space.tilt:g} rad to every side")
     if space.directions is not None:
-        found.append(f"{len(space.directions)} directions of the platform")
+        lines.append(f"{len(space.directions)} directions of the platform")
     if any(job.payload.tool):
-        found.append(f"tool at {' x '.join(f'{1e3 * x:g}' for x in job.payload.tool)} mm from P")
+        lines.append(f"tool at {' x '.join(f'{1e3 * x:g}' for x in job.payload.tool)} mm from P")
     if job.payload.mass:
-        found.append(f"payload {job.payload.mass:g} kg")
+        lines.append(f"payload {job.payload.mass:g} kg")
     for k, cycle in enumerate(job.cycles, start=1):
         time = "as fast as can be" if cycle.duration is None else f"in {cycle.duration:g} s"
         where = ", anywhere in the workspace" if cycle.anywhere else ""
         share = "" if cycle.share is None else f", {cycle.share:g} in a duty cycle"
-        found.append(f"{cycle.name or f'cycle {k}'} {time}{where}{share}")
+        lines.append(f"{cycle.name or f'cycle {k}'} {time}{where}{share}")
     if job.motion.acceleration:
-        found.append(
+        lines.append(
             f"{job.motion.acceleration:g} m/s^2 at up to {job.motion.speed:g} m/s in any direction"
         )
     if job.accuracy is not None:
-        found.append(f"tool within {1e3 * job.accuracy.most:g} mm ({job.accuracy.counted})")
+        lines.append(f"tool within {1e3 * job.accuracy.most:g} mm ({job.accuracy.counted})")
     if job.stiffness is not None:
         limit = f"{1e3 * job.stiffness.most:g} mm"
-        found.append(f"gives way {limit} at most under {job.stiffness.force:g} N")
+        lines.append(f"gives way {limit} at most under {job.stiffness.force:g} N")
     if job.cell.footprint is not None:
-        found.append(f"footprint {' x '.join(f'{x:g}' for x in job.cell.footprint)} m")
-    found += [f"height {job.cell.height:g} m"] if job.cell.height is not None else []
+        lines.append(f"footprint {' x '.join(f'{x:g}' for x in job.cell.footprint)} m")
+    lines += [f"height {job.cell.height:g} m"] if job.cell.height is not None else []
     if job.cell.low is not None and job.cell.high is not None:
-        found.append(f"cell {_box(job.cell.low, job.cell.high)} m")
-    found += [f"kept out of {_box(box.low, box.high)} m" for box in job.keep_out]
+        lines.append(f"cell {_box(job.cell.low, job.cell.high)} m")
+    lines += [f"kept out of {_box(box.low, box.high)} m" for box in job.keep_out]
     floors = {
         "type_i": "type-I measure",
         "type_ii": "type-II measure",
         "clearance": "clearance (m)",
     }
     for name in sorted(job.floors.model_fields_set):
-        found.append(f"{floors[name]} at least {getattr(job.floors, name):g}")
+        lines.append(f"{floors[name]} at least {getattr(job.floors, name):g}")
     bounds = job.most.model_dump(exclude_none=True)
-    found += [f"{name.replace('_', ' ')} at most {value:g}" for name, value in bounds.items()]
-    return [*found, f"least {' and '.join(name.replace('_', ' ') for name in job.objectives)}"]
+    lines += [f"{name.replace('_', ' ')} at most {value:g}" for name, value in bounds.items()]
+    return [*lines, f"least {' and '.join(name.replace('_', ' ') for name in job.objectives)}"]
 
 
 def _box(low: Sequence[float], high: Sequence[float]) -> str:

@@ -32,62 +32,64 @@ _SOFT, _HARD = 1e4, 1e7
 """Two stiffnesses of drives, N/m or N m/rad, from which the line of compliances is found."""
 
 
-def tolerances(asked: AccuracyTable, joints: float | Sequence[float]) -> Tolerances:
+def tolerances(accuracy: AccuracyTable, joints: float | Sequence[float]) -> Tolerances:
     """Return the tolerances of the job's file, with given errors of the joints, m or rad."""
-    return Tolerances(joints, 0.0, asked.point, asked.length, asked.angle)
+    return Tolerances(joints, 0.0, accuracy.point, accuracy.length, accuracy.angle)
 
 
-def joint_errors(asked: AccuracyTable, ratios: Array, backlash: Array) -> Array:
+def joint_errors(accuracy: AccuracyTable, ratios: Array, backlash: Array) -> Array:
     """Return errors of joints, m or rad: half a count of the encoder plus half the backlash.
 
     `ratios` are motor radians per joint unit, `backlash` is at the joint, m or rad.
     """
-    return np.asarray(np.pi / asked.counts_per_turn / ratios + 0.5 * asked.backlash * backlash)
+    return np.asarray(
+        np.pi / accuracy.counts_per_turn / ratios + 0.5 * accuracy.backlash * backlash
+    )
 
 
-def unit_errors(asked: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
+def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
     """Return the tool's errors at poses, (N,) each, m: by joint errors of 1, and by all else."""
-    joints = greatest_errors(asked, robot, poses, Tolerances(joints=1.0))
-    if not asked.of_parts:
+    joints = greatest_errors(accuracy, robot, poses, Tolerances(joints=1.0))
+    if not accuracy.of_parts:
         return joints, np.zeros_like(joints)
-    return joints, greatest_errors(asked, robot, poses, tolerances(asked, 0.0))
+    return joints, greatest_errors(accuracy, robot, poses, tolerances(accuracy, 0.0))
 
 
 def greatest_errors(
-    asked: AccuracyTable, robot: Manipulator, poses: Array, given: Tolerances
+    accuracy: AccuracyTable, robot: Manipulator, poses: Array, errors: Tolerances
 ) -> Array:
     """Return the tool's error at poses, (N,), m: the worst case or the standard deviation.
 
     `asked.counted` says which of both.
     """
-    if asked.counted == "worst":
-        return worst_position_errors(robot, poses, given)
-    return np.asarray(pose_error(robot, poses, given).position)
+    if accuracy.counted == "worst":
+        return worst_position_errors(robot, poses, errors)
+    return np.asarray(pose_error(robot, poses, errors).position)
 
 
 def errors_with(
-    asked: AccuracyTable, units: tuple[Array, Array], ratios: Array, backlash: Array
+    accuracy: AccuracyTable, units: tuple[Array, Array], ratios: Array, backlash: Array
 ) -> Array:
     """Return the greatest error of the tool with each of O choices of drives, (O,), m.
 
     `units` are those of `unit_errors`.
     """
-    joint = joint_errors(asked, ratios, backlash)[:, None] * units[0]
-    whole = joint + units[1] if asked.counted == "worst" else np.hypot(joint, units[1])
-    return np.asarray(whole.max(axis=1))
+    joint = joint_errors(accuracy, ratios, backlash)[:, None] * units[0]
+    total = joint + units[1] if accuracy.counted == "worst" else np.hypot(joint, units[1])
+    return np.asarray(total.max(axis=1))
 
 
 def link_sections(robot: Manipulator, stocks: Mapping[str, str]) -> dict[str, Section]:
     """Return the sections of links made of stock; `stocks` has its name for "upper", "lower"."""
-    found = {}
+    sections = {}
     for key, name in stocks.items():
         stock = Stock.of(name)
         wall = 0.5 * (stock.outer - stock.inner)
         tube = Section.tube(stock.outer, wall, MATERIALS[name.split("-")[0]])
         rods = getattr(robot.legs[0], "rods", 1) if key == "lower" else 1
         parts = (tube.axial, tube.bending, tube.sideways, tube.torsion)
-        found[key] = Section(*(rods * part for part in parts))
-    return found
+        sections[key] = Section(*(rods * part for part in parts))
+    return sections
 
 
 def elasticity(sections: Mapping[str, Section], actuators: float | Sequence[float]) -> Elasticity:
@@ -112,6 +114,6 @@ def compliances(
     return np.maximum(hard - by_drive / _HARD, 0.0), by_drive
 
 
-def compliance_with(given: tuple[Array, Array], actuators: Array) -> Array:
+def compliance_with(compliances: tuple[Array, Array], actuators: Array) -> Array:
     """Return the greatest compliance with each of O stiffnesses of the drives, (O,), m/N."""
-    return np.asarray((given[0] + given[1] / actuators[:, None]).max(axis=1))
+    return np.asarray((compliances[0] + compliances[1] / actuators[:, None]).max(axis=1))

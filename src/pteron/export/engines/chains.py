@@ -61,18 +61,18 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
     batch = poses.shape[:-1]
 
     def vector(*name: Any) -> Array:
-        found = np.asarray(values[name]).T
-        return found.reshape(*batch, -1)
+        stances = np.asarray(values[name]).T
+        return stances.reshape(*batch, -1)
 
-    found = []
+    stances = []
     for i, motion in enumerate(_states(robot)[1].legs):
         numbers = _numbers_before_the_cut(robot, i, motion)
-        before = [motion.chain[k] for k in numbers]
+        joints = [motion.chain[k] for k in numbers]
         turning = [b for b, body in motion.bodies.items() if body.x is not None]
-        found.append(
+        stances.append(
             LegStance(
-                tuple(joint.kind == "P" for joint in before),
-                tuple(joint.body for joint in before),
+                tuple(joint.kind == "P" for joint in joints),
+                tuple(joint.body for joint in joints),
                 tuple(vector(i, "axis", k) for k in numbers),
                 tuple(vector(i, "point", k) for k in numbers),
                 {letter: vector(i, "reference", letter) for letter in motion.bodies},
@@ -84,7 +84,7 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
                 next((k for k in numbers if motion.chain[k].driven), None),
             )
         )
-    return found
+    return stances
 
 
 def shaft_ratio(robot: Manipulator, i: int) -> float:
@@ -104,8 +104,8 @@ def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tu
             subject=robot.name,
         )
     last = max((k for k, joint in enumerate(motion.chain) if joint.body), default=-1)
-    held = [k for k, joint in enumerate(motion.chain) if motion.pushes or not joint.driven]
-    return tuple(k for k in held if k <= last)
+    moved_joints = [k for k, joint in enumerate(motion.chain) if motion.pushes or not joint.driven]
+    return tuple(k for k in moved_joints if k <= last)
 
 
 @lru_cache(maxsize=64)
@@ -130,5 +130,5 @@ def _function(robot: Manipulator) -> tuple[Any, list[tuple[Any, ...]]]:
                 parts[i, "z", letter] = body.axes
         parts[i, "end"], parts[i, "coordinate"] = point.position, motion.coordinate
     # What does not depend on the pose is made to: so that every output has a column for each pose.
-    still = 0 * pose[0]
-    return ca.Function("stances", [pose], [part + still for part in parts.values()]), list(parts)
+    zero = 0 * pose[0]
+    return ca.Function("stances", [pose], [part + zero for part in parts.values()]), list(parts)

@@ -40,17 +40,17 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
         If a leg does not reach a pose.
     """
     robot = opened.robot
-    given = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
-    flat = given.reshape(-1, robot.freedom)
+    rows = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
+    flat = rows.reshape(-1, robot.freedom)
     joints = inverse_kinematics(robot, flat)
     values = {joint.name: joint.values for joint in platform_joints(robot.platform, flat)}
     for i, (home, away) in enumerate(
         zip(leg_stances(robot, opened.home), leg_stances(robot, flat), strict=True)
     ):
-        for k, found in zip(home.numbers, _leg(home, away), strict=True):
+        for k, angle in zip(home.numbers, _leg(home, away), strict=True):
             driven = k == home.driven
             name = robot.joint_names[i] if driven else f"leg{i + 1}_joint{k}"
-            values[name] = joints[:, i] if driven else found
+            values[name] = joints[:, i] if driven else angle
     p, axes = robot.platform.at(flat)
     home_p, home_axes = robot.platform.at(opened.home)
     for body in opened.bodies:
@@ -62,14 +62,14 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
                 arm = home_axes @ (joint.point - home_p)
                 values[joint.name] = (p + np.einsum("kij,i->kj", axes, arm)) @ joint.axis
     columns = np.stack([values[joint.name] for joint in opened.joints], axis=-1)
-    return np.asarray(columns.reshape(*given.shape[:-1], -1))
+    return np.asarray(columns.reshape(*rows.shape[:-1], -1))
 
 
 def _leg(home: LegStance, away: LegStance) -> list[Array]:
     """Return how far each joint of a leg has moved from the home pose, (K,) each."""
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
-    found: list[Array] = []
+    motions: list[Array] = []
     for k, (slides, axis, point) in enumerate(
         zip(home.slides, home.axes, home.points, strict=True)
     ):
@@ -79,19 +79,19 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
             by = np.einsum("ki,ki->k", now, where - turn @ after - shift)
             shift = shift + by[:, None] * now
         else:
-            before, here = _pointer(home, away, k)
-            before = turn @ before
-            across = np.cross(now, before)
+            pointer, here = _pointer(home, away, k)
+            pointer = turn @ pointer
+            normal = np.cross(now, pointer)
             by = np.arctan2(
-                np.einsum("ki,ki->k", across, here),
-                np.einsum("ki,ki->k", np.cross(across, now), here),
+                np.einsum("ki,ki->k", normal, here),
+                np.einsum("ki,ki->k", np.cross(normal, now), here),
             )
             center = turn @ point + shift
             turned = scipy.spatial.transform.Rotation.from_rotvec(by[:, None] * now).as_matrix()
             turn = turned @ turn
             shift = center + np.einsum("kij,kj->ki", turned, shift - center)
-        found.append(by)
-    return found
+        motions.append(by)
+    return motions
 
 
 def _next_point(leg: LegStance, k: int) -> Array:
@@ -111,7 +111,7 @@ def _pointer(home: LegStance, away: LegStance, k: int) -> tuple[Array, Array]:
         for leg, other in [(home, away)]
         for j in range(k, len(home.points))
     ]
-    for before, here in pairs:
-        if np.linalg.norm(np.cross(axis, before)) > _LONG * np.linalg.norm(before) > 0.0:
-            return before, here
+    for vector, here in pairs:
+        if np.linalg.norm(np.cross(axis, vector)) > _LONG * np.linalg.norm(vector) > 0.0:
+            return vector, here
     return pairs[0]  # nothing tells: what it carries lies on its axis

@@ -60,17 +60,17 @@ def _finite(value: float) -> float:
 
 def frame(body: TreeBody) -> Array:
     """Return a body's frame at the home pose, (4, 4): from its own axes to the base frame."""
-    found = np.eye(4)
-    found[:3, :3], found[:3, 3] = body.axes, body.origin
-    return found
+    placement = np.eye(4)
+    placement[:3, :3], placement[:3, 3] = body.axes, body.origin
+    return placement
 
 
 def inverse(motion: Array) -> Array:
     """Return the inverse of a motion (4, 4)."""
-    found = np.eye(4)
-    found[:3, :3] = motion[:3, :3].T
-    found[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
-    return found
+    inverted = np.eye(4)
+    inverted[:3, :3] = motion[:3, :3].T
+    inverted[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
+    return inverted
 
 
 def within(body: TreeBody, points: Array) -> Array:
@@ -90,20 +90,20 @@ def material(body: TreeBody) -> str:
     return f"leg{body.color}" if body.color else "platform"
 
 
-def left_out(opened: Tree, kept: Sequence[str]) -> list[str]:
+def left_out(opened: Tree, written: Sequence[str]) -> list[str]:
     """Return a note on numbers of drives and passive joints that a file leaves out.
 
     `kept` are the keys of a drive that the file has.
     """
-    found = [
-        told
-        for key, told in TEXTS["left_out"].items()
-        if key not in kept and any(getattr(motor.drive, key) for motor in opened.motors)
+    omitted = [
+        words
+        for key, words in TEXTS["left_out"].items()
+        if key not in written and any(getattr(motor.drive, key) for motor in opened.motors)
     ]
     limited = limited_joints(opened.robot, opened.home)
     nouns = sorted({joint.noun for joint in limited if joint.leg and not joint.actuated})
-    found += [f"the limits of passive joints ({', '.join(nouns)})"] if nouns else []
-    return [f"Left out: {', '.join(found)}."] if found else []
+    omitted += [f"the limits of passive joints ({', '.join(nouns)})"] if nouns else []
+    return [f"Left out: {', '.join(omitted)}."] if omitted else []
 
 
 def head(opened: Tree, language: str) -> list[str]:

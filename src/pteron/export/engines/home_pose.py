@@ -55,25 +55,25 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
     limits if any are.
     """
     ranges = np.array([leg.limits or (0.0, 0.0) for leg in robot.legs])
-    found = direct_kinematics(robot, ranges.mean(axis=1)).reshape(-1, robot.freedom)
-    found = found[np.isfinite(found).all(axis=-1)]
-    worth = _worth(robot, found)
-    if len(found) and worth.max() >= _GOOD:
-        return tuple((np.round(found[_best(worth)], 12) + 0.0).tolist())
+    poses = direct_kinematics(robot, ranges.mean(axis=1)).reshape(-1, robot.freedom)
+    poses = poses[np.isfinite(poses).all(axis=-1)]
+    worth = _worth(robot, poses)
+    if len(poses) and worth.max() >= _GOOD:
+        return tuple((np.round(poses[_best(worth)], 12) + 0.0).tolist())
     for count, least in _SEARCHES:
         with suppress(ModelError):
-            found = random_poses(robot, count, type_i=least, type_ii=least)
+            poses = random_poses(robot, count, type_i=least, type_ii=least)
             break
     else:
         raise ModelError(
             "no pose found in which all legs reach the platform; give one as home",
             subject=robot.name,
         )
-    joints = inverse_kinematics(robot, found)
-    given = np.array([leg.limits is not None for leg in robot.legs])
+    joints = inverse_kinematics(robot, poses)
+    is_limited = np.array([leg.limits is not None for leg in robot.legs])
     beyond = (joints < ranges[:, 0]) | (joints > ranges[:, 1])
-    worth = _worth(robot, found) - (beyond & given).any(axis=-1)
-    return tuple((np.round(found[_best(worth)], 6) + 0.0).tolist())
+    worth = _worth(robot, poses) - (beyond & is_limited).any(axis=-1)
+    return tuple((np.round(poses[_best(worth)], 6) + 0.0).tolist())
 
 
 def _best(worth: Array) -> int:
@@ -86,9 +86,9 @@ def _worth(robot: Manipulator, poses: Array) -> Array:
     if not len(poses):
         return np.empty(0)
     bent = numeric(robot, "reach")(poses)[1].min(axis=-1)
-    held = type_ii_sizes(robot, poses)
+    type_ii = type_ii_sizes(robot, poses)
     passive = numeric(robot, "passive_room")(poses)[0].min(axis=-1)
-    worth = np.minimum(bent, held)
+    worth = np.minimum(bent, type_ii)
     # A machine seldom works the wrong way round.
     turned = np.abs(poses[:, robot.platform.angular]).max(axis=1, initial=0.0)
     worth = np.minimum(worth, 1.0 - turned / np.pi)

@@ -54,8 +54,8 @@ def plane_moments(mass: float, moment: float, lever: float) -> Array:
 
 def rod_moments(mass: float, moment: float, lever: float) -> Array:
     """Return the moments (3,) of a rod along its x."""
-    across = max(moment, _LEAST * mass * lever**2, _TINY)
-    return np.array([max(_SPIN * across, _TINY), across, across])
+    transverse = max(moment, _LEAST * mass * lever**2, _TINY)
+    return np.array([max(_SPIN * transverse, _TINY), transverse, transverse])
 
 
 def spatial_moments(inertia: SpatialInertia, lever: float) -> tuple[Array, Array]:
@@ -89,13 +89,16 @@ def shared_masses(
     (kg m^2), are together the body that was given.
     """
     share = 0.05
-    own = inertia - float(moment @ moment) / mass
+    central = inertia - float(moment @ moment) / mass
     squares = (places**2).sum(axis=1)
     for _ in range(40):
         taken = np.full(len(places), share * mass)
-        left = mass - float(taken.sum())
-        rest, turning = moment - taken @ places, inertia - float(taken @ squares)
-        if left > 0.5 * mass and turning - float(rest @ rest) / left >= 0.5 * own:
+        remaining = mass - float(taken.sum())
+        first_moment, turning = moment - taken @ places, inertia - float(taken @ squares)
+        if (
+            remaining > 0.5 * mass
+            and turning - float(first_moment @ first_moment) / remaining >= 0.5 * central
+        ):
             break
         share *= 0.5
-    return taken, left, rest, turning
+    return taken, remaining, first_moment, turning

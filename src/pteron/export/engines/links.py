@@ -39,7 +39,7 @@ class Link(NamedTuple):
 
 def links_of(bodies: Sequence[TreeBody]) -> list[Link]:
     """Return the links of bodies, one for each joint."""
-    found = []
+    links = []
     for body in bodies:
         parent = "base" if body.parent == BASE else bodies[body.parent].name
         for joint in body.joints:
@@ -48,9 +48,9 @@ def links_of(bodies: Sequence[TreeBody]) -> list[Link]:
             inertia = body.mass, body.moments, body.products
             if not last:
                 inertia = *between_joints(body.mass, body.moments), np.zeros(3)
-            found.append(Link(name, parent, body, joint, first, last, *inertia))
+            links.append(Link(name, parent, body, joint, first, last, *inertia))
             parent = name
-    return found
+    return links
 
 
 class JointDrive(NamedTuple):
@@ -87,14 +87,14 @@ class LinkShape(NamedTuple):
 def link_shape(shape: BodyShape, body: TreeBody | None) -> LinkShape:
     """Return a shape in a body's frame, or in the base frame."""
     ends = shape.ends if body is None else (shape.ends - body.origin) @ body.axes
-    along, middle = ends[1] - ends[0], ends.mean(axis=0)
-    length = float(np.linalg.norm(along))
+    axis, middle = ends[1] - ends[0], ends.mean(axis=0)
+    length = float(np.linalg.norm(axis))
     kind = {"box": "box"}.get(shape.kind, "cylinder")
     turn = np.eye(3)
     if length < _SAME:
         kind = "sphere"
     else:
-        z = along / length
+        z = axis / length
         x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
         x /= np.linalg.norm(x)
         turn = np.column_stack([x, np.cross(z, x), z])

@@ -116,13 +116,13 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
 
 def _notes(opened: Tree) -> list[str]:
     """Return notes on what the file cannot hold, and on how a shaft is driven."""
-    kept = ("inertia", "viscous", "coulomb", "offset", "max_force")
+    written = ("inertia", "viscous", "coulomb", "offset", "max_force")
     said = [
         f"{motor.name} turns {motor.joint}; its actuator's gear is the shaft's ratio."
         for motor in opened.motors
         if motor.name != motor.joint
     ]
-    return [*said, *left_out(opened, kept)]
+    return [*said, *left_out(opened, written)]
 
 
 def _placed(opened: Tree, body: TreeBody) -> tuple[str, str]:
@@ -139,8 +139,8 @@ def _moments(body: TreeBody) -> list[str]:
 
 def _hold(opened: Tree) -> Array:
     """Return the controls that hold the machine at its home pose, as far as its drives can."""
-    rest = np.zeros(opened.robot.freedom)
-    forces = inverse_dynamics(opened.robot, opened.home, rest, rest, on_failure="nan")
+    zeros = np.zeros(opened.robot.freedom)
+    forces = inverse_dynamics(opened.robot, opened.home, zeros, zeros, on_failure="nan")
     forces = forces + [motor.drive.offset for motor in opened.motors]
     most = np.array([motor.drive.max_force or np.inf for motor in opened.motors])
     return np.asarray(np.clip(np.nan_to_num(forces), -most, most))
@@ -148,13 +148,13 @@ def _hold(opened: Tree) -> Array:
 
 def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
     """Return each body's sites: the two sides of every closing, and the tool's centre point."""
-    found: list[list[tuple[str, Array]]] = [[] for _ in opened.bodies]
+    sites: list[list[tuple[str, Array]]] = [[] for _ in opened.bodies]
     for closing in opened.closings:
-        found[closing.one].append((f"{closing.name}_end", closing.point))
-        found[closing.other].append((f"{closing.name}_seat", closing.point))
+        sites[closing.one].append((f"{closing.name}_end", closing.point))
+        sites[closing.other].append((f"{closing.name}_seat", closing.point))
     p, axes = opened.robot.platform.at(opened.home)
-    found[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
-    return found
+    sites[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
+    return sites
 
 
 def _scene(opened: Tree) -> dict[str, Any]:

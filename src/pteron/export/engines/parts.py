@@ -204,18 +204,18 @@ class Tree:
 
 def place(tree: Tree, coordinates: Mapping[str, float]) -> list[Array]:
     """Return each body's displacement from the home pose, (4, 4), for joint coordinates by name."""
-    found: list[Array] = []
+    displacements: list[Array] = []
     for body in tree.bodies:
-        moved = np.eye(4) if body.parent == BASE else found[body.parent]
+        moved = np.eye(4) if body.parent == BASE else displacements[body.parent]
         for joint in body.joints:
             moved = moved @ displacement(joint, coordinates[joint.name] - joint.home)
-        found.append(moved)
-    return found
+        displacements.append(moved)
+    return displacements
 
 
 def at_zero(tree: Tree) -> tuple[TreeBody, ...]:
     """Return the bodies where all joint coordinates are zero: each chain for itself, loops open."""
-    found: list[TreeBody] = []
+    bodies: list[TreeBody] = []
     moved: list[Array] = []
     for body in tree.bodies:
         motion = np.eye(4) if body.parent == BASE else moved[body.parent]
@@ -229,7 +229,7 @@ def at_zero(tree: Tree) -> tuple[TreeBody, ...]:
             replace(shape, ends=np.array([moved_point(motion, end) for end in shape.ends]))
             for shape in body.shapes
         ]
-        found.append(
+        bodies.append(
             replace(
                 body,
                 joints=tuple(joints),
@@ -239,7 +239,7 @@ def at_zero(tree: Tree) -> tuple[TreeBody, ...]:
                 shapes=tuple(shapes),
             )
         )
-    return tuple(found)
+    return tuple(bodies)
 
 
 def displacement(joint: TreeJoint, by: float) -> Array:

@@ -150,7 +150,7 @@ def pinocchio_source(opened: Tree) -> str:
 
 def _without_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
     """Return the bodies without geared ones, whose inertia is added to that of their parents."""
-    kept = []
+    links = []
     for k, body in enumerate(bodies):
         if body.joints[0].follows is not None:
             continue
@@ -159,8 +159,8 @@ def _without_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
             follows = gear.joints[0].follows
             assert follows is not None
             body = _with_gear(body, gear, 1.0 + follows[1])
-        kept.append(body)
-    return kept
+        links.append(body)
+    return links
 
 
 def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
@@ -170,9 +170,9 @@ def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
     """
     mass = body.mass + gear.mass
     center = (body.mass * body.center + gear.mass * gear.center) / mass
-    apart = (gear.center - body.center) @ body.axes[:, :2]
+    offset = (gear.center - body.center) @ body.axes[:, :2]
     about = body.moments[2] + ratio**2 * gear.moments[2]
-    about += body.mass * gear.mass / mass * float(apart @ apart)
+    about += body.mass * gear.mass / mass * float(offset @ offset)
     moments = np.array([0.6, 0.7, 1.0]) * about
     return replace(body, mass=mass, center=center, moments=moments)
 

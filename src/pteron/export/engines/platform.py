@@ -59,19 +59,19 @@ def _turning(robot: Manipulator, pose: Array) -> Pieces:
     platform = robot.platform
     p, axes = platform.at(pose)
     # What of a leg's fixed offset is along the axis turns with the platform as well as not.
-    across = [cross(leg.fixed_offset, platform.axis) for leg in robot.legs]
-    hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in across]
+    offsets = [cross(leg.fixed_offset, platform.axis) for leg in robot.legs]
+    hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in offsets]
     points = [np.array(leg.platform_point) for leg in robot.legs]
     hinges = _distinct([point for point, hangs in zip(points, hung, strict=True) if hangs])
-    masses, shares, rest = _shared(platform, hinges, len(platform.geared))
-    bodies = [_plane_body(platform, pose, _joints(platform, pose), *rest)]
+    masses, shares, remainder = _shared(platform, hinges, len(platform.geared))
+    bodies = [_plane_body(platform, pose, _joints(platform, pose), *remainder)]
     bodies += _gears(platform, pose, shares, 1.0)
     first, closings = len(bodies), []
     for j, (hinge, mass) in enumerate(zip(hinges, masses, strict=True), start=1):
         at = p + hinge @ axes
         moves = [
-            TreeJoint(f"bar{j}_{name}", True, along, at, float(along @ at))
-            for name, along in zip(platform.lengths, platform.directions, strict=True)
+            TreeJoint(f"bar{j}_{name}", True, direction, at, float(direction @ at))
+            for name, direction in zip(platform.lengths, platform.directions, strict=True)
         ]
         closings.append(Closing(f"bar{j}", len(bodies), 0, at))
         bodies.append(_still_body(platform, f"bar{j}", BASE, moves, at, mass))
@@ -94,8 +94,8 @@ def _sliding(robot: Manipulator, pose: Array) -> Pieces:
     frame = np.array(platform.frame)
     points = [np.array(leg.platform_point) for leg in robot.legs]
     halves = _distinct([point for point in points if np.abs(point).max() > _COINCIDENT])
-    masses, shares, rest = _shared(platform, halves, 2 + len(platform.geared))
-    mass, center, about = rest
+    masses, shares, remainder = _shared(platform, halves, 2 + len(platform.geared))
+    mass, center, about = remainder
     *moves, turn = _joints(platform, pose)
     carrier = _still_body(platform, "platform", BASE, moves, p, float(shares[0]))
     tool = _plane_body(platform, pose, [turn], float(shares[1]), np.zeros(2), about)
@@ -104,16 +104,16 @@ def _sliding(robot: Manipulator, pose: Array) -> Pieces:
     first = len(bodies) + 1
     slides = [("nacelle", center, mass)]
     slides += [
-        (f"half{j}", half[:2], own)
-        for j, (half, own) in enumerate(zip(halves, masses, strict=True), start=1)
+        (f"half{j}", half[:2], part_mass)
+        for j, (half, part_mass) in enumerate(zip(halves, masses, strict=True), start=1)
     ]
-    for name, v, own in slides:
+    for name, v, part_mass in slides:
         by = float(np.linalg.norm(v))
-        along = v @ frame[:2] / by if by else frame[0]
-        at = p + by * angle * along
+        direction = v @ frame[:2] / by if by else frame[0]
+        at = p + by * angle * direction
         follows = (turned, by)
-        joint = TreeJoint(f"{name}_slide", True, along, at, by * angle, None, follows)
-        bodies.append(_still_body(platform, name, 0, [joint], at, own))
+        joint = TreeJoint(f"{name}_slide", True, direction, at, by * angle, None, follows)
+        bodies.append(_still_body(platform, name, 0, [joint], at, part_mass))
     slide = [np.abs(point).max() > _COINCIDENT for point in points]
     carried = [
         first + _which(halves, point) if away else 0
@@ -131,9 +131,9 @@ def _shared(
     keeps is its mass, the centre (2,) of it and the moment about that; a bar at which no part is
     counts as a point of it.
     """
-    own = platform.inertia
-    assert isinstance(own, PlanarInertia)  # what tilts has no parts
-    mass, moment, inertia = own.mass, np.array(own.first_moment), own.inertia
+    body = platform.inertia
+    assert isinstance(body, PlanarInertia)  # what tilts has no parts
+    mass, moment, inertia = body.mass, np.array(body.first_moment), body.inertia
     masses = [0.0] * len(places)
     for bar in platform.bars:
         hinge = np.array(bar.hinge)
@@ -143,7 +143,7 @@ def _shared(
         else:
             mass, moment = mass + bar.mass, moment + bar.mass * hinge[:2]
             inertia += bar.mass * float(hinge[:2] @ hinge[:2])
-    without = [k for k, one in enumerate(masses) if one == 0.0]
+    without = [k for k, part_mass in enumerate(masses) if part_mass == 0.0]
     at = np.zeros((len(without) + others, 2))
     for row, k in zip(at, without, strict=False):
         row[:] = places[k][:2]
@@ -156,15 +156,15 @@ def _shared(
 
 def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
     """Return the joints by which the platform moves, the tool's where its halves slide."""
-    p, moved, found = platform.at(pose)[0], np.eye(4), []
+    p, moved, joints = platform.at(pose)[0], np.eye(4), []
     limits = platform.angle_limits
     for name, slides, axis, value in platform_joints(platform, pose):
         axis = moved[:3, :3] @ axis
         joint = TreeJoint(name, slides, axis, p, float(value), limits.get(name))
         if not slides:
             moved = displacement(joint, float(value)) @ moved
-        found.append(joint)
-    return found
+        joints.append(joint)
+    return joints
 
 
 def _angle(platform: Platform, pose: Array) -> tuple[str, float]:
@@ -213,19 +213,19 @@ def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> li
     """Return what gears turn, on a body that itself turns by `against` times the angle."""
     p, axes = platform.at(pose)
     turned, angle = _angle(platform, pose) if platform.geared else ("", 0.0)
-    found = []
+    bodies = []
     for j, (part, mass) in enumerate(zip(platform.geared, masses, strict=True), start=1):
         by = part.ratio - against
         axis, follows = np.array(platform.axis), (turned, by)
         joint = TreeJoint(f"gear{j}", False, axis, p, by * angle, None, follows)
         moments = np.full(3, part.inertia)
-        found.append(TreeBody(f"geared{j}", 0, (joint,), p, axes.T, float(mass), p, moments, 0))
-    return found
+        bodies.append(TreeBody(f"geared{j}", 0, (joint,), p, axes.T, float(mass), p, moments, 0))
+    return bodies
 
 
-def _same(one: Array, other: Array) -> bool:
+def _same(first: Array, second: Array) -> bool:
     """Return whether two places of the platform are on one axis of it."""
-    return bool(np.abs(one - other)[:2].max() <= _COINCIDENT)
+    return bool(np.abs(first - second)[:2].max() <= _COINCIDENT)
 
 
 def _distinct(places: Sequence[Array]) -> list[Array]:
@@ -233,10 +233,10 @@ def _distinct(places: Sequence[Array]) -> list[Array]:
     return [
         place
         for k, place in enumerate(places)
-        if not any(_same(place, before) for before in places[:k])
+        if not any(_same(place, earlier) for earlier in places[:k])
     ]
 
 
 def _which(places: Sequence[Array], place: Array) -> int:
     """Return which of the places is on the axis of another."""
-    return next(k for k, one in enumerate(places) if _same(one, place))
+    return next(k for k, candidate in enumerate(places) if _same(candidate, place))

@@ -47,14 +47,14 @@ def _leg(
     bodies: Sequence[TreeBody], end: Array, bar: Sequence[float] | None, size: float
 ) -> list[list[BodyShape]]:
     """Return the shapes of a leg's bodies; the last one is doubled where rods are parallel."""
-    thick, found = _THICK * size, []
+    thick, shapes = _THICK * size, []
     origins = [*(body.origin for body in bodies), end]
     for k, body in enumerate(bodies):
         start, stop, radius = origins[k], origins[k + 1], thick
         slides = body.joints[-1].slides
         if slides and k == 0:
             axis = 2.6 * thick * body.joints[-1].axis
-            found.append([BodyShape("box", np.array([start - axis, start + axis]), 1.9 * thick)])
+            shapes.append([BodyShape("box", np.array([start - axis, start + axis]), 1.9 * thick)])
             continue
         if np.linalg.norm(stop - start) < _SAME:  # the next one slides in this one
             stop, radius = start + _OVERLAP * (end - start), 1.4 * thick
@@ -62,13 +62,13 @@ def _leg(
             start = stop - _OVERLAP * (stop - start)
         ends = np.array([start, stop])
         if bar is None or k < len(bodies) - 1:
-            found.append([BodyShape("capsule", ends, radius)])
+            shapes.append([BodyShape("capsule", ends, radius)])
             continue
         side = _APART * size * np.array(bar)
         pair = [BodyShape("capsule", ends + sign * side, 0.6 * thick) for sign in (1.0, -1.0)]
-        across = [BodyShape("capsule", np.array([p - side, p + side]), 0.6 * thick) for p in ends]
-        found.append(pair + across)
-    return found
+        bars = [BodyShape("capsule", np.array([p - side, p + side]), 0.6 * thick) for p in ends]
+        shapes.append(pair + bars)
+    return shapes
 
 
 def _stand(first: TreeBody, size: float) -> list[BodyShape]:

@@ -108,13 +108,13 @@ def _expect_axes(stances: Sequence[LegStance], pose: Array) -> None:
 
 def _with_shaft(platform: TreeBody, limits: tuple[float, float] | None, ratio: float) -> TreeBody:
     """Return the platform with the limits that its shaft leaves its last joint, which is phi."""
-    *rest, phi = platform.joints
+    *others, phi = platform.joints
     if limits is None:
         return platform
     low, high = sorted(limit / ratio for limit in limits)
     least, most = phi.limits or (low, high)
     phi = replace(phi, limits=(max(low, least), min(high, most)))
-    return replace(platform, joints=(*rest, phi))
+    return replace(platform, joints=(*others, phi))
 
 
 def _size(stances: list[LegStance], p: Array) -> float:
@@ -157,13 +157,13 @@ def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: 
         axes = _frame_along(joint.axis)
         moments, center = cube_moments(mass, 0.05 * size), reference
     else:
-        along = stance.along[letter]
+        direction = stance.along[letter]
         if letter in stance.across:
-            axes = _frame_along(along, stance.across[letter])
+            axes = _frame_along(direction, stance.across[letter])
             moments = plane_moments(mass, moment, size)
         else:
             # A rod's y is the axis of the joint that carries it, where that is across the rod.
-            axes = _frame_along(along, np.cross(along, joint.axis))
+            axes = _frame_along(direction, np.cross(direction, joint.axis))
             moments = rod_moments(mass, moment, size)
         center = reference + axes @ [x, y, 0.0]
     return TreeBody("", BASE, (), joint.point, axes, mass, center, moments, 0)
@@ -172,8 +172,8 @@ def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: 
 def _frame_along(x: Array, z: Array | None = None) -> Array:
     """Return axes as columns (3, 3): x along a vector, and z near another one."""
     x = x / np.linalg.norm(x)
-    across = None if z is None else z - (z @ x) * x
-    if across is None or np.linalg.norm(across) < _NONE:
-        across = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
-    across = across / np.linalg.norm(across)
-    return np.column_stack([x, np.cross(across, x), across])
+    normal = None if z is None else z - (z @ x) * x
+    if normal is None or np.linalg.norm(normal) < _NONE:
+        normal = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
+    normal = normal / np.linalg.norm(normal)
+    return np.column_stack([x, np.cross(normal, x), normal])

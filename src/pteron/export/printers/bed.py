@@ -36,9 +36,9 @@ def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[floa
     """
     tool = tool_of(robot)[2]
     if low < -tool - _BELOW and -tool < high:
-        found = _radius(robot, reach, -tool)
-        if found > 0.0:
-            return -tool, found
+        radius = _radius(robot, reach, -tool)
+        if radius > 0.0:
+            return -tool, radius
     levels = np.arange(math.ceil(1e3 * (low + _BELOW)), math.floor(1e3 * high)) / 1e3
     levels = levels[:: max(1, len(levels) // _LEVELS)]
     radii = np.array([_radius(robot, reach, level) for level in levels])
@@ -55,19 +55,21 @@ def told_bed(robot: Manipulator, level: float, good: float, most: float) -> tupl
     """Return comments on the bed: its place, and the share of Klipper's range that is good."""
     tool = tool_of(robot)
     who = "the tool's" if tool.any() else "the pose's"
-    told = [f"Klipper's z = 0, the bed, is {who} z = {1000.0 * (level + tool[2]) + 0.0:.6g} mm."]
+    comments = [
+        f"Klipper's z = 0, the bed, is {who} z = {1000.0 * (level + tool[2]) + 0.0:.6g} mm."
+    ]
     if good < most:
-        told.append(
+        comments.append(
             f"At the bed P reaches {1000.0 * good:.0f} mm from the z axis on all sides; Klipper "
             f"checks no leg, and lets it go to {1000.0 * most:.0f} mm."
         )
     if np.abs(tool[:2]).max() > SAME:
         x, y = (number(-1000.0 * part) for part in tool[:2])
-        told.append(
+        comments.append(
             "Klipper's Deltas have P on the z axis: X and Y are P's, until "
             f"SET_GCODE_OFFSET X={x} Y={y} makes them the tool's."
         )
-    return tuple(told)
+    return tuple(comments)
 
 
 def tool_of(robot: Manipulator) -> Array:

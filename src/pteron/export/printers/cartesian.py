@@ -104,18 +104,18 @@ def _box(
     half = np.ptp(limits, axis=1) / 2.0
     sides = np.full(3, (half / np.abs(rows).sum(axis=1)).min())
     for row, reach in zip(rows, half, strict=True):
-        (own,) = np.nonzero(np.abs(row) > ZERO)
-        if len(own) == 1 and (np.abs(rows[:, own[0]]) > ZERO).sum() == 1:
-            sides[own[0]] = reach / abs(row[own[0]])
+        (moving,) = np.nonzero(np.abs(row) > ZERO)
+        if len(moving) == 1 and (np.abs(rows[:, moving[0]]) > ZERO).sum() == 1:
+            sides[moving[0]] = reach / abs(row[moving[0]])
     grid = middle + sides * np.array(list(product(np.linspace(-1.0, 1.0, 9), repeat=3)))
     reached = np.isfinite(inverse_kinematics(robot, grid / 1000.0 - tool, on_failure="nan")).all(
         axis=1
     )
-    told = ["This box keeps the joints' limits; Klipper checks the box and no leg's reach."]
+    comments = ["This box keeps the joints' limits; Klipper checks the box and no leg's reach."]
     if not reached.all():
         share = 100.0 * (1.0 - reached.mean())
-        told.append(
+        comments.append(
             f"In {share:.0f} % of it a leg does not reach: make it smaller, by `pteron workspace`."
         )
     box = [(f"{m - s:.6g}", f"{m + s:.6g}") for m, s in zip(middle, sides, strict=True)]
-    return [(least, most) for least, most in box], tuple(told)
+    return [(least, most) for least, most in box], tuple(comments)

@@ -57,15 +57,15 @@ class Center:
             return cls(leg, start, step, None, radius)
         half, quarter = center(math.pi), center(0.5 * math.pi)
         at = 0.5 * (start + half)
-        along, across = start - at, quarter - at
+        cosine_arm, sine_arm = start - at, quarter - at
         if np.allclose(
-            center(1.0), at + math.cos(1.0) * along + math.sin(1.0) * across, 0.0, 1e-12
+            center(1.0), at + math.cos(1.0) * cosine_arm + math.sin(1.0) * sine_arm, 0.0, 1e-12
         ):
-            return cls(leg, at, along, across, radius)
+            return cls(leg, at, cosine_arm, sine_arm, radius)
         return None
 
 
-def common(robot: Manipulator, values: Sequence[float], told: str, taker: str) -> float:
+def common(robot: Manipulator, values: Sequence[float], reason: str, taker: str) -> float:
     """Return the value that the legs share.
 
     Raises
@@ -75,8 +75,8 @@ def common(robot: Manipulator, values: Sequence[float], told: str, taker: str) -
     """
     for i, value in enumerate(values[1:], start=2):
         if abs(value - values[0]) > SAME:
-            one, other = (round(1000.0 * v, 6) + 0.0 for v in (value, values[0]))
-            text = f"{told.format(one)}, leg 1 {other:.6g} mm"
+            first_value, second_value = (round(1000.0 * v, 6) + 0.0 for v in (value, values[0]))
+            text = f"{reason.format(first_value)}, leg 1 {second_value:.6g} mm"
             raise differs(robot, i, text, taker)
     return float(np.mean(values))
 

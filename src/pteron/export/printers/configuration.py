@@ -85,11 +85,11 @@ def _values(robot: Manipulator) -> dict[str, Any]:
         return cartesian(robot)
     centers = [Center.of(machine, i) for i in range(3)]
     if all(center is not None for center in centers):
-        found = [center for center in centers if center is not None]
-        if all(center.slides for center in found):
-            return delta(robot, found)
-        if not any(center.slides for center in found):
-            return rotary(robot, found)
+        known_centers = [center for center in centers if center is not None]
+        if all(center.slides for center in known_centers):
+            return delta(robot, known_centers)
+        if not any(center.slides for center in known_centers):
+            return rotary(robot, known_centers)
     raise ModelError(
         f"{robot.name}: its legs are neither all linear in the pose, nor those of a Delta with "
         f"guides or with cranks, which is what Klipper knows; {INSTEAD}"

@@ -20,28 +20,28 @@ from pteron.manipulator import Manipulator
 
 def delta(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
     """Return the values of `delta`: the numbers of `LinearDelta` as texts."""
-    found = LinearDelta.from_centers(robot, centers, "Klipper's delta")
-    good = found.most if found.ends is None else found.bed
+    numbers = LinearDelta.from_centers(robot, centers, "Klipper's delta")
+    good = numbers.most if numbers.ends is None else numbers.bed
     steppers = []
     for i, joint in enumerate(robot.joint_names):
-        top = None if found.ends is None else mm(found.ends[i])
+        top = None if numbers.ends is None else mm(numbers.ends[i])
         place = (
-            f"Its position is {'' if found.rises[i] > 0.0 else '-'}{joint} in mm "
-            f"{signed(1000.0 * found.zeros[i])} mm."
+            f"Its position is {'' if numbers.rises[i] > 0.0 else '-'}{joint} in mm "
+            f"{signed(1000.0 * numbers.zeros[i])} mm."
         )
         reading = reading_comment(robot, i, "rotation_distance")
         steppers.append(
             {
                 "comments": (place, *end_stop(top, "carriage"), *reading),
-                "angle": number(found.angles[i]),
-                "arm": mm(found.arms[i]),
+                "angle": number(numbers.angles[i]),
+                "arm": mm(numbers.arms[i]),
                 "end": top,
                 "turn": rotation_distance(robot, i),
             }
         )
     return {
         "kinematics": "delta",
-        "comments": (*told_bed(robot, found.level, good, found.most), *found.told),
-        "radius": mm(found.radius),
+        "comments": (*told_bed(robot, numbers.level, good, numbers.most), *numbers.told),
+        "radius": mm(numbers.radius),
         "steppers": steppers,
     }

@@ -37,11 +37,11 @@ def marlin_lines(robot: RobotLike) -> list[str]:
     ModelError
         As `export_marlin`.
     """
-    found, order = _numbers(as_manipulator(robot))
-    rod = float(np.mean(found.arms))
-    trims = [found.arms[i] - rod for i in order]
-    told = _each("ABC", trims) if max(map(abs, trims)) > 0.5e-7 else ""
-    return _lines(found, order, _mm(rod), told, min, -1.0)
+    numbers, order = _numbers(as_manipulator(robot))
+    rod = float(np.mean(numbers.arms))
+    trims = [numbers.arms[i] - rod for i in order]
+    trim_words = _each("ABC", trims) if max(map(abs, trims)) > 0.5e-7 else ""
+    return _lines(numbers, order, _mm(rod), trim_words, min, -1.0)
 
 
 def reprap_lines(robot: RobotLike) -> list[str]:
@@ -52,13 +52,13 @@ def reprap_lines(robot: RobotLike) -> list[str]:
     ModelError
         As `export_reprap`.
     """
-    found, order = _numbers(as_manipulator(robot))
-    rods = ":".join(_mm(found.arms[i]) for i in order)
-    return _lines(found, order, rods, "", np.mean, 1.0)
+    numbers, order = _numbers(as_manipulator(robot))
+    rods = ":".join(_mm(numbers.arms[i]) for i in order)
+    return _lines(numbers, order, rods, "", np.mean, 1.0)
 
 
 def _lines(
-    found: LinearDelta,
+    numbers: LinearDelta,
     order: Sequence[int],
     rods: str,
     trims: str,
@@ -66,13 +66,13 @@ def _lines(
     sign: float,
 ) -> list[str]:
     """Return M665 and M666; `of_ends` gives the height, from which ends are told with a sign."""
-    height, rest = "", []
-    if found.ends is not None:
-        level = float(of_ends(found.ends))
-        ends = [sign * (found.ends[i] - level) for i in order]
-        height, rest = f" H{_mm(level)}", [f"M666{_each('XYZ', ends)}"]
-    first = f"M665 L{rods} R{_mm(found.radius)}{height} B{1e3 * found.bed:.1f}"
-    return [first + _each("XYZ", _turns(found, order), 1.0) + trims, *rest]
+    height, end_lines = "", []
+    if numbers.ends is not None:
+        level = float(of_ends(numbers.ends))
+        ends = [sign * (numbers.ends[i] - level) for i in order]
+        height, end_lines = f" H{_mm(level)}", [f"M666{_each('XYZ', ends)}"]
+    first = f"M665 L{rods} R{_mm(numbers.radius)}{height} B{1e3 * numbers.bed:.1f}"
+    return [first + _each("XYZ", _turns(numbers, order), 1.0) + trims, *end_lines]
 
 
 def export_marlin(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
@@ -118,37 +118,40 @@ def export_reprap(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 
 def _write(robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[str]) -> list[Path]:
     machine = as_manipulator(robot)
-    found, order = _numbers(machine)
+    numbers, order = _numbers(machine)
     towers = ", ".join(f"{axis} is leg {i + 1}" for axis, i in zip("XYZ", order, strict=True))
     head = [line for line in banner(machine, f"{firmware} settings") if "SI units" not in line]
-    told = [
+    comments = [
         f"Towers: {towers}. Lengths in mm, angles in degrees.",
-        f"X, Y and Z are P's place, Z from where its z is {1e3 * found.level + 0.0:.6g} mm.",
-        *found.told,
+        f"X, Y and Z are P's place, Z from where its z is {1e3 * numbers.level + 0.0:.6g} mm.",
+        *numbers.told,
         *(text for i in range(3) for text in reading_comment(machine, i, "steps per mm (M92)")),
     ]
-    text = "\n".join([*(f"; {line}".rstrip() for line in (*head, *told)), *lines]) + "\n"
+    text = "\n".join([*(f"; {line}".rstrip() for line in (*head, *comments)), *lines]) + "\n"
     name = firmware.lower().removesuffix("firmware")
     return write_texts(folder, {f"{prefix_of(machine)}_{name}.gcode": text})
 
 
 def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
     """Return a machine's numbers, and its leg, from 0, at each of the firmware's towers."""
-    found = LinearDelta.of(robot)
-    beside = np.abs(_beside(np.subtract.outer(_TOWERS, found.angles)))
+    numbers = LinearDelta.of(robot)
+    beside = np.abs(_beside(np.subtract.outer(_TOWERS, numbers.angles)))
     order = [int(row.argmin()) for row in beside]
     if sorted(order) != [0, 1, 2] or beside.min(axis=1).max() > _MOST_TURN:
-        angles = ", ".join(f"{angle:.1f}" for angle in found.angles)
+        angles = ", ".join(f"{angle:.1f}" for angle in numbers.angles)
         raise ModelError(
             f"{robot.name}: its towers stand at {angles} degrees, and M665 has them about 210, 330 "
             "and 90: turn the model about z"
         )
-    return found, order
+    return numbers, order
 
 
-def _turns(found: LinearDelta, order: Sequence[int]) -> list[float]:
+def _turns(numbers: LinearDelta, order: Sequence[int]) -> list[float]:
     """Return each tower's angle less the one that it has in the firmware, degrees."""
-    return [float(_beside(found.angles[i] - own)) for i, own in zip(order, _TOWERS, strict=True)]
+    return [
+        float(_beside(numbers.angles[i] - firmware_angle))
+        for i, firmware_angle in zip(order, _TOWERS, strict=True)
+    ]
 
 
 def _beside(angle: float | np.ndarray) -> np.ndarray:

@@ -94,13 +94,13 @@ class LinearDelta:
         """
         machine = Machine.of(robot)
         centers = [Center.of(machine, i) for i in range(len(robot.legs))]
-        found = [center for center in centers if center is not None and center.slides]
-        if robot.platform.coordinates != ("x", "y", "z") or len(found) != 3:
+        sliding_centers = [center for center in centers if center is not None and center.slides]
+        if robot.platform.coordinates != ("x", "y", "z") or len(sliding_centers) != 3:
             raise ModelError(
                 f"{robot.name}: no linear Delta, whose platform moves x, y and z by three rods on "
                 f"guides, which is what M665 describes; {INSTEAD}"
             )
-        return cls.from_centers(robot, found, "M665")
+        return cls.from_centers(robot, sliding_centers, "M665")
 
     @classmethod
     def from_centers(cls, robot: Manipulator, centers: Sequence[Center], taker: str) -> LinearDelta:
@@ -121,8 +121,10 @@ class LinearDelta:
         radii, arms = np.hypot(*towers[:, :2].T), np.array([center.radius for center in centers])
         for i, arm in enumerate(arms, start=1):
             if arm <= radii.mean():
-                told = f"its rod of {mm(arm)} mm is shorter than the radius, {mm(radii.mean())} mm"
-                raise differs(robot, i, told, taker)
+                reason = (
+                    f"its rod of {mm(arm)} mm is shorter than the radius, {mm(radii.mean())} mm"
+                )
+                raise differs(robot, i, reason, taker)
         radius = float(radii.mean())
         below = np.sqrt(arms**2 - radius**2)
         most = min(radius, float(arms.min()) - radius)
@@ -132,7 +134,7 @@ class LinearDelta:
             level, good = bed(robot, most, float(low.max()), float(high.min()))
         angles = np.radians([degrees(tower) for tower in towers])
         start = np.array([radius, *angles, *arms, *(feet[:, 2] + highest - level)])
-        found = start
+        solution = start
         off, errors = 0.0, _errors(robot, start, level, rises, highest, good)
         if np.abs(errors).max() > 0.1 * SAME:
             fitted = scipy.optimize.least_squares(
@@ -143,15 +145,17 @@ class LinearDelta:
                 ftol=1e-14,
                 gtol=1e-14,
             )
-            found = fitted.x
+            solution = fitted.x
             off = float(np.linalg.norm(fitted.fun.reshape(-1, 3), axis=1).max())
         if off > _WORST:  # then they may be anything
             i = int(np.argmax(np.abs(radii - np.median(radii)))) + 1
-            told = f"is {mm(round(radii[i - 1], 9))} mm from the z axis or leans, unlike the others"
-            raise differs(robot, i, told, taker)
-        radius, angles, arms = found[0], found[1:4], found[4:7]
-        ends = found[7:] - np.sqrt(arms**2 - radius**2)
-        zeros = found[7:] - highest
+            reason = (
+                f"is {mm(round(radii[i - 1], 9))} mm from the z axis or leans, unlike the others"
+            )
+            raise differs(robot, i, reason, taker)
+        radius, angles, arms = solution[0], solution[1:4], solution[4:7]
+        ends = solution[7:] - np.sqrt(arms**2 - radius**2)
+        zeros = solution[7:] - highest
         return cls(
             float(radius),
             tuple(float(a) for a in np.degrees(angles)),
@@ -173,10 +177,10 @@ def _above(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:
     for i, center in enumerate(centers):
         height = center.at[2] + center.along[2] * joints[:, i]
         if not (height > poses[:, 2]).all():
-            told = (
+            reason = (
                 "its slider is below the platform, and firmware has it above: turn the model over"
             )
-            raise differs(robot, i + 1, told, taker)
+            raise differs(robot, i + 1, reason, taker)
 
 
 def _errors(

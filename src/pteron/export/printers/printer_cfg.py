@@ -76,14 +76,14 @@ def printer_cfg(text: str, source: str = "printer.cfg") -> configparser.RawConfi
         allow_no_value=True,
     )
     saved = [line.removeprefix(_SAVED) for line in text.splitlines() if line.startswith(_SAVED)]
-    kept = [re.sub("^ ", "", line) for line in saved if "SAVE_CONFIG" not in line]
-    kept = [line for line in kept if "DO NOT EDIT" not in line]
+    saved_lines = [re.sub("^ ", "", line) for line in saved if "SAVE_CONFIG" not in line]
+    saved_lines = [line for line in saved_lines if "DO NOT EDIT" not in line]
     try:
         parser.read_string(text, source)
-        parser.read_string("\n".join(kept), source)
+        parser.read_string("\n".join(saved_lines), source)
     except configparser.Error as error:
-        told = str(error).splitlines()[0]
-        raise DataError(f"{source}: no printer.cfg of Klipper ({told})") from None
+        reason = str(error).splitlines()[0]
+        raise DataError(f"{source}: no printer.cfg of Klipper ({reason})") from None
     return parser
 
 
@@ -192,20 +192,22 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
 
     def length(section: str, key: str, default: float | None = None) -> float:
         value = setting(parser, section, key)
-        found = default if value is None else 1e-3 * value
-        if found is None or found <= 0.0:
+        metres = default if value is None else 1e-3 * value
+        if metres is None or metres <= 0.0:
             raise DataError(f"{source}: [{section}] {key}: {value} given, mm above 0 expected")
-        return found
+        return metres
 
     base = [length("printer", key) for key in kind.printer]
     first = {key: length("stepper_a", key) for key in (*kind.tower, "position_endstop")}
     legs = []
     template = load(kind.template)
-    for tower, usual, own, leg in zip("abc", kind.angles, kind.own, template.legs, strict=True):
+    for tower, usual, template_angle, leg in zip(
+        "abc", kind.angles, kind.own, template.legs, strict=True
+    ):
         section = f"stepper_{tower}"
         angle = setting(parser, section, "angle")
         lengths = [length(section, key, default) for key, default in first.items()]
-        turn = math.radians((usual if angle is None else angle) - own)
+        turn = math.radians((usual if angle is None else angle) - template_angle)
         try:
             legs.append((_crank if len(base) == 2 else _slider)(leg, turn, base, lengths))
         except ValueError:
@@ -215,8 +217,8 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
             ) from None
         way = _way_a_turn(parser, tower)
         if way:
-            one = 1.0 if len(base) == 2 else 1e3
-            legs[-1] = replace(legs[-1], drive=Drive(ratio=one * 2.0 * math.pi / way))
+            factor = 1.0 if len(base) == 2 else 1e3
+            legs[-1] = replace(legs[-1], drive=Drive(ratio=factor * 2.0 * math.pi / way))
     try:
         return replace(template, name=name, legs=tuple(legs))
     except ModelError as error:

@@ -53,8 +53,8 @@ class _Arm(NamedTuple):
         if abs(axis[2]) > SAME:
             raise differs(robot, i, "its crank's axis is not horizontal", _TAKER)
         if abs(aside) > 1000.0 * SAME:
-            told = f"its crank's plane passes the z axis at {abs(aside):.6g} mm, not through it"
-            raise differs(robot, i, told, _TAKER)
+            reason = f"its crank's plane passes the z axis at {abs(aside):.6g} mm, not through it"
+            raise differs(robot, i, reason, _TAKER)
         lift = float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis))
         zero, upper = math.atan2(center.along[2], center.along @ out), np.linalg.norm(center.along)
         limits = robot.legs[center.leg].limits
@@ -65,10 +65,10 @@ class _Arm(NamedTuple):
         if self.limits is None:
             return None
         angle = self.zero + self.lift * self.limits[1 if self.lift > 0.0 else 0]
-        across = radius + self.upper * math.cos(angle)
-        if abs(across) >= self.lower:
+        distance = radius + self.upper * math.cos(angle)
+        if abs(distance) >= self.lower:
             return None
-        return self.upper * math.sin(angle) - math.sqrt(self.lower**2 - across**2)
+        return self.upper * math.sin(angle) - math.sqrt(self.lower**2 - distance**2)
 
 
 def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
@@ -126,11 +126,11 @@ def _outside(robot: Manipulator, arms: Sequence[_Arm], height: float) -> None:
         wrist = poses - arm.shoulder
         down = np.arctan2(wrist[:, 2], wrist @ arm.out)
         if (np.sin(arm.lift * q + arm.zero - down) < 0.0).any():
-            told = (
+            reason = (
                 "its elbow is inside while the platform is below, and Klipper has it outside; turn "
                 "a model over whose platform is above"
             )
-            raise differs(robot, arm.number, told, _TAKER)
+            raise differs(robot, arm.number, reason, _TAKER)
 
 
 def _bed(

@@ -12,9 +12,9 @@ INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 """Advice at the end of error messages."""
 
 
-def differs(robot: Manipulator, leg: int, told: str, taker: str) -> ModelError:
+def differs(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
     """Return the error that refuses a machine because of one of its legs."""
-    return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {told}; {INSTEAD}")
+    return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {reason}; {INSTEAD}")
 
 
 def mm(metres: float) -> str:

@@ -44,19 +44,19 @@ def firmware_fit(result: Calibration) -> FirmwareFit | None:
         drawn = LinearDelta.of(result.drawn)
         loose = dict.fromkeys(("radius", "angles", "zeros"), float("inf"))
         fitted = calibrate(result.drawn, result.measurements, free=_FREE, prior=loose)
-        found = LinearDelta.of(fitted.robot)
+        estimated = LinearDelta.of(fitted.robot)
     except PteronError:  # another machine, or too few rows
         return None
     names = [unknown.name for block in fitted.blocks for unknown in block.unknowns]
     deviations = {name: float(np.sqrt(fitted.fit.covariance[k, k])) for k, name in enumerate(names)}
     width = 1e3 * deviations["radius"]
-    rows = [_row("delta radius", 1e3 * drawn.radius, 1e3 * found.radius, "mm", width)]
+    rows = [_row("delta radius", 1e3 * drawn.radius, 1e3 * estimated.radius, "mm", width)]
     for i in (1, 2):
         key = f"legs[{i}].angle"
-        before, after = drawn.angles[i - 1], found.angles[i - 1]
+        old_angle, new_angle = drawn.angles[i - 1], estimated.angles[i - 1]
         width = float(np.degrees(deviations[key]))
-        rows.append(_row(f"angle of tower {i}", before, after, "°", width))
-    ends = [(k, drawn.ends, found.ends) for k in range(3) if drawn.ends and found.ends]
+        rows.append(_row(f"angle of tower {i}", old_angle, new_angle, "°", width))
+    ends = [(k, drawn.ends, estimated.ends) for k in range(3) if drawn.ends and estimated.ends]
     for k, old, new in ends:
         # A radius that is larger lowers the rods' upper ends too.
         slope = np.zeros(len(names))
@@ -68,25 +68,29 @@ def firmware_fit(result: Calibration) -> FirmwareFit | None:
     return FirmwareFit(tuple(rows), _sentence(fitted), fitted)
 
 
-def _row(name: str, drawn: float, found: float, unit: str, deviation: float) -> Row:
+def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float) -> Row:
     half = _QUANTILE * deviation
-    change = found - drawn
+    change = estimated - drawn
     if unit == "°":
         change = (change + 180.0) % 360.0 - 180.0
-    before, after, changed = (measured(value, half)[0] for value in (drawn, found, change))
-    return Row(name, before, after, changed, measured(0.0, half)[1], unit, "data", abs(change))
+    drawn_text, estimated_text, changed = (
+        measured(value, half)[0] for value in (drawn, estimated, change)
+    )
+    return Row(
+        name, drawn_text, estimated_text, changed, measured(0.0, half)[1], unit, "data", abs(change)
+    )
 
 
 def _sentence(fitted: Calibration) -> str:
-    held = fitted.held_out
-    if held is None:
+    held_out = fitted.held_out
+    if held_out is None:
         return "With these six values alone no rows were left for a check."
     parts = [
-        f"the {kind} error is {1e3 * after:.3g} mm, {1e3 * held.before[kind]:.3g} before"
-        for kind, after in held.after.items()
+        f"the {kind} error is {1e3 * after:.3g} mm, {1e3 * held_out.before[kind]:.3g} before"
+        for kind, after in held_out.after.items()
         if kind != "angle"
     ]
     return (
-        f"With these six values alone, at {held.rows} rows that were not fitted, "
+        f"With these six values alone, at {held_out.rows} rows that were not fitted, "
         f"{' and '.join(parts)}."
     )

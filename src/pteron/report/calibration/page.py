@@ -50,8 +50,8 @@ class ErrorMap(NamedTuple):
 
 def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | None = None) -> str:
     """Return the page as HTML without reference to another file; robot.toml may not be written."""
-    made = template("calibration/page.html.j2", scaled=scaled)
-    return made.render(
+    document = template("calibration/page.html.j2", scaled=scaled)
+    return document.render(
         result=result,
         robot=result.drawn,
         shown=result.observability,
@@ -85,12 +85,12 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
     kind = "position" if lengths else "angle"
     planes = slice_planes(robot)
     level = [plane for plane in planes if set(plane) <= lengths]
-    found = []
+    maps = []
     for plane in (level or planes)[:3]:
         with suppress(ModelError):
             cut = reach_slice(robot, home, plane, points=_POINTS)
-            before, after = result.errors(cut.poses.reshape(-1, robot.freedom))
-            errors = np.linalg.norm(before, axis=-1), after
+            drawn_errors, calibrated_errors = result.errors(cut.poses.reshape(-1, robot.freedom))
+            errors = np.linalg.norm(drawn_errors, axis=-1), calibrated_errors
             reached = (cut.status == 0).ravel() & np.isfinite(errors[0]) & np.isfinite(errors[1])
             if not reached.any() or not errors[0][reached].max() > 0.0:
                 continue
@@ -100,8 +100,8 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
             ]
             shades = levels(np.stack(values))  # of both, so that they compare
             drawn = [measure_figure(cut, part, levels=shades) for part in values]
-            found.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, _unit(kind)))
-    return found
+            maps.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, _unit(kind)))
+    return maps
 
 
 def levels(values: Array) -> list[float]:
@@ -117,14 +117,14 @@ def _figures(result: Calibration) -> dict[str, Any]:
     kinds = [*["position"] * 3, *["angle"] * int(robot.platform.angular.sum())]
     rows = [*kinds, "height", "distance"]
     residuals = row_residuals_figure(fit.residuals, rows, fit.measured, fit.kept, result.noise)
-    made: dict[str, Any] = {"residuals": residuals, "machine": None, "arrows": None}
+    figures: dict[str, Any] = {"residuals": residuals, "machine": None, "arrows": None}
     with suppress(PteronError):  # the found machine does not reach the drawn one's home
-        made["machine"] = differences_figure(robot, result.robot)
+        figures["machine"] = differences_figure(robot, result.robot)
     if robot.platform.lengths:
         poses = random_poses(robot, _ARROWS, seed=0)
         errors, _ = result.errors(poses)
         if np.abs(errors).max(initial=0.0, where=np.isfinite(errors)) > 0.0:
             place, axes = robot.platform.at(poses)
             tools = place + robot.platform.tool @ axes
-            made["arrows"] = tool_errors_figure(robot, tools, errors)
-    return made
+            figures["arrows"] = tool_errors_figure(robot, tools, errors)
+    return figures

@@ -38,11 +38,11 @@ def value_rows(result: Calibration) -> tuple[Row, ...]:
         factor, unit = _UNITS[value.unit]
         half = factor * 0.5 * (value.interval[1] - value.interval[0])
         change = value.found - value.drawn
-        drawn, found, changed = (
-            measured(factor * one, half)[0] for one in (value.drawn, value.found, change)
+        drawn, estimated, changed = (
+            measured(factor * number, half)[0] for number in (value.drawn, value.found, change)
         )
         size, error = abs(change) / _ORDINARY[value.unit], measured(0.0, half)[1]
-        rows.append(Row(value.name, drawn, found, changed, error, unit, value.origin, size))
+        rows.append(Row(value.name, drawn, estimated, changed, error, unit, value.origin, size))
     return tuple(sorted(rows, key=lambda row: -row.size))
 
 
@@ -70,17 +70,17 @@ def next_steps(
 
 def notes(result: Calibration) -> tuple[str, ...]:
     """Return what a user of the found machine must know: its zeros, and its bodies' parameters."""
-    kept = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
-    found = []
+    reading_legs = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
+    sentences = []
     if any(value.group in ("zeros", "scales") for value in result.values):
-        found.append(
-            f"Zeros and scales of joints {', '.join(kept)} are the legs' reading in robot.toml: "
-            "joint coordinate = zero + scale x reading."
-            if kept
+        sentences.append(
+            f"Zeros and scales of joints {', '.join(reading_legs)} are the legs' reading in "
+            "robot.toml: joint coordinate = zero + scale x reading."
+            if reading_legs
             else "The geometry has taken the joints' zeros: joint coordinates are readings."
         )
-    found.append(
+    sentences.append(
         "Masses, centres of mass, moments of inertia and friction are as they were on the drawn "
         "geometry: where they were identified, identify them again on this one."
     )
-    return tuple(found)
+    return tuple(sentences)

@@ -75,10 +75,10 @@ def write_calibration(
 
 def numbers(result: Calibration, firmware: FirmwareFit | None = None) -> dict[str, Any]:
     """Return the numbers of a calibration as JSON has them, null where one is not finite."""
-    whole = result.as_dict() | {"notes": list(notes(result))}
+    contents = result.as_dict() | {"notes": list(notes(result))}
     if firmware is not None:
-        whole["firmware"] = firmware.as_dict()
-    ready: dict[str, Any] = json_ready(whole)
+        contents["firmware"] = firmware.as_dict()
+    ready: dict[str, Any] = json_ready(contents)
     return ready
 
 

@@ -45,7 +45,7 @@ def _machines(file: Path) -> dict[str, str]:
     """Return the machines' files of an earlier choice by their names; none if it is not one."""
     try:
         kinds = json.loads(file.read_text(encoding="utf-8"))["kinds"]
-        return {f"{one['kind']}.toml": one["robot"] for one in kinds if one["serves"]}
+        return {f"{kind['kind']}.toml": kind["robot"] for kind in kinds if kind["serves"]}
     except (OSError, ValueError, KeyError, TypeError):
         return {}
 
@@ -86,31 +86,34 @@ def next_steps(choice: Choice, serving: list[Candidate]) -> list[str]:
             "motors under [motors]; then run the command again in another folder.",
         ]
     file = f"{serving[0].kind}.toml"
-    own = [] if choice.job.motors.list else ["Put motors that you can buy under [motors]."]
+    motor_steps = [] if choice.job.motors.list else ["Put motors that you can buy under [motors]."]
     return [
-        *own,
+        *motor_steps,
         f"pteron report {file} --out report shows the machine, pteron view {file} moves it.",
         f"pteron size {file} sizes its drives over your own cycles.",
     ]
 
 
-def picture(one: Candidate) -> Figure:
+def picture(candidate: Candidate) -> Figure:
     """Return the picture of a machine, its tool in the middle of its workspace."""
     with TemporaryDirectory() as folder:
-        file = Path(folder) / f"{one.kind}.toml"
-        file.write_text(one.robot, encoding="utf-8")
+        file = Path(folder) / f"{candidate.kind}.toml"
+        file.write_text(candidate.robot, encoding="utf-8")
         robot = load(file)
-    return draw(robot, one.middle)
+    return draw(robot, candidate.middle)
 
 
 def page(choice: Choice) -> str:
     """Return the page as HTML without reference to another file."""
-    serving = [one for one in choice.candidates if one.serves]
-    headings = list(dict.fromkeys(key for one in serving for key in cells(one)))
+    serving = [candidate for candidate in choice.candidates if candidate.serves]
+    headings = list(dict.fromkeys(key for candidate in serving for key in cells(candidate)))
     figure = None
-    if len(serving) > 1 or any(len(one.front) > 1 for one in serving):
+    if len(serving) > 1 or any(len(candidate.front) > 1 for candidate in serving):
         first, second = list(serving[0].front[0])[:2]
-        fronts = {one.kind: np.array([list(p.values())[:2] for p in one.front]) for one in serving}
+        fronts = {
+            candidate.kind: np.array([list(p.values())[:2] for p in candidate.front])
+            for candidate in serving
+        }
         units = [OBJECTIVES[name] or "as in the lists" for name in (first, second)]
         figure = fronts_figure(fronts, [first, second], units)
     return template("choice/page.html.j2").render(
@@ -118,14 +121,14 @@ def page(choice: Choice) -> str:
         serving=serving,
         reasons=reasons(choice, serving),
         steps=next_steps(choice, serving),
-        others=[one for one in choice.candidates if not one.serves],
+        others=[candidate for candidate in choice.candidates if not candidate.serves],
         headings=headings,
-        cells={one.kind: cells(one) for one in serving},
+        cells={candidate.kind: cells(candidate) for candidate in serving},
         dimensions=dimensions,
         drives=drives,
         margins=margins,
         asked=asked(choice.job),
         assumed=assumed(choice),
         figure=figure,
-        pictures={one.kind: picture(one) for one in serving},
+        pictures={candidate.kind: picture(candidate) for candidate in serving},
     )

@@ -78,7 +78,7 @@ class Contents:
     @property
     def worst_floor(self) -> float:
         """The part of the largest held-out error that noise alone makes, percent."""
-        shown = max(self.held_out, key=lambda one: float(one.prediction.nrms.max()))
+        shown = max(self.held_out, key=lambda recording: float(recording.prediction.nrms.max()))
         return float(shown.prediction.floor[int(np.argmax(shown.prediction.nrms))])
 
     @property
@@ -89,7 +89,9 @@ class Contents:
 
 def short_sources(result: Identification) -> dict[str, str]:
     """Return the names of recordings on a page: without folders, unless two would be alike."""
-    every = list(dict.fromkeys(one.source for one in (*result.fitted, *result.held_out)))
+    every = list(
+        dict.fromkeys(prediction.source for prediction in (*result.fitted, *result.held_out))
+    )
     names = [PurePath(source).name or source for source in every]
     return {
         source: name if names.count(name) == 1 else source
@@ -99,28 +101,28 @@ def short_sources(result: Identification) -> dict[str, str]:
 
 def shortened(texts: Iterable[str], sources: Mapping[str, str]) -> tuple[str, ...]:
     """Return messages with the recordings called as on the page."""
-    found = []
+    short_texts = []
     for text in texts:
         for source in sorted(sources, key=len, reverse=True):
             text = text.replace(source, sources[source])
-        found.append(text)
-    return tuple(found)
+        short_texts.append(text)
+    return tuple(short_texts)
 
 
 def contents(result: Identification) -> Contents:
     """Return the contents of the page of an identification."""
     names, verdict = short_sources(result), result.verdict
-    said = [one.message for one in result.findings]
+    said = [shown.message for shown in result.findings]
     reasons, steps, notes, messages = (
         shortened(texts, names)
         for texts in (verdict.reasons, verdict.next_steps, result.notes, said)
     )
-    found = zip(result.findings, messages, strict=True)
-    held, fitted = (
+    findings = zip(result.findings, messages, strict=True)
+    held_out, fitted = (
         tuple(_shown(prediction, names) for prediction in predictions)
         for predictions in (result.held_out, result.fitted)
     )
-    worst = sorted(held, key=lambda one: -float(one.prediction.nrms.max()))
+    worst = sorted(held_out, key=lambda shown: -float(shown.prediction.nrms.max()))
     residuals = _residuals(result)
     used = np.isfinite(residuals)
     return Contents(
@@ -128,13 +130,13 @@ def contents(result: Identification) -> Contents:
             result,
             verdict=replace(verdict, reasons=reasons, next_steps=steps),
             notes=notes,
-            findings=tuple(replace(one, message=text) for one, text in found),
+            findings=tuple(replace(shown, message=text) for shown, text in findings),
         ),
-        held_out=held,
+        held_out=held_out,
         fitted=fitted,
         # A single sample is nothing to draw.
-        drawn=tuple(one for one in worst if len(one.prediction.time) > 1)[:_MOST_PICTURES],
-        repeats={one.name for one in held} <= {one.name for one in fitted},
+        drawn=tuple(shown for shown in worst if len(shown.prediction.time) > 1)[:_MOST_PICTURES],
+        repeats={shown.name for shown in held_out} <= {shown.name for shown in fitted},
         parameters=parameter_rows(result),
         bodies=body_rows(result),
         residuals=residuals,
@@ -155,7 +157,7 @@ def _shown(prediction: Prediction, names: dict[str, str]) -> PageRecording:
 
 def _residuals(result: Identification) -> Array:
     """Return the residuals of the equations; an equation that is not used has none."""
-    found = result.estimate.residuals
-    if not found.size:
+    residuals = result.estimate.residuals
+    if not residuals.size:
         return np.full((0, len(result.robot.legs)), np.nan)
-    return np.where(found == 0.0, np.nan, found)
+    return np.where(residuals == 0.0, np.nan, residuals)

@@ -28,15 +28,15 @@ from pteron.report.typeset import measured, template
 
 def page(result: Identification, model_file: str | None = None) -> str:
     """Return the page as HTML, with a link to the machine's file beside it and to no other."""
-    made = template(
+    document = template(
         "identification/page.html.j2",
         measured=lambda row: measured(row.value, row.half),
     )
-    found = contents(result)
+    page_contents = contents(result)
     joints = [leg.joint for leg in result.robot.legs]
-    return made.render(
-        found=found,
-        result=found.result,
+    return document.render(
+        found=page_contents,
+        result=page_contents.result,
         robot=result.robot,
         estimate=result.estimate,
         bodies=result.consistency,
@@ -46,32 +46,34 @@ def page(result: Identification, model_file: str | None = None) -> str:
         force=force(joints),
         nouns=nouns(joints),
         limits=(AT_THE_FLOOR, SMALL, LARGE, CYCLE),
-        figures=figures(found),
+        figures=figures(page_contents),
         model_file=model_file,
     )
 
 
-def figures(found: Contents) -> dict[str, Any]:
+def figures(page_contents: Contents) -> dict[str, Any]:
     """Return the pictures by name; those of residuals are None if the estimator keeps none."""
-    rows = found.parameters
-    joints = [leg.joint for leg in found.result.robot.legs]
+    rows = page_contents.parameters
+    joints = [leg.joint for leg in page_contents.result.robot.legs]
     names = [row.name for row in rows]
     ratios, weak = np.array([row.ratio for row in rows]), np.array([row.weak for row in rows])
-    made: dict[str, Any] = {
+    figures_by_name: dict[str, Any] = {
         "held_out": [
-            _panels(one, f"held{k}", joints, speed=k == 1)
-            for k, one in enumerate(found.drawn, start=1)
+            _panels(recording, f"held{k}", joints, speed=k == 1)
+            for k, recording in enumerate(page_contents.drawn, start=1)
         ],
-        "fitted": _panels(found.fitted[0], "fitted", joints, speed=not found.drawn),
+        "fitted": _panels(page_contents.fitted[0], "fitted", joints, speed=not page_contents.drawn),
         "histogram": None,
         "autocorrelation": None,
-        "certainty": certainty_figure(names, ratios, weak, found.result.model.base.rank),
-        "correlation": correlation_figure(names, found.result.estimate.correlation),
+        "certainty": certainty_figure(names, ratios, weak, page_contents.result.model.base.rank),
+        "correlation": correlation_figure(names, page_contents.result.estimate.correlation),
     }
-    if np.isfinite(found.residuals).any():
-        made["histogram"] = histogram_figure(found.residuals)
-        made["autocorrelation"] = autocorrelation_figure(found.correlations, found.bound)
-    return made
+    if np.isfinite(page_contents.residuals).any():
+        figures_by_name["histogram"] = histogram_figure(page_contents.residuals)
+        figures_by_name["autocorrelation"] = autocorrelation_figure(
+            page_contents.correlations, page_contents.bound
+        )
+    return figures_by_name
 
 
 def _panels(
@@ -79,16 +81,16 @@ def _panels(
 ) -> dict[str, Any]:
     """Return the pictures of one recording, with those over joint speed if `speed` is set."""
     p, part = shown.prediction, shown.stretch
-    rest = p.measured - p.predicted
+    residuals = p.measured - p.predicted
     series = p.measured[part], p.predicted[part], p.without_friction[part]
     forces, over_speed = [], []
     for i in range(p.measured.shape[1]):
-        given, predicted, rigid = (one[:, i] for one in series)
+        measured, predicted, rigid = (array[:, i] for array in series)
         look: Any = {"leg": i, "joint": joints[i]}
         used = p.used[part, i]
-        forces.append(comparison_figure(p.time[part], given, predicted, rigid, used, **look))
+        forces.append(comparison_figure(p.time[part], measured, predicted, rigid, used, **look))
         if speed:
-            over = p.speed[:, i], rest[:, i], p.used[:, i]
+            over = p.speed[:, i], residuals[:, i], p.used[:, i]
             over_speed.append(residual_speed_figure(*over, **look))
     return {
         "shown": shown,
@@ -96,5 +98,5 @@ def _panels(
         "forces": forces,
         "speed": over_speed,
         "errors": errors_figure(p.nrms, p.nrms_without_friction, p.floor),
-        "time": residual_time_figure(p.time, rest, p.used, joints),
+        "time": residual_time_figure(p.time, residuals, p.used, joints),
     }

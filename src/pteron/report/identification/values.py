@@ -54,13 +54,13 @@ def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
     base = model.base.values(result.robot)
     expressions, names = html_expressions(model), html_names(model)
     partners, strengths = _partners(estimate.correlation)
-    found = []
+    rows = []
     for k, name in enumerate(estimate.names):
         value, deviation = float(estimate.values[k]), float(estimate.deviations[k])
         status: Literal["essential", "dropped", "unseen"] = "essential"
         if name in (*result.unseen, *result.essential.dropped):
             status = "unseen" if name in result.unseen else "dropped"
-        found.append(
+        rows.append(
             Parameter(
                 name=name,
                 expression=expressions[k],
@@ -75,7 +75,7 @@ def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
                 correlation=float(strengths[k]),
             )
         )
-    return tuple(found)
+    return tuple(rows)
 
 
 def _partners(correlation: Array) -> tuple[Array, Array]:
@@ -114,13 +114,15 @@ def body_rows(result: Identification) -> tuple[Body, ...]:
         if p.owner in consistency.at_border
         for leg in p.legs or (None,)
     }
-    found, drawn = consistency.robot, result.robot
+    identified, drawn = consistency.robot, result.robot
     rows = [
-        Body(leg.names[letter], i - 1, _values(one), _values(old), (letter, i) in border)
-        for i, (leg, other) in enumerate(zip(found.legs, drawn.legs, strict=True), start=1)
-        for (letter, one), old in zip(leg.bodies.items(), other.bodies.values(), strict=True)
+        Body(leg.names[letter], i - 1, _values(body_inertia), _values(old), (letter, i) in border)
+        for i, (leg, other) in enumerate(zip(identified.legs, drawn.legs, strict=True), start=1)
+        for (letter, body_inertia), old in zip(
+            leg.bodies.items(), other.bodies.values(), strict=True
+        )
     ]
-    body, cad = (_values(robot.platform.joined) for robot in (found, drawn))
+    body, cad = (_values(robot.platform.joined) for robot in (identified, drawn))
     return (*rows, Body("platform", None, body, cad, (PLATFORM, None) in border))
 
 

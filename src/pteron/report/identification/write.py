@@ -67,8 +67,8 @@ def _header(result: Identification) -> list[str]:
     assert consistency is not None
     names = short_sources(result)
     fitted = list(dict.fromkeys(names[p.source] for p in result.fitted))
-    held = list(dict.fromkeys(names[p.source] for p in result.held_out))
-    repeats = "" if set(held) - set(fitted) else " (their last part)"
+    held_out = list(dict.fromkeys(names[p.source] for p in result.held_out))
+    repeats = "" if set(held_out) - set(fitted) else " (their last part)"
     distance = (
         "exactly"
         if consistency.feasible
@@ -77,7 +77,7 @@ def _header(result: Identification) -> list[str]:
     plain = "near uniform rods and a uniform disc."
     return [
         f"{result.robot.name}, identified from {', '.join(fitted)}; "
-        f"judged on {', '.join(held)}{repeats}.",
+        f"judged on {', '.join(held_out)}{repeats}.",
         f"Verdict: {result.verdict.grade}.",
         *shortened(result.verdict.reasons, names),
         f"Bodies that have the identified base parameters {distance}.",
@@ -89,5 +89,5 @@ def _header(result: Identification) -> list[str]:
 
 def numbers(result: Identification) -> dict[str, Any]:
     """Return the numbers of an identification as JSON has them, null where one is not finite."""
-    found: dict[str, Any] = json_ready(result.as_dict())
-    return found
+    ready: dict[str, Any] = json_ready(result.as_dict())
+    return ready
