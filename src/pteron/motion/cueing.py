@@ -169,9 +169,9 @@ def cue(
     time, *columns = rows.numbers(COLUMNS).T
     if len(time) < 2 or not (np.diff(time) > 0.0).all():
         raise DataError(f"{rows.source}: t: two or more times expected that ascend, in seconds")
-    given = np.array(columns).T
+    vehicle = np.array(columns).T
     even = _even_times(time - time[0], rows.source)
-    demand = _filtered(even, _interpolated(even, time - time[0], given), washout or Washout())
+    demand = _filtered(even, _interpolated(even, time - time[0], vehicle), washout or Washout())
     region, proof = _box(robot, middle, np.abs(demand[0]).max(axis=0), type_ii)
     half = 0.5 * np.ptp(region.box, axis=0)
     parts = _pressed(demand, _WITHIN * half)
@@ -179,7 +179,7 @@ def cue(
         if (_control_points(even, parts) <= half).all():
             break
         even = np.linspace(0.0, even[-1], 2 * len(even) - 1)
-        demand = _filtered(even, _interpolated(even, time - time[0], given), washout or Washout())
+        demand = _filtered(even, _interpolated(even, time - time[0], vehicle), washout or Washout())
         parts = _pressed(demand, _WITHIN * half)
     else:
         raise DataError(
@@ -203,9 +203,9 @@ def _even_times(time: Array, source: str) -> Array:
     return np.linspace(0.0, time[-1], count)
 
 
-def _interpolated(even: Array, time: Array, given: Array) -> Array:
+def _interpolated(even: Array, time: Array, columns: Array) -> Array:
     """Return columns (T, 6) at even times, linear between the times given."""
-    return np.stack([np.interp(even, time, column) for column in given.T], axis=-1)
+    return np.stack([np.interp(even, time, column) for column in columns.T], axis=-1)
 
 
 def _control_points(time: Array, parts: Array) -> Array:
@@ -221,12 +221,12 @@ def _control_points(time: Array, parts: Array) -> Array:
     return np.abs(points)
 
 
-def _filtered(time: Array, given: Array, washout: Washout) -> Array:
+def _filtered(time: Array, vehicle: Array, washout: Washout) -> Array:
     """Return the uncompressed motion, x y z roll pitch yaw from the middle, and two derivatives.
 
     The array is (3, T, 6), in m, rad and s.
     """
-    accelerations, rates = (washout.scale * part for part in (given[:, :3], given[:, 3:]))
+    accelerations, rates = (washout.scale * part for part in (vehicle[:, :3], vehicle[:, 3:]))
     w, s = washout.translation, washout.smoothing
     resonance = [1.0, 2.0 * _DAMPING * w, w * w]
     quick = np.polymul(resonance, [1.0, washout.return_speed])
@@ -242,11 +242,11 @@ def _filtered(time: Array, given: Array, washout: Washout) -> Array:
         for r in rates.T
     ]
     for angle, a in enumerate(lasting):
-        wanted = np.arcsin(np.clip(a / _GRAVITY, -0.9, 0.9))
+        target_tilt = np.arcsin(np.clip(a / _GRAVITY, -0.9, 0.9))
         steps = washout.tilt_rate * np.diff(time)
         tilt = np.zeros(len(time))
         for k, most in enumerate(steps):
-            tilt[k + 1] = tilt[k] + np.clip(wanted[k + 1] - tilt[k], -most, most)
+            tilt[k + 1] = tilt[k] + np.clip(target_tilt[k + 1] - tilt[k], -most, most)
         turned[angle] += _shown(time, tilt, [1.0], [1 / s**2, 2 / s, 1.0])
     return np.moveaxis(np.array([*moved, *turned]), 0, -1)
 
@@ -265,10 +265,10 @@ def _pressed(demand: Array, half: Array) -> Array:
     """Return x / (1 + (x / L)^6)^(1 / 6) of x (T, 6), which stays within L, and its derivatives."""
     x, dx, ddx = demand
     share = x / half
-    whole = 1.0 + share**6
-    slope = whole ** (-7.0 / 6.0)
-    bend = -7.0 * share**5 * slope / whole / half
-    return np.array([x * whole ** (-1.0 / 6.0), slope * dx, slope * ddx + bend * dx * dx])
+    power_sum = 1.0 + share**6
+    slope = power_sum ** (-7.0 / 6.0)
+    bend = -7.0 * share**5 * slope / power_sum / half
+    return np.array([x * power_sum ** (-1.0 / 6.0), slope * dx, slope * ddx + bend * dx * dx])
 
 
 def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tuple[Box, Proof]:
@@ -276,7 +276,7 @@ def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tu
 
     Its sides are in proportion to the ranges of the uncompressed motion.
     """
-    asked: tuple[Condition, ...] = conditions(robot, type_ii=type_ii)
+    required: tuple[Condition, ...] = conditions(robot, type_ii=type_ii)
     least = 1e-3 * max(float(demand.max()), 1e-3)
     ways = np.random.default_rng(0).uniform(-1.0, 1.0, (_SAMPLES, len(middle)))
     ways[: _SAMPLES // 2] = np.sign(ways[: _SAMPLES // 2])
@@ -286,7 +286,7 @@ def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tu
         return Box(tuple(middle - size * half), tuple(middle + size * half))
 
     size, proof = largest_proved(
-        robot, asked, region, lambda size: middle + size * half * ways, _ROOM, _HALVINGS, shares
+        robot, required, region, lambda size: middle + size * half * ways, _ROOM, _HALVINGS, shares
     )
     if not proof.holds:
         raise ModelError(

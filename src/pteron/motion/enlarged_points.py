@@ -16,7 +16,7 @@ def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> Jo
 
     With 1 they are the other machine's.
     """
-    whole = np.vstack([part.corners for part in other.parts])
+    corners = np.vstack([part.corners for part in other.parts])
     return replace(
         points,
         links=tuple(
@@ -24,7 +24,7 @@ def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> Jo
             for line, there in zip(points.links, other.links, strict=True)
         ),
         parts=tuple(
-            Part(part.hub, _moved(part.corners, whole, times) if len(whole) else part.corners)
+            Part(part.hub, _moved(part.corners, corners, times) if len(corners) else part.corners)
             for part in points.parts
         ),
         tool=points.tool + times * (other.tool - points.tool),

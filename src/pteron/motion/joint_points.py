@@ -164,11 +164,11 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
            [0.05, 0.  , 0.  ]])
     """
     robot = as_manipulator(robot)
-    given = as_array(pose, "pose", (robot.freedom,), columns=robot.coordinates)
-    coordinates = inverse_kinematics(robot, given)
-    chain: Array = evaluated(robot, "joint_points", "raise", given)
-    points: Array = evaluated(robot, "platform_points", "raise", given)
-    p, axes = robot.platform.at(given)
+    poses = as_array(pose, "pose", (robot.freedom,), columns=robot.coordinates)
+    coordinates = inverse_kinematics(robot, poses)
+    chain: Array = evaluated(robot, "joint_points", "raise", poses)
+    points: Array = evaluated(robot, "platform_points", "raise", poses)
+    p, axes = robot.platform.at(poses)
     links = tuple(
         _links(leg, chain[..., i, :, :], coordinates[..., i], points[..., i, :])
         for i, leg in enumerate(robot.legs)
@@ -177,7 +177,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
         chain,
         links,
         points,
-        _parts(robot, given, p),
+        _parts(robot, poses, p),
         p,
         p + robot.platform.tool @ axes,
         axes,
@@ -213,16 +213,16 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
     platform = robot.platform
     frame = np.array(platform.frame)
     arms = np.array([leg.platform_point for leg in robot.legs])
-    still = np.array([leg.fixed_offset for leg in robot.legs]) @ frame.T
+    offsets = np.array([leg.fixed_offset for leg in robot.legs]) @ frame.T
     if not platform.angles:
-        arms, still = arms + still, np.zeros_like(still)
-    found = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
+        arms, offsets = arms + offsets, np.zeros_like(offsets)
+    parts = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
     for hinge in _distinct(arms):
-        own = _corners(still[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
-        if len(own):
+        corners = _corners(offsets[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
+        if len(corners):
             hub = p + platform.arms(hinge[None], poses)[..., 0, :]
-            found.append(Part(hub, hub[..., None, :] + own @ frame))
-    return tuple(found)
+            parts.append(Part(hub, hub[..., None, :] + corners @ frame))
+    return tuple(parts)
 
 
 def _corners(arms: Array) -> Array:
@@ -234,8 +234,8 @@ def _corners(arms: Array) -> Array:
 
 def _distinct(points: Array) -> Array:
     """Return the points (k, 3) but for those that are where one before them is."""
-    apart = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
-    return points[[bool(apart[i, :i].all()) for i in range(len(points))]]
+    is_apart = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
+    return points[[bool(is_apart[i, :i].all()) for i in range(len(points))]]
 
 
 def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
@@ -264,9 +264,9 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     array([-0.3,  0.3])
     """
     robot = as_manipulator(robot)
-    given = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
-    points = joint_points(robot, given.reshape(-1, robot.freedom))
-    found = []
+    pose_rows = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
+    points = joint_points(robot, pose_rows.reshape(-1, robot.freedom))
+    guides = []
     for i, leg in enumerate(robot.legs):
         used, slides = points.coordinates[:, i], "p" in leg.bodies
         axis = np.array(leg.base_axis)
@@ -282,5 +282,5 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
             center, end = points.links[i][0, :2]
             turned = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
             path = center + turned.apply(end - center)
-        found.append(Guide(slides, axis, path))
-    return tuple(found)
+        guides.append(Guide(slides, axis, path))
+    return tuple(guides)

@@ -66,11 +66,11 @@ def with_tool(robot: RobotLike, name: str) -> Manipulator:
     (0.0, 0.0, -0.08)
     """
     robot = as_manipulator(robot)
-    found = {tool.name: tool for tool in robot.tools}
-    if name not in found:
-        known = f"; it has {', '.join(found)}" if found else ", nor any other; add one as [[tools]]"
+    tools = {tool.name: tool for tool in robot.tools}
+    if name not in tools:
+        known = f"; it has {', '.join(tools)}" if tools else ", nor any other; add one as [[tools]]"
         raise DataError(f"tool: {robot.name} has no tool {name!r}{known}")
-    tool = found[name]
+    tool = tools[name]
     bare = replace(robot, platform=replace(robot.platform, tool=tool.point), tools=())
     try:
         return carrying(bare, tool.mass, tool.center, tool.central_inertia)
@@ -144,7 +144,7 @@ def carrying(
     carried = number_or_nan(mass)
     if not (math.isfinite(carried) and carried >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
-    platform, own = robot.platform, robot.platform.inertia
+    platform, body = robot.platform, robot.platform.inertia
     at = platform.tool if center is None else vector(center, "center")
     if platform.slides and any(at[:2]) and carried:
         place = "platform.tool" if center is None else "center"
@@ -153,13 +153,13 @@ def carrying(
             f"where a payload cannot be modelled; give {place} [0, 0, z]",
             subject=robot.name,
         )
-    kind, count = type(own), inertia_count(own.kinds)
-    given = np.ravel(inertia).tolist()
-    tensor = numbers([0.0] * count if given == [0.0] else given, "inertia", count)
+    kind, count = type(body), inertia_count(body.kinds)
+    components = np.ravel(inertia).tolist()
+    tensor = numbers([0.0] * count if components == [0.0] else components, "inertia", count)
     if carried == 0.0 and not any(tensor):
         return robot
     load = carried_values(kind, carried, at, tensor)
     if any(tensor):
         kind.of_values(load)  # a body that is none says so
-    values = [a + b for a, b in zip(own.values, load, strict=True)]
+    values = [a + b for a, b in zip(body.values, load, strict=True)]
     return replace(robot, platform=replace(platform, inertia=kind.of_values(values)))

@@ -26,8 +26,8 @@ def given_forces(
     currents : array, shape (..., n), or None
         Forces of the currents, where some lag.
     """
-    found = within_motors(robot, forces, motor_rates)
-    return found if currents is None else np.where(DriveKind.of(robot).lag, currents, found)
+    limited = within_motors(robot, forces, motor_rates)
+    return limited if currents is None else np.where(DriveKind.of(robot).lag, currents, limited)
 
 
 def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Array:
@@ -42,8 +42,8 @@ def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Arra
     motor_rates : array, shape (..., n)
         Rates of the motors, counted at the joints.
     """
-    found = np.array(forces, dtype=float)
+    limited = np.array(forces, dtype=float)
     for i, leg in enumerate(robot.legs):
         if leg.drive:
-            found[..., i] = within_motor(leg.drive, found[..., i], motor_rates[..., i])
-    return found
+            limited[..., i] = within_motor(leg.drive, limited[..., i], motor_rates[..., i])
+    return limited

@@ -99,7 +99,7 @@ class Timing:
 
     def parts(self, period: float, samples: int) -> tuple[list[float], list[int]]:
         """Return what `pteron.kernels.loops.Loop.run` takes: times and counts, without the last."""
-        (late, whole), (old, behind) = (
+        (late, late_samples), (old, behind) = (
             divided(min(delay, period * samples), period)  # later than the end is never
             for delay in (self.delay, self.sensing)
         )
@@ -109,15 +109,15 @@ class Timing:
         spans, step = np.diff(bounds), min(self.step, period)
         counts = [int(np.ceil(span / step - _WHOLE)) for span in spans]
         lengths = [float(span) / max(n, 1) for span, n in zip(spans, counts, strict=True)]
-        before = 0 if late == 0.0 else 2 if late > look else 1
-        return [*lengths, period], [*counts, before, int(look > late), whole, behind]
+        command_part = 0 if late == 0.0 else 2 if late > look else 1
+        return [*lengths, period], [*counts, command_part, int(look > late), late_samples, behind]
 
 
 def divided(delay: float, period: float) -> tuple[float, int]:
     """Return a delay's part of a sample, and its whole samples."""
-    whole = int(delay / period + _WHOLE)
-    part = max(delay - whole * period, 0.0)
-    return (part if part > _WHOLE * period else 0.0), whole
+    samples = int(delay / period + _WHOLE)
+    part = max(delay - samples * period, 0.0)
+    return (part if part > _WHOLE * period else 0.0), samples
 
 
 def run(
@@ -135,96 +135,132 @@ def run(
 
     The source of forces is a controller's law, or forces at each sample.
     """
-    time, m, n = reference.time, robot.freedom, robot.joint_count
-    count, period = len(time), float(time[1] - time[0])
-    times, counts = timing.parts(period, count)
-    linked = source.linked if isinstance(source, ExportedLaw | ExportedCustomLaw) else None
-    law = source if isinstance(source, ProgramLaw) else None
-    if law is not None:
-        expect_sensed(robot, law.program)
-    made = loop(robot, None if law is None else law.program, linked)
-    memory = np.empty(0) if isinstance(source, np.ndarray) else source.memory(*start)
-    arrays = loop_arrays(made, robot, start, reference, law, sensors, counts)
-    arrays |= {"wrench": loads.wrench[None], **encoder_noise(sensors, robot, count)}
-    if isinstance(source, np.ndarray):
-        arrays["given"] = source[None]
-    kept = arrays["memory"].shape[2]
-    sizes = {"states": arrays["state"].shape[2], "acceleration": m, "memories": kept}
-    sizes |= dict.fromkeys(("joints", "rates", "forces", "asked"), n)
-    found = {name: np.full((1, count, size), np.nan) for name, size in sizes.items()}
-    if timing.method == "dop853":
-        if linked is not None:
-            raise DataError('method: "dop853" given, but a controller\'s C runs with "rk4" alone')
-        del found["acceleration"]
-    ask, memories = None, [memory]
-    if isinstance(source, ControlLaw) and law is None:
-        ask = _callback(source, reference, n, memories)
-    changes = np.flatnonzero(np.diff(loads.masses)) + 1
-    for first, stop in pairwise([0, *changes.tolist(), count]):
-        loaded = loads.machines[float(loads.masses[first])]
-        here = arrays | machine_numbers(loaded, made.plant, "plant") | found
-        here |= {
-            name: here[name][:, first:stop]
-            for name in (*found, "reference", "given", "noise", "wrench")
-            if here[name].shape[1] > 1
-        }
-        go = Adaptive(loaded, timing.tolerance).go if timing.method == "dop853" else None
-        how = [*counts, first, int(stop == count)]
-        made.run(here, stop - first, times, how, ask, go=go)
-        if arrays["fault"].any():
-            break
-    done, fault = int(arrays["done"].item()), arrays["fault"].item()
-    columns = {name: value[0, :done] for name, value in found.items()}
-    kind = DriveKind.of(robot)
-    parts = kind.parts(columns.pop("states"))
-    pose, velocity = parts["pose"], parts["velocity"]
-    columns |= {"pose": pose, "velocity": velocity, "memory": columns.pop("memories")}
-    columns["joint_rates"] = columns.pop("rates")
-    for name, motor in (("joints", "motor"), ("joint_rates", "motor_rate")):
-        own = columns[name]
-        columns[f"{motor}s"] = np.where(kind.elastic, parts[motor], own) if kind.bends else own
-    columns["forces"] = given_forces(
-        robot, columns["forces"], columns["motor_rates"], parts.get("current")
-    )
-    why = None
-    if fault == _ASKED and ask is not None:
-        why = "no forces are asked for: the controller returns some that are not finite numbers"
-    elif fault == _ASKED:
-        why = (
-            f"no forces are asked for at the joints {told_pose(columns['joints'][-1])}: they have "
-            "no pose near the last one, or the wanted pose is out of the controller's reach"
-        )
-    elif fault == _MOVED:
-        why = why_not_further(robot, *np.split(arrays["state"].ravel(), [m, 2 * m])[:2])
-    end = done
+    memories = [np.empty(0) if isinstance(source, np.ndarray) else source.memory(*start)]
+    ask = None
+    if isinstance(source, ControlLaw) and not isinstance(source, ProgramLaw):
+        ask = _callback(source, reference, robot.joint_count, memories)
+    arrays, samples = _run_loop(robot, start, reference, source, loads, sensors, timing, ask)
+    done = int(arrays["done"].item())
+    columns = _columns(robot, {name: array[0, :done] for name, array in samples.items()})
+    end, why = done, _fault_words(robot, arrays, columns["joints"], python=ask is not None)
     if limits:
-        ends = {
-            first_beyond_limits(robot, pose, columns["joints"]): told_limit,
-            first_singular(robot, pose): told_singular,
-        }
-        at = min((k for k in ends if k is not None), default=None)
-        if at is not None:
-            end, why = at + 1, ends[at](robot, pose[at])
-    clock = float(arrays["clock"].item())
-    stopped = None if why is None else f"at {min(clock, time[end - 1]):.4g} s: {why}"
+        beyond, reason = _first_failure(robot, columns["pose"], columns["joints"])
+        end, why = (end, why) if beyond is None else (beyond + 1, reason)
     if timing.method == "dop853":
-        columns["acceleration"] = _accelerations(loads, pose, velocity, columns["forces"])
-    columns = {name: values[:end] for name, values in columns.items()}
+        columns["acceleration"] = _accelerations(
+            loads, columns["pose"], columns["velocity"], columns["forces"]
+        )
+    columns = {name: column[:end] for name, column in columns.items()}
     if ask is not None:
         columns["memory"] = np.array(memories[1 : end + 1])
+    time, clock = reference.time, float(arrays["clock"].item())
     return Simulation(
         robot,
         time[:end],
         reference=Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),
         payload=loads.masses[:end],
-        step=min(timing.step, period) if timing.method == "rk4" else float("nan"),
-        stopped=stopped,
+        step=min(timing.step, float(time[1] - time[0])) if timing.method == "rk4" else np.nan,
+        stopped=None if why is None else f"at {min(clock, time[end - 1]):.4g} s: {why}",
         **columns,
     )
 
 
+def _run_loop(
+    robot: Manipulator,
+    start: tuple[Array, Array],
+    reference: Motion,
+    source: ControlLaw | ProgramLaw | Array,
+    loads: Loads,
+    sensors: Sensors,
+    timing: Timing,
+    ask: Callable[[int, int, Array], Array] | None,
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return the loop's arrays when it has run, and its samples (1, T, ...) by name."""
+    count, period = len(reference.time), float(reference.time[1] - reference.time[0])
+    times, counts = timing.parts(period, count)
+    linked = source.linked if isinstance(source, ExportedLaw | ExportedCustomLaw) else None
+    law = source if isinstance(source, ProgramLaw) else None
+    if law is not None:
+        expect_sensed(robot, law.program)
+    if timing.method == "dop853" and linked is not None:
+        raise DataError('method: "dop853" given, but a controller\'s C runs with "rk4" alone')
+    control_loop = loop(robot, None if law is None else law.program, linked)
+    arrays = loop_arrays(control_loop, robot, start, reference, law, sensors, counts)
+    arrays |= {"wrench": loads.wrench[None], **encoder_noise(sensors, robot, count)}
+    if isinstance(source, np.ndarray):
+        arrays["given"] = source[None]
+    sizes = {"states": arrays["state"].shape[2], "memories": arrays["memory"].shape[2]}
+    if timing.method == "rk4":
+        sizes["acceleration"] = robot.freedom
+    sizes |= dict.fromkeys(("joints", "rates", "forces", "asked"), robot.joint_count)
+    samples = {name: np.full((1, count, size), np.nan) for name, size in sizes.items()}
+    # A stretch of samples for each mass that is carried.
+    changes = np.flatnonzero(np.diff(loads.masses)) + 1
+    for first, stop in pairwise([0, *changes.tolist(), count]):
+        loaded = loads.machines[float(loads.masses[first])]
+        stretch = arrays | machine_numbers(loaded, control_loop.plant, "plant") | samples
+        stretch |= {
+            name: stretch[name][:, first:stop]
+            for name in (*samples, "reference", "given", "noise", "wrench")
+            if stretch[name].shape[1] > 1
+        }
+        go = Adaptive(loaded, timing.tolerance).go if timing.method == "dop853" else None
+        indices = [*counts, first, int(stop == count)]
+        control_loop.run(stretch, stop - first, times, indices, ask, go=go)
+        if arrays["fault"].any():
+            break
+    return arrays, samples
+
+
+def _columns(robot: Manipulator, samples: dict[str, Array]) -> dict[str, Array]:
+    """Return samples (T, ...) as a simulation names them, motors' coordinates and forces too."""
+    kind, columns = DriveKind.of(robot), dict(samples)
+    parts = kind.parts(columns.pop("states"))
+    columns |= {"pose": parts["pose"], "velocity": parts["velocity"]}
+    columns |= {"memory": columns.pop("memories"), "joint_rates": columns.pop("rates")}
+    for name, motor in (("joints", "motor"), ("joint_rates", "motor_rate")):
+        joints = columns[name]
+        columns[f"{motor}s"] = (
+            np.where(kind.elastic, parts[motor], joints) if kind.bends else joints
+        )
+    columns["forces"] = given_forces(
+        robot, columns["forces"], columns["motor_rates"], parts.get("current")
+    )
+    return columns
+
+
+def _fault_words(
+    robot: Manipulator, arrays: dict[str, Array], joints: Array, *, python: bool
+) -> str | None:
+    """Return why the loop ended before its time; None if it did not."""
+    fault = arrays["fault"].item()
+    if fault == _ASKED and python:
+        return "no forces are asked for: the controller returns some that are not finite numbers"
+    if fault == _ASKED:
+        return (
+            f"no forces are asked for at the joints {told_pose(joints[-1])}: they have no pose "
+            "near the last one, or the wanted pose is out of the controller's reach"
+        )
+    if fault == _MOVED:
+        m = robot.freedom
+        return why_not_further(robot, *np.split(arrays["state"].ravel(), [m, 2 * m])[:2])
+    return None
+
+
+def _first_failure(
+    robot: Manipulator, poses: Array, joints: Array
+) -> tuple[int | None, str | None]:
+    """Return the first sample beyond joints' limits or a singularity, and the reason."""
+    failures = {
+        first_beyond_limits(robot, poses, joints): told_limit,
+        first_singular(robot, poses): told_singular,
+    }
+    first = min((k for k in failures if k is not None), default=None)
+    return first, None if first is None else failures[first](robot, poses[first])
+
+
 def loop_arrays(
-    made: Loop,
+    control_loop: Loop,
     robot: Manipulator,
     start: tuple[Array, Array],
     reference: Motion,
@@ -241,7 +277,7 @@ def loop_arrays(
     state = dict(zip(("pose", "velocity"), start, strict=True))
     state |= motor_states(robot, *start, reference.acceleration[0])
     begun = np.concatenate(list(state.values())).reshape(1, 1, -1)
-    arrays = made.idle(robot, begun, *counts[-2:])
+    arrays = control_loop.idle(robot, begun, *counts[-2:])
     arrays |= {
         "most": limits_of(robot).force.reshape(1, 1, -1),
         "reference": np.hstack(parts)[None],
@@ -260,8 +296,8 @@ def _callback(
     def ask(_: int, sample: int, measured: Array) -> Array:
         parts = reference.pose, reference.velocity, reference.acceleration
         pose, velocity, acceleration = (part[sample] for part in parts)
-        told = measured[:joints], measured[joints:]
-        answer: Any = law(pose, velocity, acceleration, *told, memories[-1])
+        readings = measured[:joints], measured[joints:]
+        answer: Any = law(pose, velocity, acceleration, *readings, memories[-1])
         try:
             returned, memory = answer
         except (TypeError, ValueError):
@@ -279,9 +315,9 @@ def _callback(
 
 def _accelerations(loads: Loads, pose: Array, velocity: Array, forces: Array) -> Array:
     """Return the accelerations of states whose friction is smooth."""
-    found, masses = np.empty_like(pose), loads.masses[: len(pose)]
+    accelerations, masses = np.empty_like(pose), loads.masses[: len(pose)]
     for mass, loaded in loads.machines.items():
         at: Any = masses == mass
-        given = pose[at], velocity[at], forces[at], loads.wrench[: len(pose)][at]
-        found[at] = drive_accelerations(loaded, *given, on_failure="nan")
-    return found
+        states = pose[at], velocity[at], forces[at], loads.wrench[: len(pose)][at]
+        accelerations[at] = drive_accelerations(loaded, *states, on_failure="nan")
+    return accelerations

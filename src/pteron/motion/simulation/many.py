@@ -151,7 +151,7 @@ def simulate_many(
     check_positive(step=step)
     sensors = sensors or Sensors()
     reference = reference_of(robot, motion, None, duration, controller.period)
-    count, m, n = len(reference.time), robot.freedom, robot.joint_count
+    count = len(reference.time)
     about = reference.pose[:: max(1, count // 64)]
     timing = Timing(
         delay,
@@ -160,71 +160,105 @@ def simulate_many(
         1e-10,
         sensors.delay + sensors.samples * controller.period,
     )
-    times, counts = timing.parts(controller.period, count)
     law = controller.law(robot if model is None else as_manipulator(model))
     expect_sensed(robot, law.program)
-    made = loop(robot, law.program, general=machines.geometry is not None)
-    begun = reference.pose[0], reference.velocity[0]
-    alone = loop_arrays(made, robot, begun, reference, law, sensors, counts)
+    control_loop = loop(robot, law.program, general=machines.geometry is not None)
+    _, counts = timing.parts(controller.period, count)
+    start = reference.pose[0], reference.velocity[0]
+    arrays = loop_arrays(control_loop, robot, start, reference, law, sensors, counts)
+    course = _Course(control_loop, reference, sensors, timing, controller.period, arrays)
     folder = None if out is None else _empty(out)
     size, files = max(8, _ROWS // count // 8 * 8), list[Path]()
-    found: dict[str, list[Array]] = {name: [] for name in ("done", "fault", "rms", "most", "force")}
-    for start in range(0, len(machines), size):
-        part = machines.rows(slice(start, start + size))
-        arrays = alone | part.numbers
-        arrays |= encoder_noise(sensors, robot, count, range(start, start + len(part)))
-        arrays |= {name: np.repeat(alone[name], len(part), axis=0) for name in STATE}
-        if part.geometry is not None:
-            arrays |= _begun(made, part, arrays, controller.period)
-        sizes = {"states": alone["state"].shape[2], "joints": n, "rates": n, "forces": n}
-        samples = {name: np.full((len(part), count, k), np.nan) for name, k in sizes.items()}
-        made.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
-        done = arrays["done"][:, 0]
-        gone = np.arange(count) >= done
-        error = samples["states"][..., :m] - reference.pose
-        error[gone] = np.nan
-        # Of a machine that came to nothing all are NaN.
-        came = np.where(done[:, 0] > 0.0, done[:, 0], np.nan)
-        found["rms"].append(np.sqrt(np.nansum(error**2, axis=1) / came[:, None]))
-        found["most"].append(np.fmax.reduce(np.abs(error), axis=1))
-        rates, parts = samples["rates"], made.kind.parts(samples["states"])
-        if made.kind.bends:
-            rates = np.where(made.kind.elastic, parts["motor_rate"], rates)
-        samples["forces"] = given_forces(robot, samples["forces"], rates, parts.get("current"))
-        force = np.abs(samples["forces"])
-        force[gone] = np.nan
-        found["force"].append(np.fmax.reduce(force, axis=1))
-        found["done"].append(done[:, 0])
-        found["fault"].append(arrays["fault"][:, 0, 0])
+    figures: list[dict[str, Array]] = []
+    for first in range(0, len(machines), size):
+        part = machines.rows(slice(first, first + size))
+        part_figures, samples, reached = course.simulated(part, first, threads)
+        figures.append(part_figures)
         if folder is not None:
-            files.append(folder / f"machines-{start:08d}.parquet")
-            table = _table(machines, start, reference.time, samples, ~gone)
+            files.append(folder / f"machines-{first:08d}.parquet")
+            table = _table(machines, first, reference.time, samples, reached)
             # Noisy floats hardly shrink: lz4 takes half the time of the usual zstd.
             table.write_parquet(files[-1], compression="lz4")
-    whole = {name: np.concatenate(parts) for name, parts in found.items()}
+    every = {name: np.concatenate([part[name] for part in figures]) for name in figures[0]}
     return Batch(
         machines,
-        whole["done"].astype(np.int64),
-        whole["rms"],
-        whole["most"],
-        whole["force"],
-        np.array(_WHY)[whole["fault"].astype(int)],
+        every["done"].astype(np.int64),
+        every["rms"],
+        every["most"],
+        every["force"],
+        np.array(_WHY)[every["fault"].astype(int)],
         tuple(files),
     )
 
 
-def _begun(made: Loop, part: Machines, arrays: dict[str, Array], period: float) -> dict[str, Array]:
+@dataclass(frozen=True)
+class _Course:
+    """What all machines of a batch follow, and the loop that simulates them.
+
+    `arrays` are those of a single machine.
+    """
+
+    loop: Loop
+    reference: Motion
+    sensors: Sensors
+    timing: Timing
+    period: float
+    arrays: dict[str, Array]
+
+    def simulated(
+        self, part: Machines, first: int, threads: Workers
+    ) -> tuple[dict[str, Array], dict[str, Array], NDArray[np.bool_]]:
+        """Return figures of some machines, their samples (B, T, ...), and which are reached (B, T).
+
+        `first` is the number of the first of them in the batch.
+        """
+        robot, count = part.robot, len(self.reference.time)
+        m, n = robot.freedom, robot.joint_count
+        arrays = self.arrays | part.numbers
+        arrays |= encoder_noise(self.sensors, robot, count, range(first, first + len(part)))
+        arrays |= {name: np.repeat(self.arrays[name], len(part), axis=0) for name in STATE}
+        if part.geometry is not None:
+            arrays |= _begun(self.loop, part, arrays, self.period)
+        sizes = {"states": arrays["state"].shape[2], "joints": n, "rates": n, "forces": n}
+        samples = {name: np.full((len(part), count, k), np.nan) for name, k in sizes.items()}
+        times, counts = self.timing.parts(self.period, count)
+        self.loop.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
+        done = arrays["done"][:, 0]
+        reached = np.arange(count) < done
+        error = samples["states"][..., :m] - self.reference.pose
+        error[~reached] = np.nan
+        # Of a machine that came to nothing all are NaN.
+        came = np.where(done[:, 0] > 0.0, done[:, 0], np.nan)
+        rates, parts = samples["rates"], self.loop.kind.parts(samples["states"])
+        if self.loop.kind.bends:
+            rates = np.where(self.loop.kind.elastic, parts["motor_rate"], rates)
+        samples["forces"] = given_forces(robot, samples["forces"], rates, parts.get("current"))
+        force = np.abs(samples["forces"])
+        force[~reached] = np.nan
+        figures = {
+            "done": done[:, 0],
+            "fault": arrays["fault"][:, 0, 0],
+            "rms": np.sqrt(np.nansum(error**2, axis=1) / came[:, None]),
+            "most": np.fmax.reduce(np.abs(error), axis=1),
+            "force": np.fmax.reduce(force, axis=1),
+        }
+        return figures, samples, reached
+
+
+def _begun(
+    control_loop: Loop, part: Machines, arrays: dict[str, Array], period: float
+) -> dict[str, Array]:
     """Return encoders and motors of machines whose joints, in one pose, are their own."""
     robot, state = part.robot, arrays["state"].copy()
     m, n = robot.freedom, robot.joint_count
     motion = {"pose": state[:, 0, :m], "velocity": state[:, 0, m : 2 * m]}
-    found = Evaluated("sensed", made.sensed)(motion, arrays)
-    joints, rates = found["joints"], found["rates"]
-    if made.kind.bends:
+    sensed = Evaluated("sensed", control_loop.sensed)(motion, arrays)
+    joints, rates = sensed["joints"], sensed["rates"]
+    if control_loop.kind.bends:
         # A transmission is bent as that of the machine without tolerances.
         motors = state[:, 0, 2 * m : 2 * m + n]
         motors += joints - inverse_kinematics(robot, motion["pose"])
-        soft = np.array(made.kind.elastic)
+        soft = np.array(control_loop.kind.elastic)
         joints = np.concatenate([joints, np.where(soft, motors, joints)], axis=1)
         rates = np.tile(rates, 2)
     memory = encoder_memory(joints, rates, arrays["steps"][0, 0], period)
@@ -240,7 +274,11 @@ def _empty(out: str | Path) -> Path:
 
 
 def _table(
-    machines: Machines, start: int, time: Array, samples: dict[str, Array], kept: NDArray[np.bool_]
+    machines: Machines,
+    start: int,
+    time: Array,
+    samples: dict[str, Array],
+    reached: NDArray[np.bool_],
 ) -> pl.DataFrame:
     """Return the samples of some machines that each came to."""
     import polars as pl
@@ -248,10 +286,10 @@ def _table(
     robot = machines.robot
     m = robot.freedom
     names = robot.coordinates
-    numbers = np.broadcast_to(start + np.arange(len(kept))[:, None], kept.shape)
+    numbers = np.broadcast_to(start + np.arange(len(reached))[:, None], reached.shape)
     columns: dict[str, NDArray[np.generic]] = {
-        "machine": numbers[kept],
-        "t": np.broadcast_to(time, kept.shape)[kept],
+        "machine": numbers[reached],
+        "t": np.broadcast_to(time, reached.shape)[reached],
     }
     for titles, values in (
         (names, samples["states"][..., :m]),
@@ -259,5 +297,5 @@ def _table(
         (robot.joint_names, samples["joints"]),
         (robot.force_names, samples["forces"]),
     ):
-        columns |= {title: values[..., k][kept] for k, title in enumerate(titles)}
+        columns |= {title: values[..., k][reached] for k, title in enumerate(titles)}
     return pl.DataFrame(columns)

@@ -49,17 +49,19 @@ class Sensors:
 
     def __post_init__(self) -> None:
         for name in ("encoder", "noise", "motor_encoder", "delay"):
-            given = getattr(self, name)
-            values = as_array(0.0 if given is None and name == "motor_encoder" else given, name, ())
+            setting = getattr(self, name)
+            values = as_array(
+                0.0 if setting is None and name == "motor_encoder" else setting, name, ()
+            )
             scalar = name == "delay" and values.ndim
             if scalar or not (np.isfinite(values).all() and (values >= 0.0).all()):
-                wanted = "0 s or more" if name == "delay" else "0 or more"
-                raise DataError(f"{name}: {given} given, {wanted} expected")
+                expected = "0 s or more" if name == "delay" else "0 or more"
+                raise DataError(f"{name}: {setting} given, {expected} expected")
         for name in ("seed", "samples"):
-            whole: object = getattr(self, name)
-            if not isinstance(whole, int) or isinstance(whole, bool) or whole < 0:
+            number: object = getattr(self, name)
+            if not isinstance(number, int) or isinstance(number, bool) or number < 0:
                 raise DataError(
-                    f"{name}: {shown(whole)} given, a whole number of 0 or more expected"
+                    f"{name}: {shown(number)} given, a whole number of 0 or more expected"
                 )
         cutoff = 1.0 if self.cutoff is None else as_array(self.cutoff, "cutoff", ())
         if np.ndim(cutoff) or not (np.isfinite(cutoff) and cutoff > 0.0):
@@ -88,7 +90,7 @@ def encoder_arrays(
         steps, noises = np.concatenate([steps, fine]), np.tile(noises, 2)
         round_ = np.concatenate([round_, np.where(soft, 0.0, round_)])
     at = [encoder_of(leg.drive) for leg in robot.legs]
-    found = {
+    arrays = {
         "encoders": encoder_memory(joints, rates, steps, period),
         "steps": steps,
         "noises": noises,
@@ -98,7 +100,7 @@ def encoder_arrays(
             [*(float(e == "motor") for e in at), *(float(e in ("motor", "both")) for e in at)]
         ),
     }
-    return {name: value.reshape(1, 1, -1) for name, value in found.items()}
+    return {name: value.reshape(1, 1, -1) for name, value in arrays.items()}
 
 
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
@@ -106,10 +108,10 @@ def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> 
 
     `steps` (E,) are theirs, `period` is from one sample to the next.
     """
-    before = joints - period * rates
+    last_joints = joints - period * rates
     widths = np.where(steps > 0.0, steps, 1.0)
-    before = np.where(steps > 0.0, steps * np.round(before / widths), before)
-    return np.concatenate([joints, np.zeros_like(joints), before, rates], axis=-1)
+    last_joints = np.where(steps > 0.0, steps * np.round(last_joints / widths), last_joints)
+    return np.concatenate([joints, np.zeros_like(joints), last_joints, rates], axis=-1)
 
 
 def encoder_noise(
@@ -137,8 +139,8 @@ def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
     """
     count = robot.joint_count
     at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
-    given = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
-    steps, noises, fine = (_per_joint(value, key, count) for key, value in given.items())
+    settings = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
+    steps, noises, fine = (_per_joint(value, key, count) for key, value in settings.items())
     motors = [encoder_of(leg.drive) in ("motor", "both") for leg in robot.legs]
     rough = np.where(motors, fine, steps) + noises > 0.0
     return np.where(rough, _share(sensors, period), np.nan)
@@ -153,20 +155,21 @@ def _share(sensors: Sensors, period: float) -> float:
 
 def expect_sensed(robot: Manipulator, law: Program) -> None:
     """Refuse a controller that needs readings of motors where there is no encoder."""
-    asked = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
+    readings = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
     without = [str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"]
-    if asked and without:
+    if readings and without:
         raise DataError(
-            f"controller: needs {' and '.join(asked)}, which no sensor gives: the encoder of leg "
-            f"{', '.join(without)} of {robot.name} is at the joint; take joints and joint_rates, "
-            'or give its drive.elastic encoder = "both"'
+            f"controller: needs {' and '.join(readings)}, which no sensor gives: the encoder of "
+            f"leg {', '.join(without)} of {robot.name} is at the joint; take joints and "
+            'joint_rates, or give its drive.elastic encoder = "both"'
         )
 
 
 def _per_joint(value: float | tuple[float, ...], name: str, count: int) -> Array:
-    given = np.asarray(value, dtype=float)
-    if given.shape not in ((), (count,)):
+    numbers = np.asarray(value, dtype=float)
+    if numbers.shape not in ((), (count,)):
         raise DataError(
-            f"{name}: shape {given.shape} given, one number or {count} expected, one for each joint"
+            f"{name}: shape {numbers.shape} given, one number or {count} expected, one for each "
+            "joint"
         )
-    return np.broadcast_to(given, (count,)).copy()
+    return np.broadcast_to(numbers, (count,)).copy()

@@ -193,14 +193,14 @@ def simulate(
     loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench", reference.time))
 
     def made(timing: Timing) -> Simulation:
-        given = (pose, velocity), reference, source, loads, sensors, timing
-        return run(robot, *given, limits=limits and controller is not None)
+        settings = (pose, velocity), reference, source, loads, sensors, timing
+        return run(robot, *settings, limits=limits and controller is not None)
 
     return made(timing) if error is None else _within(made, timing, error, period)
 
 
 def _within(
-    made: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
+    simulated: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
 ) -> Simulation:
     """Return a simulation whose steps are shortened until no pose changes by more than the error.
 
@@ -211,12 +211,12 @@ def _within(
     check_positive(error=error)
     if timing.method != "rk4":
         raise DataError('error: goes with method "rk4"; the steps of "dop853" have `tolerance`')
-    coarse, changes = made(timing), [np.inf]
+    coarse, changes = simulated(timing), [np.inf]
     for _ in range(_HALVINGS):
         length = min(timing.step, coarse.step)
         count = round(period / length)
         timing = replace(timing, step=period / (2 * count + 1) if count else length / 2.0)
-        fine = made(timing)
+        fine = simulated(timing)
         both = min(len(fine.time), len(coarse.time))
         changes.append(float(np.abs(fine.pose[:both] - coarse.pose[:both]).max()))
         if max(changes[-2:]) <= _SAFE * error and len(fine.time) == len(coarse.time):
@@ -288,28 +288,30 @@ def reference_of(
         return Motion(time, *(checked(robot, part, name) for part, name in parts))
     if start is None:
         raise DataError("start: not given, nor a motion to start on; give a pose and a velocity")
-    rest = np.zeros((len(time), robot.freedom))
-    return Motion(time, rest + _state(robot, start)[0], rest, rest)
+    zeros = np.zeros((len(time), robot.freedom))
+    return Motion(time, zeros + _state(robot, start)[0], zeros, zeros)
 
 
 def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Array:
     """Return what is carried at each sample, kg."""
-    given = as_array(payload, "payload", ())
-    if given.ndim == 0:
-        return np.full(len(time), given)
-    pairs = given.ndim == 2 and given.shape[1:] == (2,) and bool(np.isfinite(given[:, 0]).all())
-    if not pairs or (np.diff(given[:, 0]) < 0.0).any():
+    carried = as_array(payload, "payload", ())
+    if carried.ndim == 0:
+        return np.full(len(time), carried)
+    pairs = (
+        carried.ndim == 2 and carried.shape[1:] == (2,) and bool(np.isfinite(carried[:, 0]).all())
+    )
+    if not pairs or (np.diff(carried[:, 0]) < 0.0).any():
         raise DataError("payload: a mass, or pairs of time and mass in the order of time, expected")
-    if not (given[:, 1] >= 0.0).all():
-        wrong = given[~(given[:, 1] >= 0.0), 1][0]
+    if not (carried[:, 1] >= 0.0).all():
+        wrong = carried[~(carried[:, 1] >= 0.0), 1][0]
         raise DataError(f"payload: {wrong} given, a mass of 0 kg or more expected")
-    k = np.searchsorted(given[:, 0], time + 1e-9, side="right")
-    masses: Array = np.append(0.0, given[:, 1])[k]
+    k = np.searchsorted(carried[:, 0], time + 1e-9, side="right")
+    masses: Array = np.append(0.0, carried[:, 1])[k]
     return masses
 
 
 def _of_time(
-    given: PoseLike | Callable[[float], PoseLike] | None,
+    source: PoseLike | Callable[[float], PoseLike] | None,
     robot: Manipulator,
     name: str,
     time: Array,
@@ -318,13 +320,13 @@ def _of_time(
     columns = robot.column_names[name]
     size = len(columns)
 
-    def numbers(value: PoseLike, told: str) -> Array:
-        found = as_array(by_name(value, columns, told), told, (size,))
-        expect(found.ndim == 1, told, f"shape {found.shape}", f"({size},)")
-        expect(np.isfinite(found).all(), told, shown(found.tolist()), "finite numbers")
-        return found
+    def numbers(value: PoseLike, label: str) -> Array:
+        array = as_array(by_name(value, columns, label), label, (size,))
+        expect(array.ndim == 1, label, f"shape {array.shape}", f"({size},)")
+        expect(np.isfinite(array).all(), label, shown(array.tolist()), "finite numbers")
+        return array
 
-    if callable(given):
-        return np.array([numbers(given(now), f"{name}({now:g})") for now in time.tolist()])
-    held = np.zeros(size) if given is None else numbers(given, name)
-    return np.tile(held, (len(time), 1))
+    if callable(source):
+        return np.array([numbers(source(now), f"{name}({now:g})") for now in time.tolist()])
+    constant = np.zeros(size) if source is None else numbers(source, name)
+    return np.tile(constant, (len(time), 1))

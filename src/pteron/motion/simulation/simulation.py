@@ -136,8 +136,10 @@ class Simulation:
         names, joints = self.robot.coordinates, self.robot.joint_names
         scales = reading_scales(self.robot)
         bends = [leg.drive.elastic if leg.drive else None for leg in self.robot.legs]
-        behind = [one is not None and one.encoder == "motor" for one in bends]
-        told = np.where(behind, self.motors, self.joints)
+        behind = [
+            transmission is not None and transmission.encoder == "motor" for transmission in bends
+        ]
+        read_joints = np.where(behind, self.motors, self.joints)
         rates = np.where(behind, self.motor_rates, self.joint_rates)
         motors = [f"motor_{name}" for name in joints] if any(bends) else []
         blocks = (
@@ -145,7 +147,7 @@ class Simulation:
             ([f"d{name}" for name in names], self.velocity),
             ([f"dd{name}" for name in names], self.acceleration),
             ([f"{name}ref" for name in names], self.reference.pose),
-            (joints, to_readings(self.robot, told)),
+            (joints, to_readings(self.robot, read_joints)),
             ([f"d{name}" for name in joints], rates / scales),
             (motors, to_readings(self.robot, self.motors)[:, : len(motors)]),
             ([f"d{name}" for name in motors], (self.motor_rates / scales)[:, : len(motors)]),

@@ -43,13 +43,13 @@ def _fastest(
     robot: Manipulator, poses: PoseLike, machines: Machines | None = None
 ) -> tuple[float, str]:
     """Return the longest stable step, s, and its cause as the beginning of a sentence."""
-    kind, own = DriveKind.of(robot), drives_of(robot)
+    kind, drives = DriveKind.of(robot), drives_of(robot)
     if machines is not None:
-        parts = machines.drives.reshape(len(machines), len(own), -1)
-        own = Drives(*np.moveaxis(parts, 1, 0))
-    own = own._replace(viscous=own.viscous + _braking(robot))
-    found = float("inf"), ""
-    if own.viscous.any() or kind.bends or any(kind.lugre):
+        parts = machines.drives.reshape(len(machines), len(drives), -1)
+        drives = Drives(*np.moveaxis(parts, 1, 0))
+    drives = drives._replace(viscous=drives.viscous + _braking(robot))
+    longest = float("inf"), ""
+    if drives.viscous.any() or kind.bends or any(kind.lugre):
         rows, mass = jacobian(robot, poses), mass_matrix(robot, poses)
         if machines is not None:
             at = np.einsum("...ij,...ji->...", rows, np.linalg.solve(mass, rows.mT)).argmax()
@@ -60,29 +60,29 @@ def _fastest(
                 {"mass_parameters": machines.loaded[:, None]},
             )
             mass = next(iter(each.values())).reshape(-1, *mass.shape[-2:])
-        found = _longest(robot, rows, mass, own)
+        longest = _longest(robot, rows, mass, drives)
     for i, leg in enumerate(robot.legs, start=1):
         lag = leg.drive and leg.drive.current_time
-        if lag and _STABLE * lag < found[0]:
-            found = _STABLE * lag, f"leg {i}: the current's time constant"
-    return found
+        if lag and _STABLE * lag < longest[0]:
+            longest = _STABLE * lag, f"leg {i}: the current's time constant"
+    return longest
 
 
 def _braking(robot: Manipulator) -> Array:
     """Return the fall (n,) of drive forces per joint rate where the supply is at its limit."""
-    found = np.zeros(robot.joint_count)
+    slopes = np.zeros(robot.joint_count)
     for i, leg in enumerate(robot.legs):
         if leg.drive and leg.drive.winding:
             winding = leg.drive.winding
-            found[i] = (leg.drive.gear * winding.torque_constant) ** 2 / winding.resistance
-    return found
+            slopes[i] = (leg.drive.gear * winding.torque_constant) ** 2 / winding.resistance
+    return slopes
 
 
-def _longest(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple[float, str]:
+def _longest(robot: Manipulator, rows: Array, mass: Array, drives: Drives) -> tuple[float, str]:
     """Return the longest step and its cause, from J, M and drives of poses or of machines."""
-    kind, found = DriveKind.of(robot), (float("inf"), "")
-    if own.viscous.any() or kind.bends:
-        system, bent = _linear(robot, rows, mass, own)
+    kind, longest = DriveKind.of(robot), (float("inf"), "")
+    if drives.viscous.any() or kind.bends:
+        system, bent = _linear(robot, rows, mass, drives)
         if kind.bends:
             rates, vectors = np.linalg.eig(system)
         else:  # without springs the eigenvalues are those of the friction's part alone, and zeros
@@ -90,24 +90,24 @@ def _longest(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple
         fastest = int(np.abs(rates).argmax())
         rate = float(np.abs(rates.flat[fastest]))
         if rate > 0.0:
-            found = _STABLE / rate, "viscous friction"
+            longest = _STABLE / rate, "viscous friction"
             if kind.bends:
                 shapes = np.moveaxis(bent @ vectors[..., : bent.shape[-1], :], -1, -2)
                 soft = np.abs(shapes.reshape(-1, robot.joint_count)[fastest]) * kind.elastic
-                found = found[0], f"leg {soft.argmax() + 1}: the stiffness of its transmission"
+                longest = longest[0], f"leg {soft.argmax() + 1}: the stiffness of its transmission"
     if any(kind.lugre):
-        rotors = np.where(kind.elastic, 0.0, own.inertia)
+        rotors = np.where(kind.elastic, 0.0, drives.inertia)
         mass = mass + rows.mT @ (rotors[..., None] * rows)
         moved = np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT))
         for i, leg in enumerate(robot.legs):
             if leg.drive and leg.drive.lugre:
-                ease = 1.0 / own.inertia[..., i] if kind.elastic[i] else moved[..., i]
+                ease = 1.0 / drives.inertia[..., i] if kind.elastic[i] else moved[..., i]
                 # A bound on the eigenvalue of a spring with a damper.
                 bristle = leg.drive.lugre
                 rate = float(np.max(np.sqrt(bristle.stiffness * ease) + bristle.damping * ease))
-                if _STABLE / rate < found[0]:
-                    found = _STABLE / rate, f"leg {i + 1}: the stiffness of its bristles"
-    return found
+                if _STABLE / rate < longest[0]:
+                    longest = _STABLE / rate, f"leg {i + 1}: the stiffness of its bristles"
+    return longest
 
 
 def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
@@ -155,38 +155,38 @@ def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
     return rates, np.where(soft[:, None], bent @ vectors[..., : bent.shape[-1], :], 0.0)
 
 
-def _linear(robot: Manipulator, rows: Array, mass: Array, own: Drives) -> tuple[Array, Array]:
+def _linear(robot: Manipulator, rows: Array, mass: Array, drives: Drives) -> tuple[Array, Array]:
     """Return the linear machine's matrix (..., 2 K, 2 K) and the deflections (..., n, K).
 
     The K coordinates are those of the pose, then the motors behind transmissions that bend.
     """
     bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
     stiffness, damping = (
-        np.array([getattr(one, name) if one else 0.0 for one in bends])
+        np.array([getattr(transmission, name) if transmission else 0.0 for transmission in bends])
         for name in ("stiffness", "damping")
     )
-    soft = np.array([one is not None for one in bends])
+    soft = np.array([transmission is not None for transmission in bends])
     m, n = robot.freedom, robot.joint_count
     every = np.eye(n)[soft]
     bent = np.concatenate([-rows, np.broadcast_to(every.T, (*rows.shape[:-2], n, len(every)))], -1)
     rigid = np.where(soft, 0.0, 1.0)
 
-    def whole(joints: Array, motors: Array, springs: Array) -> Array:
+    def coupled(joints: Array, motors: Array, springs: Array) -> Array:
         moved = rows.mT @ (joints[..., None] * rows)
         pulled = bent.mT @ (springs[:, None] * bent)
-        found = np.zeros(
+        block = np.zeros(
             np.broadcast_shapes(moved.shape[:-2], pulled.shape[:-2]) + pulled.shape[-2:]
         )
-        found += pulled
-        found[..., :m, :m] += moved
-        found[..., m:, m:] += motors[..., soft, None] * np.eye(len(every))
-        return found
+        block += pulled
+        block[..., :m, :m] += moved
+        block[..., m:, m:] += motors[..., soft, None] * np.eye(len(every))
+        return block
 
-    inertia = whole(rigid * own.inertia, own.inertia, np.zeros(n))
+    inertia = coupled(rigid * drives.inertia, drives.inertia, np.zeros(n))
     inertia = np.broadcast_to(inertia, (*mass.shape[:-2], *inertia.shape[-2:])).copy()
     inertia[..., :m, :m] += mass
-    drag = whole(rigid * own.viscous, own.viscous, damping)
-    pull = whole(np.zeros(n), np.zeros(n), stiffness)
+    drag = coupled(rigid * drives.viscous, drives.viscous, damping)
+    pull = coupled(np.zeros(n), np.zeros(n), stiffness)
     size = m + len(every)
     system = np.zeros((*inertia.shape[:-2], 2 * size, 2 * size))
     system[..., :size, size:] = np.eye(size)

@@ -92,11 +92,13 @@ class Sizing:
             *(self.peak_power, self.mean_power),
         )
         rows = []
-        for name, leg, *found in zip(self.robot.joint_names, self.robot.legs, *values, strict=True):
+        for name, leg, *numbers in zip(
+            self.robot.joint_names, self.robot.legs, *values, strict=True
+        ):
             force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
             units = (force, force, speed, "W", "W")
-            told = (f"{value:.4g} {unit}" for value, unit in zip(found, units, strict=True))
-            rows.append((name, *told))
+            texts = (f"{value:.4g} {unit}" for value, unit in zip(numbers, units, strict=True))
+            rows.append((name, *texts))
         about = f"drives over a cycle of {self.duration:.6g} s"
         return html_table(self.robot.name, about, columns, rows, self.overloads)
 
@@ -130,15 +132,15 @@ class Sizing:
         shape = len(self.time), -1, self.robot.joint_count
         forces, speeds = self.forces.reshape(shape), self.speeds.reshape(shape)
         power = forces * speeds
-        given, braked = np.maximum(power, 0.0), np.maximum(-power, 0.0)
+        delivered, braked = np.maximum(power, 0.0), np.maximum(-power, 0.0)
         return {
             "peak_force": np.abs(forces).max(axis=0),
             "rms_force": np.sqrt(self.mean(forces**2)),
             "peak_speed": np.abs(speeds).max(axis=0),
             "rms_speed": np.sqrt(self.mean(speeds**2)),
-            "peak_power": given.max(axis=0),
+            "peak_power": delivered.max(axis=0),
             "peak_braking": braked.max(axis=0),
-            "given_energy": self.integral(given),
+            "given_energy": self.integral(delivered),
             "braked_energy": self.integral(braked),
         }
 
@@ -203,8 +205,8 @@ class Sizing:
     @property
     def energy(self) -> PerJoint:
         """Energy that each drive gives over the cycle, less what it takes back, J."""
-        found = self._by_place
-        return np.asarray((found["given_energy"] - found["braked_energy"]).max(axis=0))
+        quantities = self._by_place
+        return np.asarray((quantities["given_energy"] - quantities["braked_energy"]).max(axis=0))
 
     @property
     def net_energy(self) -> float:
@@ -212,9 +214,11 @@ class Sizing:
 
         It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
         """
-        given, braked = (self._by_place[f"{key}_energy"].sum(axis=1) for key in ("given", "braked"))
-        net = float((given - braked).max())
-        return net if abs(net) > _NONE * float(given.max()) else 0.0
+        delivered, braked = (
+            self._by_place[f"{key}_energy"].sum(axis=1) for key in ("given", "braked")
+        )
+        net = float((delivered - braked).max())
+        return net if abs(net) > _NONE * float(delivered.max()) else 0.0
 
     @property
     def mean_power(self) -> PerJoint:
@@ -272,19 +276,19 @@ class Sizing:
     @cached_property
     def overloads(self) -> tuple[str, ...]:
         """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
-        beyond = [one for one in self.margins if one.margin < 1.0]
-        beyond.sort(key=lambda one: one.quantity == "rms_force")
-        return tuple(one.told(self.where(one)) for one in beyond)
+        beyond = [limit for limit in self.margins if limit.margin < 1.0]
+        beyond.sort(key=lambda limit: limit.quantity == "rms_force")
+        return tuple(limit.told(self.where(limit)) for limit in beyond)
 
-    def where(self, one: DriveMargin) -> str:
+    def where(self, limit: DriveMargin) -> str:
         """Return in words at which of several places a margin is so small; else an empty text."""
         if not self.places:
             return ""
-        leg = one.leg - 1
-        if one.quantity == "force_at_speed":
+        leg = limit.leg - 1
+        if limit.quantity == "force_at_speed":
             peak = motor_peak(self.drives[leg], self.forces[..., leg], self.speeds[..., leg])
             return f" {self.places[peak.at % len(self.places)]}"
-        return f" {self.places[self.worst(one.quantity)[leg]]}"
+        return f" {self.places[self.worst(limit.quantity)[leg]]}"
 
     def table(self) -> pl.DataFrame:
         """Return a table, one row a leg: SI units, at the joint but for motor_torque.
@@ -359,20 +363,20 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     )
     if rotor_inertia == 0.0 or not moving.any():
         return math.inf
-    own = np.sqrt(np.sqrt(force[moving] / acceleration[moving]) / rotor_inertia)
-    least, most = float(own.min()), float(own.max())
+    ratios = np.sqrt(np.sqrt(force[moving] / acceleration[moving]) / rotor_inertia)
+    least, most = float(ratios.min()), float(ratios.max())
     if not moving.all():  # where it only holds, more is better
         most *= HOLDING
     if most - least <= _SAME * most:
         return most
     # The greatest of convex functions of i^2.
-    found = scipy.optimize.minimize_scalar(
+    optimum = scipy.optimize.minimize_scalar(
         lambda log: float(mean_squares(sizing, leg, math.exp(log), rotor_inertia).max()),
         bounds=(math.log(least), math.log(most)),
         method="bounded",
         options={"xatol": _SAME},
     )
-    return math.exp(found.x)
+    return math.exp(optimum.x)
 
 
 def mean_squares(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> Array:

@@ -63,9 +63,11 @@ class DutyCycle:
     def thinned(self) -> DutyCycle:
         """Return it with as many samples as are looked at in each of several places."""
         motions = []
-        for one in self.motions:
-            time = np.linspace(one.time[0], one.time[-1], _SAMPLES)
-            motions.append(Motion(time, *one.at(time)) if len(one.time) > _SAMPLES else one)
+        for motion in self.motions:
+            time = np.linspace(motion.time[0], motion.time[-1], _SAMPLES)
+            motions.append(
+                Motion(time, *motion.at(time)) if len(motion.time) > _SAMPLES else motion
+            )
         return replace(self, motions=tuple(motions))
 
     def sized(self, places: Sequence[Place] = ()) -> Sizing:
@@ -85,7 +87,7 @@ class DutyCycle:
         """Return the loads over motions (T, m), or (T, W, m) of places."""
         clock, inertias = float(self.motions[0].time[0]), []
         blocks: list[tuple[Array, ...]] = []
-        for motion, curve, rest in zip(self.motions, curves, self.rests, strict=True):
+        for motion, curve, dwell in zip(self.motions, curves, self.rests, strict=True):
             middles = (motion.time[:-1] + motion.time[1:]) / 2.0
             # The samples by themselves, so that an error's index is that of the motion.
             samples = motion.time, *self._loads(*curve)
@@ -93,13 +95,13 @@ class DutyCycle:
             time, *loads = (_interleaved(*pair) for pair in zip(samples, between, strict=True))
             blocks.append((clock + time - time[0], *loads))
             clock += motion.duration
-            if rest:
-                pose, still = (
+            if dwell:
+                pose, zeros = (
                     np.repeat(curve[0][-1:], 3, axis=0),
                     np.zeros((3, *curve[0].shape[1:])),
                 )
-                blocks.append((clock + rest * _HALVES, *self._loads(pose, still, still)))
-                clock += float(rest)
+                blocks.append((clock + dwell * _HALVES, *self._loads(pose, zeros, zeros)))
+                clock += float(dwell)
             inertias.append(self._inertia(curve[0]))
         time, forces, speeds, accelerations = (
             _joined(parts) for parts in zip(*blocks, strict=True)
@@ -159,12 +161,12 @@ def _between(time: Array, curve: Curve, middles: Array) -> Curve:
 
 
 def _interleaved(samples: Array, middles: Array) -> Array:
-    found = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
-    found[::2], found[1::2] = samples, middles
-    return found
+    rows = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
+    rows[::2], rows[1::2] = samples, middles
+    return rows
 
 
 def _joined(parts: Sequence[Array]) -> Array:
     """Return parts one behind the other; between two, an interval of no length keeps the pairs."""
-    found = [row for part in parts for row in (part, part[-1:])]
-    return np.concatenate(found[:-1])
+    rows = [row for part in parts for row in (part, part[-1:])]
+    return np.concatenate(rows[:-1])

@@ -75,12 +75,12 @@ def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float
     At each sample |f / i + J i q''| <= T holds between the roots of two parabolas, an interval.
     """
     loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
-    own = rotor_inertia * accelerations
-    inside = peak_torque**2 - 4.0 * loads * own
+    rotor_torques = rotor_inertia * accelerations
+    inside = peak_torque**2 - 4.0 * loads * rotor_torques
     if (inside < 0.0).any():
         return NONE
     root = peak_torque + np.sqrt(inside)
     least = 2.0 * np.abs(loads) / root
-    moving = np.abs(own) > 0.0
-    greatest = root[moving] / (2.0 * np.abs(own[moving]))
+    moving = np.abs(rotor_torques) > 0.0
+    greatest = root[moving] / (2.0 * np.abs(rotor_torques[moving]))
     return Span(float(least.max()), float(greatest.min(initial=math.inf)))

@@ -64,8 +64,8 @@ class Motor:
         for key in _NUMBERS:
             value, least = getattr(self, key), key == "rotor_inertia"
             if not (math.isfinite(value) and (value > 0.0 or (least and value == 0.0))):
-                wanted = "0 or more" if least else "a number above 0"
-                faults.append(f"{key}: {value:g} given, {wanted} expected")
+                expected = "0 or more" if least else "a number above 0"
+                faults.append(f"{key}: {value:g} given, {expected} expected")
         if not faults and self.peak_torque < self.rated_torque:
             faults.append(
                 f"peak_torque: {self.peak_torque:g} N m given, at least rated_torque expected, "
@@ -79,18 +79,18 @@ class Motor:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings of unlikely numbers, most often in a wrong unit, one line each."""
-        found = []
+        texts = []
         if self.max_speed >= _FASTEST:
-            found.append(
+            texts.append(
                 f"motor {self.name}: max_speed of {self.max_speed:g} rad/s: is it in revolutions "
                 "per minute?"
             )
         if self.rated_torque < _SLUGGISH * self.rotor_inertia:
-            found.append(
+            texts.append(
                 f"motor {self.name}: rotor_inertia of {self.rotor_inertia:g} kg m^2 with a rated "
                 f"torque of {self.rated_torque:g} N m: is it in kg cm^2?"
             )
-        return tuple(found)
+        return tuple(texts)
 
 
 def read_motors(path: str | Path) -> tuple[Motor, ...]:
@@ -120,7 +120,7 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
         Of each of `Motor.warnings`.
     """
     rows = _from_toml(path) if Path(path).suffix.lower() == ".toml" else _from_table(path)
-    found, names = [], set()
+    motors, names = [], set()
     for place, row in rows:
         try:
             motor = Motor(**row)
@@ -131,10 +131,10 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
         for text in motor.warnings:
             warn_unlikely(text)
         names.add(motor.name)
-        found.append(motor)
-    if not found:
+        motors.append(motor)
+    if not motors:
         raise DataError(f"{path}: lists no motor")
-    return tuple(found)
+    return tuple(motors)
 
 
 _NAMED: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}

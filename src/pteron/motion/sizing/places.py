@@ -165,7 +165,7 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
     leaves out some of them, others are spread over all of the box.
     """
     turns = np.linspace(0.0, 2.0 * np.pi, TURNS, endpoint=False) if course.axis is not None else [0]
-    found = []
+    candidates = []
     for turn in map(float, turns):
         low, high = box - course.around(turn)
         if (low > high + _ROUNDING).any():
@@ -175,11 +175,11 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
         counts = np.where(varies, _COUNTS.get(int(varies.sum()), 2), 1)
         grid = [Place(pose, turn) for pose in product(*map(np.linspace, low, high, counts))]
         if turn and course.yaw.any() and not (varies & (course.yaw != 0.0)).any():
-            found += [with_platform(place, course.yaw, turn) for place in grid]
-        found += grid
-    kept = [place for place in found if stays(course, place, fits)]
-    others = _spread(course, box) if len(kept) < len(found) else ()
-    return (*kept, *(place for place in others if stays(course, place, fits)))
+            candidates += [with_platform(place, course.yaw, turn) for place in grid]
+        candidates += grid
+    possible = [place for place in candidates if stays(course, place, fits)]
+    others = _spread(course, box) if len(possible) < len(candidates) else ()
+    return (*possible, *(place for place in others if stays(course, place, fits)))
 
 
 def _spread(course: Course, box: Array) -> Iterator[Place]:
@@ -251,18 +251,18 @@ def _axis(robot: Manipulator) -> Array | None:
 
 def _yaw(robot: Manipulator, axis: Array | None) -> Array:
     """Return by how much a pose grows where the platform turns by 1 rad about an axis."""
-    platform, found = robot.platform, np.zeros(robot.freedom)
-    last = len(found) - 1
+    platform, growth = robot.platform, np.zeros(robot.freedom)
+    last = len(growth) - 1
     if (
         axis is None
         or not platform.angles
         or (platform.tilts and platform.coordinates[-1] != "yaw")
     ):
-        return found
+        return growth
     about = platform.frame[2] if platform.tilts else platform.axis
-    along = float(np.dot(about, axis))
-    found[last] = np.sign(along) if abs(along) > 1.0 - _ROUNDING else 0.0
-    return found
+    cosine = float(np.dot(about, axis))
+    growth[last] = np.sign(cosine) if abs(cosine) > 1.0 - _ROUNDING else 0.0
+    return growth
 
 
 def _inside(region: Region, poses: Array) -> NDArray[np.bool_]:

@@ -101,8 +101,8 @@ def size(
         raise DataError(
             f"dwell: {len(rests)} rests given, and {len(motions)} motions; give one for each motion"
         )
-    for one, rest in zip(motions, rests, strict=True):
-        _check(robot, one, float(rest))
+    for single, pause in zip(motions, rests, strict=True):
+        _check(robot, single, float(pause))
     expect(np.isfinite(friction) and friction >= 0.0, "friction", friction, "a share of 0 or more")
     load = None if wrench is None else np.asarray(wrench, dtype=float)
     if load is not None and load.shape != (robot.freedom,):
@@ -131,7 +131,7 @@ def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["wor
             f"places: the cycle fits nowhere in the region: it is {told_pose(sizes)} wide, and the "
             f"region {told_pose(np.ptp(box, axis=0))} ({' '.join(robot.coordinates)}, m and rad)"
         )
-    found = cycle.sized(tuple(known))
+    sizing = cycle.sized(tuple(known))
     worst: dict[tuple[str, int], tuple[float, Place]] = {}
     free = np.ptp(box, axis=0) > np.ptp(course.around(0.0), axis=0) + _ROUNDING
     steps, turn = (
@@ -142,11 +142,11 @@ def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["wor
     boxed = isinstance(places, Box)
     for nearer in _NEARER[boxed]:
         for quantity in _SOUGHT:
-            most = getattr(found, f"{quantity}s")
-            for leg, i in enumerate(found.worst(quantity)):
+            most = getattr(sizing, f"{quantity}s")
+            for leg, i in enumerate(sizing.worst(quantity)):
                 value = float(most[leg])
                 if (quantity, leg) not in worst or value > worst[quantity, leg][0]:
-                    worst[quantity, leg] = value, found.places[i]
+                    worst[quantity, leg] = value, sizing.places[i]
         around = (
             n
             for place in {p for _, p in worst.values()}
@@ -155,7 +155,7 @@ def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["wor
         new = [place for place in dict.fromkeys(around) if place not in known]
         new = [place for place in new if stays(course, place, fits)]
         if new:
-            found = cycle.sized(tuple(new))
+            sizing = cycle.sized(tuple(new))
             known.update(dict.fromkeys(new))
         steps, turn = nearer * steps, nearer * turn
     return cycle.sized(tuple(known))

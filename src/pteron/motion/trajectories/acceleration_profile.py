@@ -38,14 +38,14 @@ class Profile(NamedTuple):
 
         Its acceleration is continuous, and its jerk too but for steps.
         """
-        whole = self.duration + 2.0 * h
+        total = self.duration + 2.0 * h
 
         def progress(tau: Array) -> tuple[Array, Array, Array]:
-            t = np.clip(whole * tau - h, -h, self.duration + h)
+            t = np.clip(total * tau - h, -h, self.duration + h)
             s, rate = self._state(t)
-            after, before = self._moments(t, h), self._moments(t, -h)
-            gains, rates, parts = ((a + b) / h**2 for a, b in zip(after, before, strict=True))
-            return s + parts, (rate + rates) * whole, gains * whole**2
+            after, behind = self._moments(t, h), self._moments(t, -h)
+            gains, rates, parts = ((a + b) / h**2 for a, b in zip(after, behind, strict=True))
+            return s + parts, (rate + rates) * total, gains * total**2
 
         return progress
 

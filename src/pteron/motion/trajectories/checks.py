@@ -92,8 +92,8 @@ def check_motion(
         )
     even = np.linspace(float(motion.time[0]), float(motion.time[-1]), _SAMPLES)
     marks = np.unique(np.concatenate([motion.time, even]))
-    told = place or (lambda at: f"the motion, at {at:.4g} s")
-    check_curve(robot, lambda at: motion.at(at)[0], marks, told)
+    place_words = place or (lambda at: f"the motion, at {at:.4g} s")
+    check_curve(robot, lambda at: motion.at(at)[0], marks, place_words)
 
 
 def check_curve(
@@ -113,9 +113,9 @@ def check_curve(
     if len(marks) > 1:
         failures += [_failed_limit(curve, marks), _failed_passive(curve, marks)]
         failures.append(_failed_type_ii(curve, marks))
-    found = [failure for failure in failures if failure is not None]
-    if found:
-        raise min(found, key=lambda failure: failure.at).error
+    present = [failure for failure in failures if failure is not None]
+    if present:
+        raise min(present, key=lambda failure: failure.at).error
 
 
 class _Curve(NamedTuple):
@@ -145,10 +145,10 @@ def _failed_reach(curve: _Curve, marks: Array) -> _Failure | None:
     def squares(at: Array) -> Array:
         return np.nan_to_num(curve.value("squared_type_i", at), nan=-1.0)
 
-    found = first_below(squares, marks, TYPE_I**2)
-    if found is None:
+    crossing = first_below(squares, marks, TYPE_I**2)
+    if crossing is None:
         return None
-    at, i, square = found
+    at, i, square = crossing
     fine = np.linspace(marks[0], marks[-1], _SAMPLES)
     missed = -float(np.nanmin(curve.value("reach", fine)[:, i]))
     leg = curve.robot.legs[i]
@@ -181,43 +181,43 @@ def _failed_limit(curve: _Curve, marks: Array) -> _Failure | None:
     def margin(at: Array) -> Array:
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
-    found = first_below(margin, marks, -_ROUNDING)
-    if found is None:
+    crossing = first_below(margin, marks, -_ROUNDING)
+    if crossing is None:
         return None
-    at, i, _ = found
+    at, i, _ = crossing
     leg = curve.robot.legs[i]
     assert leg.limits is not None
     beyond = -float(least_along(margin, marks, -_ROUNDING)[1][i])
     unit, (low, high) = leg.joint.unit, leg.limits
-    told = (
+    words = (
         f"leg {i + 1}: its {leg.joint.noun} passes its limits, {low:g} to {high:g} {unit}, by up "
     )
-    return _beyond(curve, at, i + 1, f"{told}to {beyond:.3g} {unit}", beyond * leg.lever)
+    return _beyond(curve, at, i + 1, f"{words}to {beyond:.3g} {unit}", beyond * leg.lever)
 
 
 def _failed_passive(curve: _Curve, marks: Array) -> _Failure | None:
     def margin(at: Array) -> Array:
         return curve.value("passive_room", at, 1)
 
-    found = first_below(margin, marks, -_ROUNDING)
-    if found is None:
+    crossing = first_below(margin, marks, -_ROUNDING)
+    if crossing is None:
         return None
-    at, i, _ = found
+    at, i, _ = crossing
     places, least = least_along(margin, marks, -_ROUNDING)
     worst = curve.poses(places[i : i + 1])[0]
-    leg, told = i + 1, f"leg {i + 1} passes a passive joint's limits"
+    leg, words = i + 1, f"leg {i + 1} passes a passive joint's limits"
     for joint in limited_joints(curve.robot, worst):
-        own = not joint.actuated and joint.leg in (0, i + 1)
-        if own and not joint.least <= joint.value <= joint.most:
+        belongs = not joint.actuated and joint.leg in (0, i + 1)
+        if belongs and not joint.least <= joint.value <= joint.most:
             leg, whose = joint.leg, f"leg {i + 1}: its " if joint.leg else ""
-            told = f"{whose}{joint.noun} comes to {joint.value:.4g} {joint.unit}, its limits are "
-            told += joint.limits_text("{:g}".format)
+            words = f"{whose}{joint.noun} comes to {joint.value:.4g} {joint.unit}, its limits are "
+            words += joint.limits_text("{:g}".format)
             break
-    return _beyond(curve, at, leg, told, -float(least[i]))
+    return _beyond(curve, at, leg, words, -float(least[i]))
 
 
-def _beyond(curve: _Curve, at: float, leg: int, told: str, metres: float) -> _Failure:
-    text = f"{curve.told(at)}: {told}; take another path"
+def _beyond(curve: _Curve, at: float, leg: int, words: str, metres: float) -> _Failure:
+    text = f"{curve.told(at)}: {words}; take another path"
     return _Failure(at, UnreachablePose(text, leg=leg, shortfall=metres, index=()))
 
 
@@ -226,10 +226,10 @@ def _failed_type_ii(curve: _Curve, marks: Array) -> _Failure | None:
         return None
     # Its sign is that of the beginning, as far as the actuators hold the platform.
     side = 1.0 if float(curve.value("type_ii", marks[:1])[0]) > 0.0 else -1.0
-    found = first_below(lambda at: side * curve.value("type_ii", at)[:, None], marks, TYPE_II)
-    if found is None:
+    crossing = first_below(lambda at: side * curve.value("type_ii", at)[:, None], marks, TYPE_II)
+    if crossing is None:
         return None
-    at = found[0]
+    at = crossing[0]
     error = SingularPose(
         f"{curve.told(at)}: comes to a singularity (type II), where the actuators no longer hold "
         "the platform; take another path, or go round it",

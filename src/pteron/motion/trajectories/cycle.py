@@ -50,11 +50,11 @@ def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
     """
     span = end - begin
     t = np.clip((tau - begin) / span, 0.0, 1.0)
-    rest = 1.0 - t
+    remaining = 1.0 - t
     return (
         t**3 * (10.0 - 15.0 * t + 6.0 * t**2),
-        30.0 * t**2 * rest**2 / span,
-        60.0 * t * rest * (rest - t) / span**2,
+        30.0 * t**2 * remaining**2 / span,
+        60.0 * t * remaining * (remaining - t) / span**2,
     )
 
 
@@ -127,8 +127,8 @@ class Cycle:
         angle = self.around[angular] + turned
         if carries(self.platform):
             # The middle is given as a pose of P, the path as that of the tool.
-            still = np.zeros_like(self.around[angular])
-            place = place + arm_motion(self.platform, self.around[angular], still, still)[0]
+            zeros = np.zeros_like(self.around[angular])
+            place = place + arm_motion(self.platform, self.around[angular], zeros, zeros)[0]
         return pose_motion(
             self.platform,
             np.hstack([place, angle]),
@@ -169,10 +169,10 @@ def _shares(tau: Array) -> tuple[_Shares, _Shares]:
     """
     way = np.where(tau <= 0.5, 2.0 * tau, 2.0 - 2.0 * tau)
     rate = np.where(tau <= 0.5, 2.0, -2.0)
-    across = quintic(way, _ACROSS_BEGINS, 1.0 - _ACROSS_BEGINS)
+    transfer = quintic(way, _ACROSS_BEGINS, 1.0 - _ACROSS_BEGINS)
     rise, sink = quintic(way, 0.0, _LIFT_ENDS), quintic(way, 1.0 - _LIFT_ENDS, 1.0)
     lift = [up - down for up, down in zip(rise, sink, strict=True)]
-    centred = [(s - 0.5, rate * ds, 4.0 * dds) for s, ds, dds in (across, lift)]
+    centred = [(s - 0.5, rate * ds, 4.0 * dds) for s, ds, dds in (transfer, lift)]
     return centred[0], centred[1]
 
 
@@ -203,11 +203,11 @@ def moves(
         level = level - np.outer(upright, upright)
 
     if direction is not None:
-        given = as_array(direction, "direction", (3,))
-        first = level @ given
-        if not np.linalg.norm(first) > _NONE * np.linalg.norm(given):
+        vector = as_array(direction, "direction", (3,))
+        first = level @ vector
+        if not np.linalg.norm(first) > _NONE * np.linalg.norm(vector):
             place = " in the machine's plane" if platform.planar else ""
-            raise DataError(f"direction: {given.tolist()} has no horizontal part{place}")
+            raise DataError(f"direction: {vector.tolist()} has no horizontal part{place}")
         count = 1
     else:
         x, y, _ = (level @ axis for axis in platform.frame)

@@ -56,8 +56,8 @@ class CyclePath:
         place, rate, bend = self._curve(tau)
         speed = np.linalg.norm(rate * self._weights, axis=-1)[:, None]
         first = rate / speed
-        along = np.sum(bend * first * self._weights**2, axis=-1)[:, None]
-        second = (bend - along * first) / speed**2
+        tangential = np.sum(bend * first * self._weights**2, axis=-1)[:, None]
+        second = (bend - tangential * first) / speed**2
         beyond = (s - within)[:, None]
         second = np.where(beyond == 0.0, second, 0.0)
         return pose_motion(self._cycle.platform, place + beyond * first, first, second)

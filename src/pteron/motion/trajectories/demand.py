@@ -78,12 +78,12 @@ class Demand(NamedTuple):
 
 def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Demand:
     """Return the demand of poses (K, m) on a curve with these derivatives by p."""
-    rest = np.zeros_like(pose)
-    weight = unchecked(robot, "inverse_dynamics", pose, rest, rest)
+    zeros = np.zeros_like(pose)
+    weight = unchecked(robot, "inverse_dynamics", pose, zeros, zeros)
     rates = unchecked(robot, "joint_rates", pose, first)[0]
     bends = unchecked(robot, "joint_accelerations", pose, first, second)[0]
     drives = drives_of(robot)
-    pushed = unchecked(robot, "inverse_dynamics", pose, rest, first)
+    pushed = unchecked(robot, "inverse_dynamics", pose, zeros, first)
     swept = unchecked(robot, "inverse_dynamics", pose, first, second)
     _, speed, bend = tool_path(robot.platform, pose, first, second)
     return Demand(
@@ -110,11 +110,11 @@ def demand_between(
     every = np.concatenate([at, turns, turns])
     order = np.argsort(every, kind="stable")
     pose, first, second = states(every[order])
-    asked = demand(robot, pose, first, second)
-    rates = asked.first.copy()
+    path_demand = demand(robot, pose, first, second)
+    rates = path_demand.first.copy()
     rows = np.argsort(order)[len(at) :]
     rates[rows, np.tile(joints, 2)] = np.repeat([_CREEP, -_CREEP], len(turns))
-    return every[order], asked._replace(first=rates), pose
+    return every[order], path_demand._replace(first=rates), pose
 
 
 def _reversals(
@@ -133,8 +133,8 @@ def _reversals(
         low, _ = bisected(
             lambda places: (rates(places)[each, joints] > 0.0) == ahead, low, high, _HALVINGS
         )
-    rest, still = np.nonzero((known[1:-1] == 0.0) & (known[2:] * known[:-2] < 0.0))
-    return np.concatenate([low, at[rest + 1]]), np.concatenate([joints, still])
+    touching, touching_joints = np.nonzero((known[1:-1] == 0.0) & (known[2:] * known[:-2] < 0.0))
+    return np.concatenate([low, at[touching + 1]]), np.concatenate([joints, touching_joints])
 
 
 def curve_rate(
@@ -145,7 +145,11 @@ def curve_rate(
 
 
 def most_rate(
-    robot: Manipulator, asked: Demand, limits: MotionLimits, poses: Array, most: float = np.inf
+    robot: Manipulator,
+    path_demand: Demand,
+    limits: MotionLimits,
+    poses: Array,
+    most: float = np.inf,
 ) -> float:
     """Return the largest constant p', `most` at most, at which a curve keeps the limits.
 
@@ -153,23 +157,23 @@ def most_rate(
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = [
-            limits.speed / np.abs(asked.first),
-            np.sqrt(limits.acceleration / np.abs(asked.second)),
-            limits.tool_speed / np.linalg.norm(asked.tool[0], axis=-1),
-            np.sqrt(limits.tool_acceleration / np.linalg.norm(asked.tool[1], axis=-1)),
+            limits.speed / np.abs(path_demand.first),
+            np.sqrt(limits.acceleration / np.abs(path_demand.second)),
+            limits.tool_speed / np.linalg.norm(path_demand.tool[0], axis=-1),
+            np.sqrt(limits.tool_acceleration / np.linalg.norm(path_demand.tool[1], axis=-1)),
         ]
         least = min(float(np.nanmin(rate, initial=most)) for rate in rates)
     joints, force, fall, back = limits.force_lines
     if not len(joints):
         return least
     # The margin on each side of a drive's force: square p'^2 + root p' <= margin.
-    rows, first = [], asked.first[:, joints]
-    for dry in asked.dry:
-        still = asked.still + dry * np.sign(asked.first)
-        _expect_strength(robot, still, limits, poses)
+    rows, first = [], path_demand.first[:, joints]
+    for dry in path_demand.dry:
+        static = path_demand.still + dry * np.sign(path_demand.first)
+        _expect_strength(robot, static, limits, poses)
         for side in (1.0, -1.0):
-            parts = force - side * still[:, joints], side * asked.square[:, joints]
-            root = side * (asked.viscous[joints] + back) * first + fall * np.abs(first)
+            parts = force - side * static[:, joints], side * path_demand.square[:, joints]
+            root = side * (path_demand.viscous[joints] + back) * first + fall * np.abs(first)
             rows.append([*parts, root])
     margin, square, root = (np.concatenate([row[k].ravel() for row in rows]) for k in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -189,19 +193,19 @@ def most_rate(
     return least
 
 
-def _expect_strength(robot: Manipulator, still: Array, limits: MotionLimits, poses: Array) -> None:
+def _expect_strength(robot: Manipulator, static: Array, limits: MotionLimits, poses: Array) -> None:
     """Refuse a curve on which a drive cannot even creep."""
     joints, force, _, _ = limits.force_lines
-    strength = np.full(still.shape[-1], np.inf)
+    strength = np.full(static.shape[-1], np.inf)
     np.minimum.at(strength, joints, force)
-    over = np.abs(still) - strength
+    over = np.abs(static) - strength
     if not (over >= 0.0).any():
         return
     k, i = np.unravel_index(int(np.nanargmax(over)), over.shape)
     joint = robot.legs[i].joint
     raise ModelError(
         f"leg {i + 1}: its drive gives {strength[i]:.4g} {joint.force_unit}, but the machine's "
-        f"weight and dry friction alone take {abs(still[k, i]):.4g} {joint.force_unit} at pose "
+        f"weight and dry friction alone take {abs(static[k, i]):.4g} {joint.force_unit} at pose "
         f"{told_pose(poses[k])}: no motion is slow enough; take another path, a lighter load or a "
         "stronger drive",
         subject=robot.name,
@@ -259,30 +263,32 @@ def peaks(
     tuple of Peak
     """
     robot = as_manipulator(robot)
-    asked = demand(robot, pose, velocity, acceleration)
+    path_demand = demand(robot, pose, velocity, acceleration)
     ones = np.ones(len(pose))
-    given = asked.drive_forces(ones, 0.0 * ones)
-    force = np.abs(given).max(axis=0)
-    found = []
+    drive_forces = path_demand.drive_forces(ones, 0.0 * ones)
+    force = np.abs(drive_forces).max(axis=0)
+    largest = []
     for name, sizes in (
-        ("speed", np.abs(asked.first)),
-        ("acceleration", np.abs(asked.second)),
+        ("speed", np.abs(path_demand.first)),
+        ("acceleration", np.abs(path_demand.second)),
         ("force", force),
     ):
         for i, leg in enumerate(robot.legs):
             unit = _WORDS[name][1].format(unit=leg.joint.unit, force_unit=leg.joint.force_unit)
             at = int(np.argmax(sizes[:, i]))
             size = float(sizes[at, i])
-            found.append(Peak(name, i + 1, size, unit, float(getattr(limits, name)[i]), at))
+            largest.append(Peak(name, i + 1, size, unit, float(getattr(limits, name)[i]), at))
     for i, leg in enumerate(robot.legs):
         if not any(limits.lines[i : i + 1]):
             continue
-        size, most, at = motor_peak(leg.drive or Drive(), given[..., i], asked.first[:, i])
-        told = leg.joint.force_unit, most, at % len(pose)
-        found.append(Peak("force_at_speed", i + 1, size, *told))
-    for name, part in zip(("tool_speed", "tool_acceleration"), asked.tool, strict=True):
+        size, most, at = motor_peak(
+            leg.drive or Drive(), drive_forces[..., i], path_demand.first[:, i]
+        )
+        limit_of_drive = leg.joint.force_unit, most, at % len(pose)
+        largest.append(Peak("force_at_speed", i + 1, size, *limit_of_drive))
+    for name, part in zip(("tool_speed", "tool_acceleration"), path_demand.tool, strict=True):
         sizes = np.linalg.norm(part, axis=-1)
         at = int(np.argmax(sizes))
         limit = float(getattr(limits, name))
-        found.append(Peak(name, 0, float(sizes[at]), _WORDS[name][1], limit, at))
-    return tuple(found)
+        largest.append(Peak(name, 0, float(sizes[at]), _WORDS[name][1], limit, at))
+    return tuple(largest)

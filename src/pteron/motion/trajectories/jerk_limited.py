@@ -90,9 +90,9 @@ def jerk_limited(
     """
     robot = as_manipulator(robot)
     ends = [checked_one(robot, start, "start"), checked_one(robot, end, "end")]
-    kept = limits_of(robot) if limits is None else limits
+    bounds = limits_of(robot) if limits is None else limits
     jerks = per_joint(robot, "jerk", jerk, [None] * robot.joint_count)
-    if not np.isfinite([*kept.acceleration, *jerks]).all():
+    if not np.isfinite([*bounds.acceleration, *jerks]).all():
         raise DataError(
             "a motion with limited jerk needs jerk and acceleration of every joint; give both"
         )
@@ -104,7 +104,7 @@ def jerk_limited(
     last = np.where(free, first + _within_half_a_turn(last - first), last)
     if np.abs(last - first).max() <= _NEAR:
         raise DataError("end: the joints are at start's already; give another pose")
-    planned = _planned(first, last, kept, jerks)
+    planned = _planned(first, last, bounds, jerks)
 
     def curve(tau: Array) -> Curve:
         joints, rates, gains = (
@@ -127,7 +127,7 @@ def jerk_limited(
     rough = sampled(course.at, course.duration, min(step, course.duration / 100.0))
     check_motion(robot, rough)
     _expect_modes(robot, rough, planned, ends[1])
-    return kept_motion(robot, course, kept, step)
+    return kept_motion(robot, course, bounds, step)
 
 
 def _within_half_a_turn(angles: Array) -> Array:
@@ -139,9 +139,13 @@ def _joints(robot: Manipulator, name: str, pose: Array) -> Array:
     try:
         return inverse_kinematics(robot, pose)
     except UnreachablePose as error:
-        told = f"{name} {error}"
+        reason = f"{name} {error}"
         raise UnreachablePose(
-            told, leg=error.leg, shortfall=error.shortfall, index=(), millimetres=error.millimetres
+            reason,
+            leg=error.leg,
+            shortfall=error.shortfall,
+            index=(),
+            millimetres=error.millimetres,
         ) from None
 
 
@@ -169,12 +173,12 @@ def _planned(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> A
     """Return Ruckig's trajectory between joint coordinates (n,)."""
     ruckig = of_extra("motion", "ruckig", "motion with limited jerk needs ruckig", PteronError)
     count = len(first)
-    asked = ruckig.InputParameter(count)
-    asked.current_position, asked.target_position = first.tolist(), last.tolist()
-    asked.max_velocity = np.minimum(limits.speed, _FAST).tolist()
-    asked.max_acceleration, asked.max_jerk = limits.acceleration.tolist(), jerks.tolist()
+    parameters = ruckig.InputParameter(count)
+    parameters.current_position, parameters.target_position = first.tolist(), last.tolist()
+    parameters.max_velocity = np.minimum(limits.speed, _FAST).tolist()
+    parameters.max_acceleration, parameters.max_jerk = limits.acceleration.tolist(), jerks.tolist()
     planned = ruckig.Trajectory(count)
-    result = ruckig.Ruckig(count).calculate(asked, planned)
+    result = ruckig.Ruckig(count).calculate(parameters, planned)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise DataError(f"limits: Ruckig finds no motion within them ({result}); give others")
     return planned

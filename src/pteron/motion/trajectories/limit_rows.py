@@ -33,12 +33,12 @@ class LimitRows(NamedTuple):
         return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
 
 
-def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
+def limit_rows(path_demand: Demand, limits: MotionLimits, unit: float) -> LimitRows:
     """Return the limits as rows for the demand at K points of a path.
 
     Times are in units of `unit`, s.
     """
-    count = len(asked.first)
+    count = len(path_demand.first)
     none = np.zeros((count, 0))
     a, b, c, v = [none], [none], [none], [none]
 
@@ -49,19 +49,21 @@ def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
         ):
             part.append((np.broadcast_to(values, linear.shape) / limit)[:, has])
 
-    zero = np.zeros_like(asked.first)
+    zero = np.zeros_like(path_demand.first)
     joints, force, fall, back = limits.force_lines
-    moving = np.sign(asked.first)
+    moving = np.sign(path_demand.first)
     for side in (1.0, -1.0):
         against = side * moving > 0.0
-        dry = np.where(against, asked.dry[1], asked.dry[0]) * side * moving
-        add(side * asked.first, side * asked.second, zero, zero, limits.acceleration)
-        still = side * asked.still + dry
-        root = side * (asked.viscous[joints] + back) * asked.first[:, joints]
-        root += fall * np.abs(asked.first[:, joints])
-        linear, square = (side * part[:, joints] for part in (asked.growth, asked.square))
-        add(linear, square, still[:, joints], root, force)
-    speed, bend = asked.tool
+        dry = np.where(against, path_demand.dry[1], path_demand.dry[0]) * side * moving
+        add(side * path_demand.first, side * path_demand.second, zero, zero, limits.acceleration)
+        static = side * path_demand.still + dry
+        root = side * (path_demand.viscous[joints] + back) * path_demand.first[:, joints]
+        root += fall * np.abs(path_demand.first[:, joints])
+        linear, square = (
+            side * part[:, joints] for part in (path_demand.growth, path_demand.square)
+        )
+        add(linear, square, static[:, joints], root, force)
+    speed, bend = path_demand.tool
     if math.isfinite(limits.tool_acceleration):
         # Speed and bend span a plane: x along the speed, y along the rest of the bend.
         size = np.linalg.norm(speed, axis=-1)
@@ -78,8 +80,8 @@ def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
         add(linear, square, np.zeros_like(linear), np.zeros_like(linear), most)
     with np.errstate(divide="ignore"):
         rates = np.minimum(
-            (limits.speed / np.abs(asked.first)).min(axis=-1),
+            (limits.speed / np.abs(path_demand.first)).min(axis=-1),
             limits.tool_speed / np.linalg.norm(speed, axis=-1),
         )
-    found = [np.hstack(part) for part in (a, b, c, v)]
-    return LimitRows(found[0], found[1], found[2], found[3], (rates * unit) ** 2)
+    stacked = [np.hstack(part) for part in (a, b, c, v)]
+    return LimitRows(stacked[0], stacked[1], stacked[2], stacked[3], (rates * unit) ** 2)

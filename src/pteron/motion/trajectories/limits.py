@@ -56,7 +56,7 @@ class MotionLimits:
     def force_lines(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """All limits of forces, as lines: joint, force, fall and back, (R,) each."""
         flat = [(i, (force, 0.0, 0.0)) for i, force in enumerate(self.force) if force < math.inf]
-        every = [*flat, *((i, one) for i, lines in enumerate(self.lines) for one in lines)]
+        every = [*flat, *((i, numbers) for i, lines in enumerate(self.lines) for numbers in lines)]
         joints = np.array([i for i, _ in every], dtype=np.int64)
         force, fall, back = np.array([line for _, line in every]).reshape(-1, 3).T
         return joints, force, fall, back
@@ -119,12 +119,12 @@ def limits_of(
 
 
 def per_joint(
-    robot: Manipulator, name: str, given: PerJointLimit, own: Sequence[float | None]
+    robot: Manipulator, name: str, limit: PerJointLimit, defaults: Sequence[float | None]
 ) -> Array:
     """Return a limit of each joint (n,), by default its own, infinite where it has none."""
-    if given is None:
-        return np.array([math.inf if value is None else value for value in own])
-    several = list(given) if isinstance(given, Sequence | np.ndarray) else [given]
+    if limit is None:
+        return np.array([math.inf if value is None else value for value in defaults])
+    several = list(limit) if isinstance(limit, Sequence | np.ndarray) else [limit]
     values = [_positive(name, value) for value in several]
     if len(values) not in (1, robot.joint_count):
         raise DataError(
@@ -137,6 +137,6 @@ def per_joint(
 def _positive(name: str, value: object) -> float:
     number = number_or_nan(value)
     if not number > 0.0:
-        given = value if isinstance(value, float) else shown(value)
-        raise DataError(f"{name}: {given} given, a number above 0 expected")
+        text = value if isinstance(value, float) else shown(value)
+        raise DataError(f"{name}: {text} given, a number above 0 expected")
     return number

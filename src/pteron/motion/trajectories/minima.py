@@ -42,11 +42,11 @@ def least_along(
             low, high = marks[max(k - 1, 0)], marks[min(k + 1, len(marks) - 1)]
             for _ in range(_ZOOMS):
                 fine = np.linspace(low, high, _FINER)
-                found = measure(fine)[:, j]
-                best = int(found.argmin())
+                fine_values = measure(fine)[:, j]
+                best = int(fine_values.argmin())
                 low, high = fine[max(best - 1, 0)], fine[min(best + 1, _FINER - 1)]
-            if found[best] < least[j]:
-                places[j], least[j] = fine[best], found[best]
+            if fine_values[best] < least[j]:
+                places[j], least[j] = fine[best], fine_values[best]
     return places, least
 
 

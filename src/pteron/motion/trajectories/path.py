@@ -148,13 +148,15 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
     (0.0, 0.2)
     """
     robot = as_manipulator(robot)
-    given = checked(robot, poses, "poses")
-    if given.ndim != 2 or len(given) < 2:
+    corners = checked(robot, poses, "poses")
+    if corners.ndim != 2 or len(corners) < 2:
         raise DataError(
-            f"poses: shape {given.shape} given, (K, {robot.freedom}) expected, K at least 2"
+            f"poses: shape {corners.shape} given, (K, {robot.freedom}) expected, K at least 2"
         )
     expect(np.isfinite(corner) and corner >= 0.0, "corner", corner, "0 m or more")
-    places, _, _ = tool_motion(robot.platform, given, np.zeros_like(given), np.zeros_like(given))
+    places, _, _ = tool_motion(
+        robot.platform, corners, np.zeros_like(corners), np.zeros_like(corners)
+    )
     directions = np.diff(places, axis=0)
     sizes = np.linalg.norm(directions * path_weights(robot.platform), axis=-1)
     if (sizes <= _SAME).any():

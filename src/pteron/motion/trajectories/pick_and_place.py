@@ -147,7 +147,7 @@ def pick_and_place(
     )
 
 
-def cycle_path(found: PickAndPlace) -> BackPath:
+def cycle_path(motion: PickAndPlace) -> BackPath:
     """Return the path of a pick-and-place cycle, out and back, without its time.
 
     Parameters
@@ -168,7 +168,7 @@ def cycle_path(found: PickAndPlace) -> BackPath:
     >>> len(path.rests)
     3
     """
-    return BackPath(CyclePath(found.cycle))
+    return BackPath(CyclePath(motion.cycle))
 
 
 def farthest_point(robot: Manipulator) -> float:

@@ -71,13 +71,13 @@ def replay(
     robot = as_manipulator(robot)
     names = robot.column_names
     poses, joints = names["pose"], names["joints"]
-    whole = [*poses, *names["velocity"], *names["acceleration"]]
-    rows = rows_of(table, [TIME, *whole, *joints])
+    motion_columns = [*poses, *names["velocity"], *names["acceleration"]]
+    rows = rows_of(table, [TIME, *motion_columns, *joints])
     rows = in_si(rows, {**robot.column_units, TIME: "s"})
     has = set(rows.columns)
     m = robot.freedom
-    if has.issuperset(whole):
-        time, values = _read(rows, whole)
+    if has.issuperset(motion_columns):
+        time, values = _read(rows, motion_columns)
         values[:, :m] = _turned_on(robot, values[:, :m])
         motion = Motion(time, values[:, :m], values[:, m : 2 * m], values[:, 2 * m :])
     elif has.issuperset(joints) and not has.issuperset(poses):
@@ -97,16 +97,16 @@ def _place(rows: Table, motion: Motion, at: float) -> str:
     return f"{rows.place(max(k, 0))}, at {at:.4g} s"
 
 
-def rows_of(given: str | File | Table | Columns, useful: Sequence[str]) -> Table:
+def rows_of(source: str | File | Table | Columns, useful: Sequence[str]) -> Table:
     """Return a table with its useful columns, or the file's of that name."""
-    if isinstance(given, Table):
-        return given
-    if isinstance(given, str | File):
-        return read_table(given)
-    held: Any = given
-    names = list(held if isinstance(held, Mapping) else getattr(held, "columns", ()))
+    if isinstance(source, Table):
+        return source
+    if isinstance(source, str | File):
+        return read_table(source)
+    columns: Any = source
+    names = list(columns if isinstance(columns, Mapping) else getattr(columns, "columns", ()))
     try:
-        frame = pl.DataFrame({name: np.asarray(held[name]) for name in useful if name in names})
+        frame = pl.DataFrame({name: np.asarray(columns[name]) for name in useful if name in names})
     except (TypeError, ValueError, pl.exceptions.PolarsError):
         raise DataError("table: columns of numbers expected, as long as each other") from None
     if TIME not in names or not frame.height:

@@ -138,18 +138,18 @@ def scaled_to_reach(
     return scale / _STEPS, best
 
 
-def _largest(robot: Manipulator, cycle: Cycle, least: float, wanted: int) -> int:
+def _largest(robot: Manipulator, cycle: Cycle, least: float, least_scale: int) -> int:
     """Return the largest scale that fits, in thousandths; 0 if it is less than is wanted."""
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
         return keeps_margin(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
 
-    if wanted > _STEPS or not fits(wanted):
+    if least_scale > _STEPS or not fits(least_scale):
         return 0
     if fits(_STEPS):
         return _STEPS
-    most = range(_STEPS - wanted)
+    most = range(_STEPS - least_scale)
     return _STEPS - bisect_left(most, True, lo=1, key=lambda less: fits(_STEPS - less))
 
 

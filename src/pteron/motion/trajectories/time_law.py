@@ -148,30 +148,30 @@ def along(
     """
     robot = as_manipulator(robot)
     check_path(robot, path)
-    kept = limits_of(robot) if limits is None else limits
+    bounds = limits_of(robot) if limits is None else limits
     laws = (polynomial(law),) * (len(path.rests) - 1)
     sizes = np.diff(path.rests)
     # Where nothing limits a motion the stretches have the same peak acceleration.
     shares: Sequence[float] = [float(np.sqrt(size)) for size in sizes]
-    if kept.any:
-        shares = stretch_times(robot, path, laws[0], kept)
+    if bounds.any:
+        shares = stretch_times(robot, path, laws[0], bounds)
     elif duration is None:
         raise _unlimited()
     course = timed_path(path, shares, laws)
     if duration is None:
-        return kept_motion(robot, course, kept, step)
+        return kept_motion(robot, course, bounds, step)
     _expect_time("duration", duration)
-    given = course.slowed(duration / course.duration)
-    if kept.any:
-        _expect_kept(robot, given, kept, course.duration)
-    return sampled(given.at, duration, step)
+    slowed = course.slowed(duration / course.duration)
+    if bounds.any:
+        _expect_kept(robot, slowed, bounds, course.duration)
+    return sampled(slowed.at, duration, step)
 
 
 def stretch_times(
     robot: Manipulator, path: Path, law: Progress, limits: MotionLimits
 ) -> list[float]:
     """Return the shortest durations, s, of the stretches between rests that keep the limits."""
-    found = []
+    durations = []
     tau = np.linspace(0.0, 1.0, _LOOK)
     share, rate, gain = law(tau)
     for begin, end in zip(path.rests[:-1], path.rests[1:], strict=True):
@@ -182,8 +182,8 @@ def stretch_times(
         most = curve_rate(robot, (pose, first, second), limits)
         if not np.isfinite(most):
             raise _unlimited()
-        found.append(1.0 / most)
-    return found
+        durations.append(1.0 / most)
+    return durations
 
 
 def _expect_kept(
@@ -215,8 +215,8 @@ def kept_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: f
         course = course.slowed(count * step / course.duration)
         motion = sampled(course.at, count * step, step)
         fine = np.linspace(0.0, motion.duration, _FINER * count + 1)
-        _, asked, poses = demand_between(robot, motion.at, fine)
-        rate = most_rate(robot, asked, limits, poses, 1.0)
+        _, path_demand, poses = demand_between(robot, motion.at, fine)
+        rate = most_rate(robot, path_demand, limits, poses, 1.0)
         if rate * KEPT >= 1.0:
             return motion
         course = course.slowed(1.0 / rate)

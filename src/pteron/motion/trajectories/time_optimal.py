@@ -136,20 +136,22 @@ def time_optimal(
     True
     """
     robot = as_manipulator(robot)
-    kept = limits_of(robot) if limits is None else limits
-    if not kept.bounds_acceleration:
+    bounds = limits_of(robot) if limits is None else limits
+    if not bounds.bounds_acceleration:
         raise DataError(
             "nothing limits the acceleration: neither a limit given nor the drives' max_force; "
             "give a limit of force or of acceleration"
         )
     toppra = of_extra("motion", "toppra", "time-optimal motion needs toppra", PteronError)
     check_path(robot, path)
-    slow = stretch_times(robot, path, polynomial("quintic"), kept)
-    found = [_fastest(robot, path, j, kept, slow[j], step, toppra) for j in range(len(slow))]
-    course = timed_path(path, [one.duration for one in found], [one.progress for one in found])
-    motion = kept_motion(robot, course, kept, step)
+    slow = stretch_times(robot, path, polynomial("quintic"), bounds)
+    stretches = [_fastest(robot, path, j, bounds, slow[j], step, toppra) for j in range(len(slow))]
+    course = timed_path(
+        path, [law.duration for law in stretches], [law.progress for law in stretches]
+    )
+    motion = kept_motion(robot, course, bounds, step)
     parts = motion.time, motion.pose, motion.velocity, motion.acceleration
-    return TimeOptimal(*parts, sum(stretch.bound for stretch in found), sum(slow))
+    return TimeOptimal(*parts, sum(stretch.bound for stretch in stretches), sum(slow))
 
 
 class _Stretch(NamedTuple):
@@ -184,7 +186,7 @@ def _fastest(
     rows = limit_rows(demand(robot, *states(grid)), limits, unit)
     squares = _first(toppra, rows, grid)
     bound = Profile.of(grid, squares).duration
-    found: list[_Stretch] = []
+    laws: list[_Stretch] = []
     margin, most = np.full_like(rows.c, 1.0 - _SPARE), rows.most
     for _ in range(_PASSES):
         tighter = rows._replace(c=rows.c + 1.0 - margin, most=most)
@@ -197,21 +199,21 @@ def _fastest(
         def at_times(tau: Array, progress: Progress = progress) -> Curve:
             return states(progress(tau)[0])
 
-        tau, asked, _ = demand_between(robot, at_times, np.linspace(0.0, 1.0, _LOOK))
+        tau, path_demand, _ = demand_between(robot, at_times, np.linspace(0.0, 1.0, _LOOK))
         _, rate, gain = progress(tau)
-        whole = profile.duration + 2.0 * spread
-        x, u = (rate / whole) ** 2, gain / whole**2
-        there = limit_rows(asked, limits, unit)
+        total = profile.duration + 2.0 * spread
+        x, u = (rate / total) ** 2, gain / total**2
+        there = limit_rows(path_demand, limits, unit)
         used = there.used(u, x)
         fast = x / there.most
         slower = max(1.0, float(used.max(initial=0.0)) ** 0.5, float(fast.max()) ** 0.5)
-        found.append(_Stretch(progress, whole * unit, bound * unit, slower))
+        laws.append(_Stretch(progress, total * unit, bound * unit, slower))
         if slower <= 1.0:
             break
-        near = _near(tau * whole - spread, profile.time, 2.0 * spread)
+        near = _near(tau * total - spread, profile.time, 2.0 * spread)
         margin = np.minimum(margin, margin - 1.05 * np.maximum(_most_of(near, used - 1.0), 0.0))
         most = most / np.maximum(_most_of(near, fast[:, None])[:, 0], 1.0)
-    return min(found, key=lambda one: one.duration * one.slower)
+    return min(laws, key=lambda law: law.duration * law.slower)
 
 
 def _first(toppra: Any, rows: LimitRows, grid: Array) -> Array:
@@ -248,7 +250,7 @@ def _most_of(near: Array, values: Array) -> Array:
     return np.array([values[a:b].max(axis=0) for a, b in near.T])
 
 
-def _solved(toppra: Any, rows: LimitRows, grid: Array, before: Array, ahead: float) -> Array:
+def _solved(toppra: Any, rows: LimitRows, grid: Array, last_squares: Array, ahead: float) -> Array:
     """Return x = s'^2 on the grid, by TOPP-RA, from that of the pass before.
 
     With viscous friction it is at most `ahead` times as large: there the chord ends.
@@ -256,7 +258,7 @@ def _solved(toppra: Any, rows: LimitRows, grid: Array, before: Array, ahead: flo
     most = np.minimum(rows.most, _FASTEST)
     a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()
     if rows.v.any():
-        at = np.maximum(before, _SLOWEST * before.max())[:, None]
+        at = np.maximum(last_squares, _SLOWEST * last_squares.max())[:, None]
         most = np.minimum(most, ahead * at[:, 0])
         # sqrt(x) <= sqrt(at) / 2 + x / (2 sqrt(at)), and for x <= top: sqrt(x) >= x / sqrt(top).
         against = rows.v > 0.0

@@ -40,21 +40,21 @@ class Timed:
 
 def timed_path(path: Path, durations: Sequence[float], laws: Sequence[Progress]) -> Timed:
     """Return a path traversed from rest to rest, a duration (s) and a time law for each stretch."""
-    whole = float(sum(durations))
-    starts = np.concatenate([[0.0], np.cumsum(durations)]) / whole
+    total = float(sum(durations))
+    starts = np.concatenate([[0.0], np.cumsum(durations)]) / total
 
     def curve(tau: Array) -> Curve:
         k = np.clip(np.searchsorted(starts, tau, side="right") - 1, 0, len(laws) - 1)
         s, rate, gain = np.zeros((3, len(tau)))
         for j, law in enumerate(laws):
-            own, span = k == j, starts[j + 1] - starts[j]
+            is_within, span = k == j, starts[j + 1] - starts[j]
             begin, end = path.rests[j : j + 2]
-            share, first, second = law((tau[own] - starts[j]) / span)
-            s[own] = begin + (end - begin) * share
-            rate[own] = (end - begin) * first / span
-            gain[own] = (end - begin) * second / span**2
+            share, first, second = law((tau[is_within] - starts[j]) / span)
+            s[is_within] = begin + (end - begin) * share
+            rate[is_within] = (end - begin) * first / span
+            gain[is_within] = (end - begin) * second / span**2
         pose, by_s, bend = path.at(s)
         rate, gain = rate[:, None], gain[:, None]
         return pose, by_s * rate, bend * rate**2 + by_s * gain
 
-    return Timed(curve, whole)
+    return Timed(curve, total)

@@ -74,6 +74,6 @@ def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) 
 
 
 def _without_lengths(platform: Platform, angles: Array) -> Array:
-    found = np.zeros((*angles.shape[:-1], len(platform.coordinates)))
-    found[..., platform.angular] = angles
-    return found
+    poses = np.zeros((*angles.shape[:-1], len(platform.coordinates)))
+    poses[..., platform.angular] = angles
+    return poses

@@ -63,8 +63,8 @@ class LinearPlant:
         size, count = self.inputs.shape
         both = np.zeros((size + count, size + count))
         both[:size] = np.hstack([self.matrix, self.inputs]) * span
-        found = scipy.linalg.expm(both)[:size]
-        return found[:, :size], found[:, size:]
+        exponential = scipy.linalg.expm(both)[:size]
+        return exponential[:, :size], exponential[:, size:]
 
 
 def linearised(
@@ -109,12 +109,12 @@ def linearised(
     ((6, 6), (6, 3))
     """
     robot = as_manipulator(robot)
-    rest = np.zeros(robot.freedom)
-    given = (pose, velocity, acceleration)
+    zeros = np.zeros(robot.freedom)
+    motion = (pose, velocity, acceleration)
     names = ("pose", "velocity", "acceleration")
     state = [
-        checked_one(robot, rest if value is None else value, name)
-        for value, name in zip(given, names, strict=True)
+        checked_one(robot, zeros if value is None else value, name)
+        for value, name in zip(motion, names, strict=True)
     ]
     smooth = with_linear_drives(robot)
     kind, n = DriveKind.of(smooth), robot.joint_count
@@ -129,15 +129,15 @@ def linearised(
         "actuators": actuator_numbers(smooth),
     }
     function = _derivatives(bare(robot), kind)
-    found = function(*(values[name] for name in function.name_in()))
-    system, driven, turned = (np.asarray(part, dtype=float) for part in found)
+    derivatives = function(*(values[name] for name in function.name_in()))
+    system, driven, turned = (np.asarray(part, dtype=float) for part in derivatives)
     rows, m = jacobian(robot, state[0]), robot.freedom
     # A motor that moves with its joint, and a current that does not lag, are no states.
-    own = [kind.lag if name == "current" else kind.elastic for name, _ in kind.more]
-    kept = np.flatnonzero([*[True] * (2 * m), *np.ravel(own)])
-    system, driven = system[np.ix_(kept, kept)], driven[kept]
+    is_state = [kind.lag if name == "current" else kind.elastic for name, _ in kind.more]
+    states = np.flatnonzero([*[True] * (2 * m), *np.ravel(is_state)])
+    system, driven = system[np.ix_(states, states)], driven[states]
     # From the platform's (x, x') to the joints' (q, q'): q' = J x' changes with x too.
-    change = np.eye(len(kept) + 2 * (n - m), len(kept), 2 * (m - n))
+    change = np.eye(len(states) + 2 * (n - m), len(states), 2 * (m - n))
     change[: 2 * n, : 2 * m] = np.block([[rows, np.zeros((n, m))], [turned, rows]])
     matrix = np.linalg.solve(change.T, (change @ system).T).T
     outputs = np.eye(2 * n, len(matrix))
@@ -177,11 +177,11 @@ def with_linear_drives(robot: Manipulator) -> Manipulator:
 @lru_cache(maxsize=16)
 def _derivatives(robot: Manipulator, kind: DriveKind) -> ca.Function:
     """Return derivatives of the state's rates by state and forces, and those of J x' by x."""
-    given = motion_program(robot, kind)
-    names, symbols = [port.name for port in given.inputs], given.function.sx_in()
+    plant = motion_program(robot, kind)
+    names, symbols = [port.name for port in plant.inputs], plant.function.sx_in()
     by_name = dict(zip(names, symbols, strict=True))
-    found = (ca.vec(part) for part in given.function.call(symbols))
-    results = zip((port.name for port in given.outputs), found, strict=True)
+    vectors = (ca.vec(part) for part in plant.function.call(symbols))
+    results = zip((port.name for port in plant.outputs), vectors, strict=True)
     every = by_name | dict(results)
     state = ca.vertcat(*(by_name[name] for name in ("pose", "velocity", *dict(kind.more))))
     moved = ("velocity", "acceleration", *dict(kind.more).values())

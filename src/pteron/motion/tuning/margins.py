@@ -78,17 +78,17 @@ class Margins:
     @cached_property
     def common_gain(self) -> float:
         """The smallest factor above 1 on all forces for which a pole reaches the unit circle."""
-        matrix, inputs, asked = self.loop.opened()
-        fed_back = inputs @ asked
+        matrix, inputs, outputs = self.loop.opened()
+        fed_back = inputs @ outputs
         return self._stable and 1.0 + _first(
-            lambda more: radius(matrix + (1.0 + more) * fed_back), 1.0, 1
+            lambda increase: radius(matrix + (1.0 + increase) * fed_back), 1.0, 1
         )
 
     @cached_property
     def common_delay(self) -> float:
         """The smallest further delay of all forces for which one does, s."""
         return self._stable and _first(
-            lambda more: radius(self.loop.closed(more)), self.loop.period, 0
+            lambda delay: radius(self.loop.closed(delay)), self.loop.period, 0
         )
 
     @cached_property
@@ -99,8 +99,8 @@ class Margins:
         the disk on whose rim (1 + d / 2) / (1 - d / 2) and its inverse are. It is a lower bound, by
         the greatest singular value and by Perron's bound, of which the better.
         """
-        one = np.eye(len(self._response[0]))
-        middle = np.linalg.inv(one + self._response) - 0.5 * one
+        identity = np.eye(len(self._response[0]))
+        middle = np.linalg.inv(identity + self._response) - 0.5 * identity
         greatest = np.linalg.norm(middle, ord=2, axis=(1, 2))
         perron = np.abs(np.linalg.eigvals(np.abs(middle))).max(axis=-1)
         return self._stable and float(1.0 / np.minimum(greatest, perron).max())
@@ -144,8 +144,8 @@ class Margins:
         n = self.loop.plant.inputs.shape[1]
         if not self._stable:
             return np.array([0.0, 0.0, 0.0, np.nan])[:, None] * np.ones(n)
-        found = [_classical(self.frequencies, one) for one in self.drive_loops.T]
-        return np.array(found).T
+        margins = [_classical(self.frequencies, response) for response in self.drive_loops.T]
+        return np.array(margins).T
 
 
 def radius(matrix: Array) -> float:

@@ -49,51 +49,51 @@ class SampledLoop:
         asked for that still wait; u are forces asked for, `more` is a delay, s, beyond the loop's.
         """
         period, law, n = self.period, self.law, self.plant.inputs.shape[1]
-        late, whole = divided(self.delay + more, period)
+        late, samples = divided(self.delay + more, period)
         moved, after = self.plant.held(period - late)
-        early, before = self.plant.held(late)
-        free, before = moved @ early, moved @ before
+        early, first_part = self.plant.held(late)
+        free, first_part = moved @ early, moved @ first_part
         shares = np.broadcast_to(np.nan if self.share is None else self.share, n)
         rough = np.isfinite(shares)
-        told = bool(rough.any())
-        sizes = [len(free), 2 * n * told, len(law.matrix), *[n] * (whole + 1)]
+        differenced = bool(rough.any())
+        sizes = [len(free), 2 * n * differenced, len(law.matrix), *[n] * (samples + 1)]
         places = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
         state, last, memory, *waiting = places
         size = sum(sizes)
         # What the controller is told, of the whole state.
         measured = np.zeros((2 * n, size))
         measured[:, state] = self.plant.outputs
-        if told:
+        if differenced:
             share = np.diag(np.where(rough, shares, 1.0))
             measured[n:][rough] = 0.0
             differences = np.zeros((n, size))
             differences[:, state] = share @ self.plant.differenced / period
             differences[:, last] = np.hstack([-share / period, np.eye(n) - share])
             measured[n:][rough] = differences[rough]
-        asked = law.feedthrough @ measured
-        asked[:, memory] += law.outputs
+        commands = law.feedthrough @ measured
+        commands[:, memory] += law.outputs
         matrix, inputs = np.zeros((size, size)), np.zeros((size, n))
         matrix[np.ix_(state, state)] = free
-        if told:
+        if differenced:
             matrix[np.ix_(last[:n], state)] = self.plant.differenced
             matrix[last[n:]] = measured[n:]
         matrix[memory] = law.inputs @ measured
         matrix[np.ix_(memory, memory)] += law.matrix
         # waiting[k] was asked for k + 1 samples ago.
-        matrix[np.ix_(state, waiting[whole])] = before
-        if whole:
-            matrix[np.ix_(state, waiting[whole - 1])] = after
+        matrix[np.ix_(state, waiting[samples])] = first_part
+        if samples:
+            matrix[np.ix_(state, waiting[samples - 1])] = after
         else:
             inputs[state] = after
         for newer, older in pairwise(waiting):
             matrix[np.ix_(older, newer)] = np.eye(n)
         inputs[waiting[0]] = np.eye(n)
-        return matrix, inputs, asked
+        return matrix, inputs, commands
 
     def closed(self, more: float = 0.0) -> Array:
         """Return the closed loop's matrix, all forces delayed more, s."""
-        matrix, inputs, asked = self.opened(more)
-        return matrix + inputs @ asked
+        matrix, inputs, commands = self.opened(more)
+        return matrix + inputs @ commands
 
     @cached_property
     def poles(self) -> Array:
@@ -106,6 +106,6 @@ class SampledLoop:
         Opened at all drives; I + L is singular where the closed loop has a pole. In rad/s, at most
         pi / period.
         """
-        matrix, inputs, asked = self.opened()
+        matrix, inputs, commands = self.opened()
         z = np.exp(1j * frequencies * self.period)[:, None, None]
-        return -asked @ np.linalg.solve(z * np.eye(len(matrix)) - matrix, inputs + 0j * z)
+        return -commands @ np.linalg.solve(z * np.eye(len(matrix)) - matrix, inputs + 0j * z)

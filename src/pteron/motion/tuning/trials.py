@@ -83,7 +83,7 @@ def trial(
     Parameters are those of `simulate`, and so is what it raises.
     """
     robot = as_manipulator(robot)
-    found = simulate(
+    simulation = simulate(
         robot,
         motion,
         controller,
@@ -92,21 +92,21 @@ def trial(
         sensors=sensors,
         delay=delay,
     )
-    if found.stopped:
-        return Trial(*_UNKNOWN, found.stopped)
-    moving = found.time <= motion.duration
-    off = _tool(robot, found.pose) - _tool(robot, found.reference.pose)
+    if simulation.stopped:
+        return Trial(*_UNKNOWN, simulation.stopped)
+    moving = simulation.time <= motion.duration
+    off = _tool(robot, simulation.pose) - _tool(robot, simulation.reference.pose)
     errors = np.linalg.norm(off, axis=-1)
     most = limits_of(robot).force
-    shares = found.forces / np.where(np.isfinite(most), most, 1.0)
-    power = np.maximum(found.forces * found.motor_rates, 0.0).sum(axis=-1)
+    shares = simulation.forces / np.where(np.isfinite(most), most, 1.0)
+    power = np.maximum(simulation.forces * simulation.motor_rates, 0.0).sum(axis=-1)
     return Trial(
         float(errors[moving].max()),
         float(np.sqrt((errors[moving] ** 2).mean())),
-        *_end(found, motion, off, moving),
+        *_end(simulation, motion, off, moving),
         float(np.abs(shares).max()),
         float(np.sqrt((shares**2).mean(axis=0)).max()),
-        float(np.trapezoid(power, found.time)),
+        float(np.trapezoid(power, simulation.time)),
         "",
     )
 
@@ -168,7 +168,7 @@ def trials(
         )
     usual: dict[str, Any] = {"robot": robot, "motion": motion, "model": model}
     usual |= {"controller": controller, "sensors": sensors, "delay": delay}
-    asked: list[tuple[str, float, dict[str, Any]]] = [
+    changes: list[tuple[str, float, dict[str, Any]]] = [
         *(
             ("bandwidth", b, {"controller": replace(controller, bandwidth=b, **plain)})
             for b in bandwidths
@@ -178,12 +178,12 @@ def trials(
         *(("stiffness", k, {"robot": _stiffer(robot, k)}) for k in stiffnesses),
     ]
     rows = []
-    for changed, value, other in asked:
+    for changed, value, other in changes:
         try:
-            made = trial(**usual | other)
+            figures = trial(**usual | other)
         except PteronError as error:
-            made = Trial(*_UNKNOWN, str(error))
-        rows.append({"changed": changed, "value": float(value), **asdict(made)})
+            figures = Trial(*_UNKNOWN, str(error))
+        rows.append({"changed": changed, "value": float(value), **asdict(figures)})
     return pl.DataFrame(rows)
 
 
@@ -207,13 +207,13 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
 
 
 def _tool(robot: Manipulator, poses: Array) -> Array:
-    rest = np.zeros_like(poses)
-    place = tool_path(robot.platform, poses, rest, rest)[0]
+    zeros = np.zeros_like(poses)
+    place = tool_path(robot.platform, poses, zeros, zeros)[0]
     return place if place.shape[-1] else poses
 
 
 def _end(
-    found: Simulation, motion: Motion, off: Array, moving: NDArray[np.bool_]
+    simulation: Simulation, motion: Motion, off: Array, moving: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Return settling time and overshoot after the motion's end; NaN where it does not end."""
     after = off[~moving]
@@ -221,12 +221,14 @@ def _end(
         return float("nan"), float("nan")
     band = max(_SETTLED * float(np.linalg.norm(off[moving], axis=-1).max()), _LEAST)
     outside = np.flatnonzero(np.linalg.norm(after - after[-1], axis=-1) > band)
-    settled = float(found.time[~moving][outside[-1]] - motion.duration) if len(outside) else 0.0
+    settled = (
+        float(simulation.time[~moving][outside[-1]] - motion.duration) if len(outside) else 0.0
+    )
     if len(outside) and outside[-1] >= len(after) - 2:
         settled = float("nan")
-    places = _tool(found.robot, motion.pose)
+    places = _tool(simulation.robot, motion.pose)
     gone = places[-1] - places
     lengths = np.linalg.norm(gone, axis=-1)
     last = gone[np.flatnonzero(lengths > 0.01 * lengths.max())[-1]] if lengths.max() else after[0]
-    along = last / (np.linalg.norm(last) or 1.0)
-    return settled, max(float((after @ along).max()), 0.0)
+    direction = last / (np.linalg.norm(last) or 1.0)
+    return settled, max(float((after @ direction).max()), 0.0)
