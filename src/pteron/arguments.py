@@ -60,14 +60,14 @@ def checking(function: types.FunctionType) -> types.FunctionType:
     return _checking(function) if hints - _CHECKED_LATER - {"bool"} else function
 
 
-def checked_arguments(made: type[_Class]) -> type[_Class]:
+def checked_arguments(checked_class: type[_Class]) -> type[_Class]:
     """Let a class refuse arguments of another kind than its type hints say, as a decorator.
 
     It is for classes that are made from what a user gives, and have no check of their own.
     """
-    any_class: Any = made
+    any_class: Any = checked_class
     any_class.__init__ = _checking(any_class.__init__)
-    return made
+    return checked_class
 
 
 def expect_kinds(
@@ -83,8 +83,8 @@ def expect_kinds(
     wrong = []
     kinds, order, others = _kinds_of(function)
     names = [*order, *[others] * (len(args) - len(order))]
-    given = [*zip(names, args, strict=False), *named.items()]
-    for name, value in given:
+    arguments = [*zip(names, args, strict=False), *named.items()]
+    for name, value in arguments:
         kind, default = kinds.get(name, (None, None))
         if kind is not None and value is not default and not kind.holds(value):
             wrong.append(f"{name}: {shown(value)} given, {kind.words} expected")
@@ -92,7 +92,7 @@ def expect_kinds(
         raise DataError("; ".join(wrong))
 
 
-def expect(holds: object, name: str, given: object, wanted: object) -> None:
+def expect(holds: object, name: str, argument: object, expected: object) -> None:
     """Refuse an argument of which a condition does not hold, in the words of all such messages.
 
     Parameters
@@ -115,10 +115,10 @@ def expect(holds: object, name: str, given: object, wanted: object) -> None:
     pteron.errors.DataError: corner: -1.0 given, 0 m or more expected
     """
     if not holds:
-        raise DataError(f"{name}: {given} given, {wanted} expected")
+        raise DataError(f"{name}: {argument} given, {expected} expected")
 
 
-def expect_share(name: str, given: float) -> None:
+def expect_share(name: str, share: float) -> None:
     """Refuse a number that is no share of a whole: it must be above 0 and below 1.
 
     Raises
@@ -126,7 +126,7 @@ def expect_share(name: str, given: float) -> None:
     DataError
         If it is not, or is NaN.
     """
-    expect(0.0 < given < 1.0, name, repr(given), "a share above 0 and below 1")
+    expect(0.0 < share < 1.0, name, repr(share), "a share above 0 and below 1")
 
 
 def number_or_nan(value: object) -> float:
@@ -145,15 +145,15 @@ def number_or_nan(value: object) -> float:
 
 
 def expect_one_of(
-    choices: Sequence[str], error: type[PteronError] = DataError, **given: object
+    choices: Sequence[str], error: type[PteronError] = DataError, **arguments: object
 ) -> None:
     """Refuse values, by the names of their arguments, that are none of the choices."""
-    for name, value in given.items():
+    for name, value in arguments.items():
         if value not in choices:
             raise error(f"{name}: {value!r} is not one of {', '.join(choices)}")
 
 
-def expect_to_fit(name: str, given: object, numbers: float) -> None:
+def expect_to_fit(name: str, argument: object, numbers: float) -> None:
     """Refuse a size whose arrays do not fit into this computer's memory, before they are made.
 
     Parameters
@@ -170,8 +170,8 @@ def expect_to_fit(name: str, given: object, numbers: float) -> None:
     """
     if 8.0 * numbers > _memory():
         raise DataError(
-            f"{name}: {given} given, which takes {8e-9 * numbers:.3g} GB of memory; this computer "
-            f"has {1e-9 * _memory():.3g} GB: give less"
+            f"{name}: {argument} given, which takes {8e-9 * numbers:.3g} GB of memory; this "
+            f"computer has {1e-9 * _memory():.3g} GB: give less"
         )
 
 
@@ -192,10 +192,10 @@ def _checking(function: types.FunctionType) -> types.FunctionType:
         return function(*args, **named)
 
     # With the globals of its module: a doctest is looked for where they are the module's.
-    made = types.FunctionType(
+    wrapped = types.FunctionType(
         call.__code__, function.__globals__, function.__name__, None, call.__closure__
     )
-    return typing.cast(types.FunctionType, update_wrapper(made, function))
+    return typing.cast(types.FunctionType, update_wrapper(wrapped, function))
 
 
 @cache
@@ -233,14 +233,16 @@ def _kind(hint: Any) -> _Kind | None:
     if origin in (typing.Union, types.UnionType):
         # ArrayLike is a union too, and one with another flattens it.
         numbers = set(inner) >= _ARRAY_LIKE
-        rest = [_alternative(one) for one in inner if not (numbers and one in _ARRAY_LIKE)]
-        return _either([*rest, *([_Kind("real numbers", _are_numbers)] if numbers else [])])
+        alternatives = [
+            _alternative(part) for part in inner if not (numbers and part in _ARRAY_LIKE)
+        ]
+        return _either([*alternatives, *([_Kind("real numbers", _are_numbers)] if numbers else [])])
     if origin is typing.Annotated and isinstance(inner[1], Between):
         return _bounded(_kind(inner[0]), inner[1])
     if origin is typing.Literal:
-        choices = tuple({type(one) for one in inner})
+        choices = tuple({type(part) for part in inner})
         return _Kind(
-            _listed([f'"{one}"' if isinstance(one, str) else repr(one) for one in inner]),
+            _listed([f'"{part}"' if isinstance(part, str) else repr(part) for part in inner]),
             lambda value: isinstance(value, choices),
         )
     kind: Any = origin or hint
@@ -278,7 +280,9 @@ def _alternative(hint: Any) -> _Kind | None:
     if kind is None or typing.get_origin(hint) is not typing.Literal:
         return kind
     choices = typing.get_args(hint)
-    return _Kind(kind.words, lambda value: any(value is one or value == one for one in choices))
+    return _Kind(
+        kind.words, lambda value: any(value is choice or value == choice for choice in choices)
+    )
 
 
 def _either(kinds: list[_Kind | None]) -> _Kind | None:
@@ -343,16 +347,16 @@ def _are_numbers(value: Any) -> bool:
     if isinstance(value, str | bytes) or value is None:
         return False
     try:
-        given = np.asarray(value)
-        if given.dtype.kind == "O":
-            given = given.astype(float) if not _has_text(given) else given
+        array = np.asarray(value)
+        if array.dtype.kind == "O":
+            array = array.astype(float) if not _has_text(array) else array
     except (TypeError, ValueError, OverflowError):
         return False
-    return given.dtype.kind in "biuf"
+    return array.dtype.kind in "biuf"
 
 
 def _has_text(values: np.ndarray[Any, Any]) -> bool:
-    return any(isinstance(one, str | bytes) for one in values.flat)
+    return any(isinstance(element, str | bytes) for element in values.flat)
 
 
 _ARRAY_LIKE = set(typing.get_args(ArrayLike))

@@ -32,8 +32,8 @@ def of_extra(extra: str, module: str, need: str, error: type[PteronError] | None
         # Where nothing of Pteron is installed, this file still runs for its command.
         from pteron.errors import ModelError
 
-        told = f"{need}, which is not installed; {install_command(extra)}"
-        raise (error or ModelError)(told) from None
+        reason = f"{need}, which is not installed; {install_command(extra)}"
+        raise (error or ModelError)(reason) from None
 
 
 def expect_extra(extra: str, module: str, need: str) -> None:

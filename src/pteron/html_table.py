@@ -59,9 +59,9 @@ def html_table(
     >>> "<td>1 &lt; 2</td>" in html_table("A", "", [Column("sum")], [["1 < 2"]])
     True
     """
-    made = template("", "html_table.html.j2", cell=_cell, kind=_kind)
+    page_part = template("", "html_table.html.j2", cell=_cell, kind=_kind)
     cells = [list(zip(columns, row, strict=True)) for row in rows]
-    return made.render(title=title, about=about, columns=columns, rows=cells, notes=notes)
+    return page_part.render(title=title, about=about, columns=columns, rows=cells, notes=notes)
 
 
 def _kind(kind: str) -> Markup:

@@ -85,14 +85,14 @@ def former_name(package: str, name: str) -> Any:
     present = RENAMED.get(package, {}).get(name)
     if present is None:
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
-    module, _, own = present.rpartition(".")
+    module, _, attribute = present.rpartition(".")
     warnings.warn(
-        f"{package}.{name} goes with version {UNTIL}; write from {module} import {own}",
+        f"{package}.{name} goes with version {UNTIL}; write from {module} import {attribute}",
         DeprecationWarning,
         stacklevel=3,
     )
     try:
-        return getattr(import_module(module), own)
+        return getattr(import_module(module), attribute)
     except AttributeError:
         return import_module(present)
 
@@ -111,12 +111,12 @@ def former_attribute(former: str, present: str) -> property:
         It gives the attribute, with a `DeprecationWarning` that has what to write instead.
     """
 
-    def attribute(own: Any) -> Any:
+    def attribute(instance: Any) -> Any:
         warnings.warn(
-            f"{type(own).__name__}.{former} goes with version {UNTIL}; write .{present}",
+            f"{type(instance).__name__}.{former} goes with version {UNTIL}; write .{present}",
             DeprecationWarning,
             stacklevel=2,
         )
-        return getattr(own, present)
+        return getattr(instance, present)
 
     return property(attribute)

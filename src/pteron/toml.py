@@ -133,8 +133,8 @@ def language_of(text: str) -> str:
     """
     start = text.lstrip("\ufeff \t\r\n")[:_SNIFFED]
     if start.startswith("<"):
-        found = next((name for tag, name in _TAGS.items() if re.search(rf"<{tag}\b", start)), "")
-        return found or "XML"
+        language = next((name for tag, name in _TAGS.items() if re.search(rf"<{tag}\b", start)), "")
+        return language or "XML"
     if start.startswith("{"):
         return "JSON"
     return "YAML" if start.startswith(("%YAML", "---\n", "---\r\n")) else ""
@@ -219,8 +219,8 @@ def told(lines: Sequence[str]) -> str:
     """Return the faults of a file as the reason of one error: a line each, `_MANY` at most."""
     if len(lines) == 1:
         return lines[0]
-    more = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
-    return "\n  ".join([f"{len(lines)} faults", *lines[:_MANY], *more])
+    remainder = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
+    return "\n  ".join([f"{len(lines)} faults", *lines[:_MANY], *remainder])
 
 
 def refuse(faults: Sequence[str]) -> None:
@@ -241,13 +241,13 @@ def keep_checked(
     ModelError
         If there are faults: it lists all of them.
     """
-    found = [*faults]
+    all_faults = [*faults]
     for name, check in checks.items():
         try:
             object.__setattr__(part, name, check(getattr(part, name), name))
         except ModelError as error:
-            found += error.faults
-    refuse(found)
+            all_faults += error.faults
+    refuse(all_faults)
 
 
 def fault_lines(
@@ -326,13 +326,13 @@ def _meant(location: tuple[int | str, ...], schema: _Node) -> tuple[int | str, .
 def _fault(
     fault: Any, schema: _Node, location: tuple[int | str, ...], listed: set[tuple[str, ...]]
 ) -> str:
-    kind, given, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
+    kind, text, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
     if kind in _UNKNOWN:
         table, valid = _valid(location, schema)
         if location[-1] in valid:
-            return f"{given} given, a table expected"
+            return f"{text} given, a table expected"
         meant = _meant(location, schema)
         guess = f" did you mean {str(meant[-1]).removeprefix(table)}?" if meant else ""
         if valid in listed:
@@ -345,14 +345,14 @@ def _fault(
         key = ".".join(str(part) for part in location)
         return f"[{key}] is one table, a list of tables expected; write [[{key}]] above each"
     expected = _words(node)
-    whole = all(isinstance(part, str) for part in location)
-    if expected == "a table" and whole and not isinstance(fault["input"], dict):
+    is_named = all(isinstance(part, str) for part in location)
+    if expected == "a table" and is_named and not isinstance(fault["input"], dict):
         key = ".".join(str(part) for part in location)
-        return f"{given} given, a table expected: [{key}] with {', '.join(_keys(node, ''))}"
+        return f"{text} given, a table expected: [{key}] with {', '.join(_keys(node, ''))}"
     if kind in ("too_short", "too_long") and "prefixItems" not in node:
         least, most = context.get("min_length"), context.get("max_length")
         count = f"at least {least}" if kind == "too_short" else f"at most {most}"
-        return f"{given} given, {expected} expected, {count} of them"
+        return f"{text} given, {expected} expected, {count} of them"
     if kind == "missing" and fault["loc"] == location:
         return f"missing; the file must give {expected or 'it'}"
     if kind in _BOUNDS:
@@ -362,30 +362,30 @@ def _fault(
     elif kind == "literal_error":
         expected = context["expected"]
     if not expected:
-        return f"{given} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
-    return f"{given} given, {expected} expected"
+        return f"{text} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
+    return f"{text} given, {expected} expected"
 
 
 def _schema(model: Any) -> _Node:
     """Return the JSON schema of a model, in which nothing stands for another part of it."""
     from pydantic import TypeAdapter
 
-    whole = TypeAdapter(model).json_schema(by_alias=True)
+    schema = TypeAdapter(model).json_schema(by_alias=True)
 
     def resolved(node: Any) -> Any:
         if isinstance(node, list):
-            return [resolved(one) for one in node]
+            return [resolved(part) for part in node]
         if not isinstance(node, dict):
             return node
         if "$ref" in node:
-            return resolved(whole["$defs"][node["$ref"].rpartition("/")[2]])
-        others = [one for one in node.get("anyOf", []) if one.get("type") != "null"]
+            return resolved(schema["$defs"][node["$ref"].rpartition("/")[2]])
+        others = [part for part in node.get("anyOf", []) if part.get("type") != "null"]
         if len(others) == 1:
             return resolved(others[0])
         return {key: resolved(value) for key, value in node.items() if key != "$defs"}
 
-    found: _Node = resolved(whole)
-    return found
+    resolved_schema: _Node = resolved(schema)
+    return resolved_schema
 
 
 def _at(node: _Node, location: tuple[int | str, ...]) -> _Node:

@@ -29,15 +29,15 @@ def accelerated(
     function = _function(robot, names, places, grid.chunk)
     # A chunk at the grid's rim is filled up: another shape would be compiled anew.
     values = [
-        np.pad(own, (0, side - len(own)), mode="edge")
-        for own, side in (
+        np.pad(array, (0, side - len(array)), mode="edge")
+        for array, side in (
             (axis.values[part], side)
             for axis, part, side in zip(grid.axes, region, grid.chunk, strict=True)
         )
     ]
-    found = function(np.array(grid.pose), *values)
-    kept = tuple(slice(0, part.stop - part.start) for part in region)
-    return {name: np.asarray(own)[kept] for name, own in found.items()}
+    outputs = function(np.array(grid.pose), *values)
+    region_of_chunk = tuple(slice(0, part.stop - part.start) for part in region)
+    return {name: np.asarray(array)[region_of_chunk] for name, array in outputs.items()}
 
 
 @lru_cache(maxsize=16)
@@ -53,19 +53,19 @@ def _function(
     }
 
     def evaluate(pose: Any, *values: Any) -> dict[str, Any]:
-        columns = [jnp.broadcast_to(own, shape) for own in pose]
-        for k, (place, own) in enumerate(zip(places, values, strict=True)):
+        columns = [jnp.broadcast_to(coordinate, shape) for coordinate in pose]
+        for k, (place, coordinate) in enumerate(zip(places, values, strict=True)):
             columns[place] = jnp.broadcast_to(
-                own.reshape((-1,) + (1,) * (len(shape) - 1 - k)), shape
+                coordinate.reshape((-1,) + (1,) * (len(shape) - 1 - k)), shape
             )
         poses = jnp.stack(columns, axis=-1)
         status, margin, _ = kernels["standing"](poses)
-        found = {"status": status, MARGIN.name: margin}
+        outputs = {"status": status, MARGIN.name: margin}
         for name in names:
             if name != MARGIN.name:
                 value, serves = kernels[name](poses)
-                found[name] = jnp.where(serves > 0.0, value, jnp.nan)
-        return {name: found[name] for name in (*names, "status")}
+                outputs[name] = jnp.where(serves > 0.0, value, jnp.nan)
+        return {name: outputs[name] for name in (*names, "status")}
 
     compiled: Callable[..., dict[str, Any]] = jax.jit(evaluate)
     return compiled

@@ -26,16 +26,16 @@ _HEADER, _WIDEST = 4096, 8
 """Bytes of an array's header and of its widest element."""
 
 
-def write_archive(given: Map, target: Path) -> Path:
+def write_archive(index_map: Map, target: Path) -> Path:
     """Write a map to an .npz file."""
     buffer = io.BytesIO()
-    axes = {axis.name: axis.values for axis in given.grid.axes}
-    arrays: dict[str, Any] = {**axes, **given.values, _STATUS: given.status}
+    axes = {axis.name: axis.values for axis in index_map.grid.axes}
+    arrays: dict[str, Any] = {**axes, **index_map.values, _STATUS: index_map.status}
     about: dict[str, Any] = {
-        "robot": given.robot,
-        "machine": given.machine,
-        "units": given.units,
-        "grid": given.grid.plain(),
+        "robot": index_map.robot,
+        "machine": index_map.machine,
+        "units": index_map.units,
+        "grid": index_map.grid.plain(),
     }
     about["sha256"] = checksum(about, arrays)
     arrays[_ABOUT] = np.array(json.dumps(about))

@@ -21,9 +21,9 @@ def checksum(about: Any, arrays: Mapping[str, NDArray[Any]]) -> str:
     """
     total = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for name, values in sorted(arrays.items()):
-        own = np.ascontiguousarray(values)
-        if own.dtype.kind == "f":
-            own = np.where(np.isnan(own), np.nan, own)
-        total.update(f"\0{name} {own.dtype.str} {own.shape}\0".encode())
-        total.update(own.data)
+        array = np.ascontiguousarray(values)
+        if array.dtype.kind == "f":
+            array = np.where(np.isnan(array), np.nan, array)
+        total.update(f"\0{name} {array.dtype.str} {array.shape}\0".encode())
+        total.update(array.data)
     return total.hexdigest()

@@ -139,10 +139,10 @@ class Grid:
         object.__setattr__(self, "pose", pose)
 
     @classmethod
-    def of_plain(cls, given: Mapping[str, Any]) -> Self:
+    def of_plain(cls, plain: Mapping[str, Any]) -> Self:
         """Return the grid from its `plain` form."""
-        axes = tuple(Axis(**axis) for axis in given["axes"])
-        return cls(tuple(given["coordinates"]), tuple(given["pose"]), axes)
+        axes = tuple(Axis(**axis) for axis in plain["axes"])
+        return cls(tuple(plain["coordinates"]), tuple(plain["pose"]), axes)
 
     def plain(self) -> dict[str, Any]:
         """Return the grid as plain data for JSON."""
@@ -190,12 +190,12 @@ class Grid:
         """Return the poses (..., m) of the grid, or of a part of it, m and rad."""
         parts = region or (slice(None),) * len(self.axes)
         values = [axis.values[part] for axis, part in zip(self.axes, parts, strict=True)]
-        found = np.empty((*map(len, values), len(self.pose)))
-        found[...] = self.pose
-        for k, (axis, own) in enumerate(zip(self.axes, values, strict=True)):
+        poses = np.empty((*map(len, values), len(self.pose)))
+        poses[...] = self.pose
+        for k, (axis, axis_values) in enumerate(zip(self.axes, values, strict=True)):
             lead = (-1,) + (1,) * (len(values) - 1 - k)
-            found[..., self.coordinates.index(axis.name)] = own.reshape(lead)
-        return found
+            poses[..., self.coordinates.index(axis.name)] = axis_values.reshape(lead)
+        return poses
 
 
 def pose_grid(
@@ -280,8 +280,8 @@ def pose_grid(
         spans |= {name: tuple(box[:, names.index(name)].tolist()) for name in moved}
     axes = []
     for name in varying_names:
-        least, greatest, *own = spans[name]
-        number = own[0] if own else count
+        least, greatest, *span_count = spans[name]
+        number = span_count[0] if span_count else count
         # A range is of floats, its count among them.
         if isinstance(number, float) and number.is_integer():
             number = int(number)

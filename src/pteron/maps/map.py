@@ -184,7 +184,7 @@ class Map:
         i = int(np.abs(steps - value).argmin())
         pose = list(self.grid.pose)
         pose[self.grid.coordinates.index(name)] = float(steps[i])
-        values = {index: np.take(own, i, axis=k) for index, own in self.values.items()}
+        values = {index: np.take(array, i, axis=k) for index, array in self.values.items()}
         grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
         return Map(self.robot, grid, values, np.take(self.status, i, axis=k), self.machine)
 

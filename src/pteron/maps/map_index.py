@@ -132,10 +132,10 @@ def map_index(
             threads=1 if engine == "jax" else cores(),
             progress=progress,
         )
-        found = store.map(robot.name, text_of(robot))
+        index_map = store.map(robot.name, text_of(robot))
     if target is not None and not streams:
-        save_map(found, target)
-    return found
+        save_map(index_map, target)
+    return index_map
 
 
 def checked_indices(robot: Manipulator, index: str | Sequence[str]) -> tuple[str, ...]:
@@ -156,16 +156,16 @@ def _computed(
     prepare(robot, names, grid.size)
     poses = grid.poses(region)
     rows = poses.reshape(-1, poses.shape[-1])
-    found = {name: np.empty(len(rows)) for name in (*names, "status")}
+    outputs = {name: np.empty(len(rows)) for name in (*names, "status")}
     for start in range(0, len(rows), _BLOCK):
         part = slice(start, start + _BLOCK)
         status, margin, _ = numeric(robot, "standing")(rows[part])
-        found["status"][part] = status
+        outputs["status"][part] = status
         for name in names:
-            found[name][part] = (
+            outputs[name][part] = (
                 margin if name == MARGIN.name else evaluated(robot, name, "nan", rows[part])
             )
-    return {name: values.reshape(poses.shape[:-1]) for name, values in found.items()}
+    return {name: values.reshape(poses.shape[:-1]) for name, values in outputs.items()}
 
 
 @lru_cache(maxsize=64)

@@ -21,42 +21,42 @@ _MANY = 2
 """Most differences that are listed of each part of a plan."""
 
 
-def expect_same(path: str | Path, found: Any, wanted: Mapping[str, Any]) -> None:
+def expect_same(path: str | Path, stored: Any, plan: Mapping[str, Any]) -> None:
     """Refuse to resume a store whose plan differs.
 
     Plans are plain JSON data: the store's, and that of the run. Texts that are TOML, as a robot's
     is, are compared by their keys.
     """
-    if not isinstance(found, Mapping):
+    if not isinstance(stored, Mapping):
         raise OutputError(f"{path}: holds no plan of results; name another place, or remove it")
-    told: list[str] = []
-    for key in {**wanted, **found}:
-        lines = list(_differences(str(key), found.get(key), wanted.get(key)))
-        told += lines[:_MANY]
+    differences: list[str] = []
+    for key in {**plan, **stored}:
+        lines = list(_differences(str(key), stored.get(key), plan.get(key)))
+        differences += lines[:_MANY]
         if len(lines) > _MANY:
-            told.append(f"and {len(lines) - _MANY} more of the {shown(key, bare=True)}")
-    if told:
+            differences.append(f"and {len(lines) - _MANY} more of the {shown(key, bare=True)}")
+    if differences:
         raise OutputError(
-            f"{path}: holds results of another plan ({'; '.join(told)}); name another place, or "
-            "remove it"
+            f"{path}: holds results of another plan ({'; '.join(differences)}); name another place, "
+            "or remove it"
         )
 
 
-def _differences(name: str, found: Any, wanted: Any) -> Iterator[str]:
+def _differences(name: str, stored: Any, plan: Any) -> Iterator[str]:
     """Yield a line for every number or text in which two plans differ."""
     label = f"{name}."
     if name == "robot":
-        found, wanted = _machine(found), _machine(wanted)
-        label = f"robot {shown(wanted.get('name'), bare=True)}: "
-    if isinstance(found, Mapping) and isinstance(wanted, Mapping):
-        for key in {**wanted, **found}:
-            yield from _differences(f"{label}{key}", found.get(key), wanted.get(key))
-    elif _listed(found) and _listed(wanted) and len(found) == len(wanted):
-        for k, both in enumerate(zip(found, wanted, strict=True), start=1):
+        stored, plan = _machine(stored), _machine(plan)
+        label = f"robot {shown(plan.get('name'), bare=True)}: "
+    if isinstance(stored, Mapping) and isinstance(plan, Mapping):
+        for key in {**plan, **stored}:
+            yield from _differences(f"{label}{key}", stored.get(key), plan.get(key))
+    elif _listed(stored) and _listed(plan) and len(stored) == len(plan):
+        for k, both in enumerate(zip(stored, plan, strict=True), start=1):
             yield from _differences(f"{name}[{k}]", *both)
     # True is 1 and -0.0 is 0.0, but not as they are written.
-    elif json.dumps(found, default=str) != json.dumps(wanted, default=str):
-        yield _told(name, found, wanted)
+    elif json.dumps(stored, default=str) != json.dumps(plan, default=str):
+        yield _told(name, stored, plan)
 
 
 def _machine(text: Any) -> Mapping[str, Any]:
@@ -68,11 +68,13 @@ def _machine(text: Any) -> Mapping[str, Any]:
 
 
 def _listed(value: Any) -> bool:
-    return isinstance(value, list) and any(isinstance(one, Mapping) for one in value)
+    return isinstance(value, list) and any(
+        isinstance(entry_of_list, Mapping) for entry_of_list in value
+    )
 
 
-def _told(name: str, found: Any, wanted: Any) -> str:
-    texts = ["none" if value is None else shown(value) for value in (found, wanted)]
+def _told(name: str, stored: Any, plan: Any) -> str:
+    texts = ["none" if value is None else shown(value) for value in (stored, plan)]
     name = shown(name, bare=True, longest=2 * _LONG)
     if any(len(text) > _LONG for text in texts):
         return f"another {name}"

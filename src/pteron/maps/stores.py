@@ -91,17 +91,17 @@ class MapStore:
         A store of the same map is continued. `robot` is the machine's name, `names` are those of
         the indices, and `plan` is all else that the numbers depend on.
         """
-        wanted = {**plan, "index": list(names), "grid": grid.plain()}
+        full_plan = {**plan, "index": list(names), "grid": grid.plain()}
         if not path.exists():
             with _beside(path) as work:
-                _make(work, grid, names, {"name": robot, "plan": wanted})
+                _make(work, grid, names, {"name": robot, "plan": full_plan})
                 _placed(work, path)
-        found = _attributes(path)
-        if "plan" not in found:
+        attributes = _attributes(path)
+        if "plan" not in attributes:
             raise OutputError(f"{path}: is no map's store; name another place, or remove it")
-        expect_same(path, found["plan"], wanted)
+        expect_same(path, attributes["plan"], full_plan)
         try:
-            return cls(path.resolve(), grid, names, _checked_seal(path, found))
+            return cls(path.resolve(), grid, names, _checked_seal(path, attributes))
         except DataError as error:
             raise OutputError(f"{error}; remove it, or name another place") from None
 
@@ -113,10 +113,10 @@ class MapStore:
     def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
         """Write a chunk's values, each array's part through a temporary file and a rename."""
         region, group = self.grid.regions()[number], _group(self.path)
-        held = {name: np.asarray(result[name], dtype=_dtype(name)) for name in self._arrays}
-        for name, values in held.items():
+        arrays = {name: np.asarray(result[name], dtype=_dtype(name)) for name in self._arrays}
+        for name, values in arrays.items():
             group[name][region] = values
-        group[_CHECKSUM][number] = self._checksum(number, held)
+        group[_CHECKSUM][number] = self._checksum(number, arrays)
 
     def map(self, robot: str, machine: str) -> Map:
         """Return the map, read into memory."""
@@ -124,10 +124,10 @@ class MapStore:
         values = {name: np.empty(self.grid.shape, _dtype(name)) for name in self._arrays}
         missing = 0
         for number, region in enumerate(regions):
-            found = self._read(number)
-            missing += found is None
-            for name, own in (found or {}).items():
-                values[name][region] = own
+            chunk = self._read(number)
+            missing += chunk is None
+            for name, array in (chunk or {}).items():
+                values[name][region] = array
         if missing:
             raise DataError(
                 f"{self.path}: {missing} of {len(regions)} chunks are not finished, lost or "
@@ -144,13 +144,13 @@ class MapStore:
         """Return a chunk as it was written; None where it is not there, lost or damaged."""
         region, group = self.grid.regions()[number], _group(self.path)
         try:
-            told = int(group[_CHECKSUM][number])
-            if not told:
+            recorded = int(group[_CHECKSUM][number])
+            if not recorded:
                 return None
-            found = {name: np.asarray(group[name][region]) for name in self._arrays}
+            arrays = {name: np.asarray(group[name][region]) for name in self._arrays}
         except Exception:  # codecs and their libraries raise what they like at damaged bytes
             return None
-        return found if told == self._checksum(number, found) else None
+        return arrays if recorded == self._checksum(number, arrays) else None
 
     def _checksum(self, number: int, values: Mapping[str, NDArray[Any]]) -> int:
         """Return the checksum, above 0, of a chunk's values, its number and the store's seal."""
@@ -159,30 +159,30 @@ class MapStore:
 
 def read_store(path: Path) -> Map:
     """Return the map of a Zarr store."""
-    found = _attributes(path)
-    if "plan" not in found:
+    attributes = _attributes(path)
+    if "plan" not in attributes:
         raise DataError(f"{path}: is no map's store")
-    seal = _checked_seal(path, found)
-    plan, name = found["plan"], found["name"]
+    seal = _checked_seal(path, attributes)
+    plan, name = attributes["plan"], attributes["name"]
     store = MapStore(path.resolve(), Grid.of_plain(plan["grid"]), tuple(plan["index"]), seal)
     return store.map(name, "" if plan["robot"] == name else plan["robot"])
 
 
-def save_store(given: Map, path: Path) -> Path:
+def save_store(index_map: Map, path: Path) -> Path:
     """Write a map to a Zarr store, whole or not at all."""
-    plan = {"robot": given.machine or given.robot, "saved": True}
-    names = tuple(given.values)
+    plan = {"robot": index_map.machine or index_map.robot, "saved": True}
+    names = tuple(index_map.values)
     if path.exists():
-        MapStore.of(path, given.robot, given.grid, names, plan)
+        MapStore.of(path, index_map.robot, index_map.grid, names, plan)
     with _beside(path) as work:
-        made = work / path.name
-        store = MapStore.of(made, given.robot, given.grid, names, plan)
-        for number, region in enumerate(given.grid.regions()):
-            found = {name: values[region] for name, values in given.values.items()}
-            store.write(number, found | {_STATUS: given.status[region]})
+        new_store = work / path.name
+        store = MapStore.of(new_store, index_map.robot, index_map.grid, names, plan)
+        for number, region in enumerate(index_map.grid.regions()):
+            arrays = {name: values[region] for name, values in index_map.values.items()}
+            store.write(number, arrays | {_STATUS: index_map.status[region]})
         if path.exists():
             path.rename(work / "former")
-        return made.rename(path)
+        return new_store.rename(path)
 
 
 def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, Any]) -> None:
@@ -190,11 +190,11 @@ def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, 
     group = _zarr().create_group(work, attributes=attributes)
     axes = tuple(axis.name for axis in grid.axes)
     for axis in grid.axes:
-        made = group.create_array(axis.name, data=axis.values, dimension_names=(axis.name,))
-        made.attrs["units"] = axis.unit
+        array = group.create_array(axis.name, data=axis.values, dimension_names=(axis.name,))
+        array.attrs["units"] = axis.unit
     for name in (*names, _STATUS):
         index = ALL.get(name)
-        made = group.create_array(
+        array = group.create_array(
             name,
             shape=grid.shape,
             chunks=grid.chunk,
@@ -204,7 +204,7 @@ def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, 
             config={"write_empty_chunks": True},
         )
         if index:
-            made.attrs.update({"units": index.unit, "long_name": index.title})
+            array.attrs.update({"units": index.unit, "long_name": index.title})
     group.create_array(
         _CHECKSUM,
         shape=(len(grid.regions()),),
@@ -278,8 +278,8 @@ def _attributes(path: Path) -> dict[str, Any]:
     """Return a store's attributes as its file has them, or none where the path is no store."""
     _zarr()
     try:
-        found = json.loads((path / "zarr.json").read_bytes())["attributes"]
-        return dict(found) if isinstance(found["plan"], dict) else {}
+        attributes = json.loads((path / "zarr.json").read_bytes())["attributes"]
+        return dict(attributes) if isinstance(attributes["plan"], dict) else {}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return {}
 

@@ -98,21 +98,21 @@ def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tu
     nearest = scipy.ndimage.distance_transform_edt(
         ~known, return_distances=False, return_indices=True
     )
-    whole = values[tuple(nearest)]
-    found = []
+    filled = values[tuple(nearest)]
+    parts = []
     if MARGIN.name in given.values:
         closed = np.pad(given.values[MARGIN.name], 1, constant_values=-_BEYOND)
         corners, triangles, *_ = measure(closed, 0.0)
         corners = np.clip(corners - 1.0, 0.0, np.array(values.shape) - 1.0)
-        own = scipy.ndimage.map_coordinates(whole, corners.T, order=1)
-        found.append(_surface(given, None, corners, triangles, own))
+        corner_values = scipy.ndimage.map_coordinates(filled, corners.T, order=1)
+        parts.append(_surface(given, None, corners, triangles, corner_values))
     for level in levels:
-        if whole.min() < level < whole.max():
+        if filled.min() < level < filled.max():
             with suppress(RuntimeError):  # no triangle between poses that serve
-                corners, triangles, *_ = measure(whole, level, mask=known)
-                own = np.full(len(corners), level)
-                found.append(_surface(given, level, corners, triangles, own))
-    return tuple(found)
+                corners, triangles, *_ = measure(filled, level, mask=known)
+                corner_values = np.full(len(corners), level)
+                parts.append(_surface(given, level, corners, triangles, corner_values))
+    return tuple(parts)
 
 
 def save_surfaces(given: Map, target: Path) -> Path:
@@ -129,7 +129,10 @@ def save_surfaces(given: Map, target: Path) -> Path:
     levels = sorted(part.level for part in parts if part.level is not None)
     numbers = [0 if part.level is None else 1 + levels.index(part.level) for part in parts]
     # VTK reads no shorter integers from its own legacy files.
-    kinds = [np.full(len(one), k, np.int64) for one, k in zip(triangles, numbers, strict=True)]
+    kinds = [
+        np.full(len(part_triangles), k, np.int64)
+        for part_triangles, k in zip(triangles, numbers, strict=True)
+    ]
     mesh = meshio.Mesh(
         np.concatenate([part.points for part in parts]),
         [("triangle", np.concatenate(triangles).astype(np.int32))],
@@ -141,9 +144,9 @@ def save_surfaces(given: Map, target: Path) -> Path:
     if ending.startswith(".vt"):
         mesh.cell_data["surface"] = [np.concatenate(kinds)]
     with TemporaryDirectory(prefix="pteron-surface-") as folder:
-        made = Path(folder, f"surface{ending}")
-        meshio.write(made, mesh, binary=True)
-        return write_bytes(target, made.read_bytes())
+        file = Path(folder, f"surface{ending}")
+        meshio.write(file, mesh, binary=True)
+        return write_bytes(target, file.read_bytes())
 
 
 def checked_surfaces() -> tuple[Any, Any]:
@@ -159,10 +162,10 @@ def checked_surfaces() -> tuple[Any, Any]:
 
 
 def _surface(
-    given: Map, level: float | None, corners: Array, triangles: NDArray[Any], values: Array
+    index_map: Map, level: float | None, corners: Array, triangles: NDArray[Any], values: Array
 ) -> Surface:
     """Return a surface of places in the grid (P, 3), without the triangles that have no area."""
-    axes = given.grid.axes
+    axes = index_map.grid.axes
     steps = [(axis.greatest - axis.least) / (axis.count - 1) for axis in axes]
     points = np.asarray([axis.least for axis in axes] + corners * steps)
     a, b, c = np.moveaxis(corners[triangles], 1, 0)

@@ -110,13 +110,13 @@ def sweep(
     if scheduler is not None and workers is not None:
         raise DataError("scheduler and workers given; a scheduler has its own workers: give one")
     done = set(store.finished())
-    left = [k for k in range(len(chunks)) if k not in done]
-    total, ready = len(chunks), len(chunks) - len(left)
+    remaining = [k for k in range(len(chunks)) if k not in done]
+    total, ready = len(chunks), len(chunks) - len(remaining)
     tell = progress or (lambda share: None)
     tell(ready / total if total else 1.0)
-    if not left:
+    if not remaining:
         return 0
-    tasks = ((k, chunks[k]) for k in left)
+    tasks = ((k, chunks[k]) for k in remaining)
     task = partial(_computed, function, store)
     finished = (
         _here(task, tasks, threads)
@@ -125,7 +125,7 @@ def sweep(
     )
     for count, _ in enumerate(finished, start=ready + 1):
         tell(count / total)
-    return len(left)
+    return len(remaining)
 
 
 def _computed(
@@ -138,17 +138,22 @@ def _here(
     task: Callable[[int, Any], None], tasks: Iterator[tuple[int, Any]], threads: int
 ) -> Iterator[None]:
     """Do the tasks in this process; yield after each."""
-    for one in islice(tasks, 1 if threads > 1 else None):
-        task(*one)
+    for numbered_chunk in islice(tasks, 1 if threads > 1 else None):
+        task(*numbered_chunk)
         yield
     with ThreadPoolExecutor(threads) as pool:
-        pending = {pool.submit(task, *one) for one in islice(tasks, _AHEAD * threads)}
+        pending = {
+            pool.submit(task, *numbered_chunk) for numbered_chunk in islice(tasks, _AHEAD * threads)
+        }
         try:
             while pending:
                 ready, pending = wait(pending, return_when=FIRST_COMPLETED)
                 for future in ready:
                     yield future.result()
-                pending |= {pool.submit(task, *one) for one in islice(tasks, len(ready))}
+                pending |= {
+                    pool.submit(task, *numbered_chunk)
+                    for numbered_chunk in islice(tasks, len(ready))
+                }
         finally:
             for future in pending:
                 future.cancel()
@@ -163,9 +168,9 @@ def _elsewhere(
     """Do the tasks in other processes; yield after each."""
     distributed = _distributed()
 
-    def submitted(one: tuple[int, Any]) -> Future[None]:
+    def submitted(numbered_chunk: tuple[int, Any]) -> Future[None]:
         # Each is a task of its own: that its result is none does not mean it is not needed.
-        future: Future[None] = client.submit(task, *one, pure=False)
+        future: Future[None] = client.submit(task, *numbered_chunk, pure=False)
         return future
 
     where = "local workers" if scheduler is None else f"scheduler {scheduler}"
@@ -173,7 +178,7 @@ def _elsewhere(
     with _quiet(), _client(where, scheduler, workers) as client:
         with _told_if_lost(where):
             ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-            pending = {submitted(one) for one in islice(tasks, ahead)}
+            pending = {submitted(numbered_chunk) for numbered_chunk in islice(tasks, ahead)}
         alone = 0.0
         while pending:
             with _told_if_lost(where):
@@ -189,7 +194,7 @@ def _elsewhere(
                 _settle(future, where)
                 yield
                 with _told_if_lost(where):
-                    pending |= {submitted(one) for one in islice(tasks, 1)}
+                    pending |= {submitted(numbered_chunk) for numbered_chunk in islice(tasks, 1)}
 
 
 def _settle(future: Future[None], where: str) -> None:
@@ -268,12 +273,14 @@ def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[
                 f"{where}: has no workers; start some with: dask worker {scheduler}"
             ) from None
         here = version("pteron")
-        for worker, found in client.run(version, "pteron", on_error="return").items():
-            if found != here:
-                told = "none" if isinstance(found, BaseException) else found
+        for worker, worker_version in client.run(version, "pteron", on_error="return").items():
+            if worker_version != here:
+                version_words = (
+                    "none" if isinstance(worker_version, BaseException) else worker_version
+                )
                 raise PteronError(
-                    f"{where}: worker {worker} has Pteron {told}, {here} expected; install "
-                    "the same there"
+                    f"{where}: worker {worker} has Pteron {version_words}, {here} expected; "
+                    "install the same there"
                 )
         yield client
 

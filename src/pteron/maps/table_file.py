@@ -34,13 +34,13 @@ _EQUAL = 1e-6
 """Greatest difference of a coordinate's steps, over a step, for tables with few digits."""
 
 
-def write_map_table(given: Map, target: Path) -> Path:
+def write_map_table(index_map: Map, target: Path) -> Path:
     """Write a map to a CSV file, or to a Parquet file, which carries a checksum."""
-    frame = given.table()
+    frame = index_map.table()
     if target.suffix.lower() == ".csv":
         return write_table(frame, target)
     buffer = io.BytesIO()
-    frame.write_parquet(buffer, metadata=dict.fromkeys(_CHECKSUMS, _checksum(given)))
+    frame.write_parquet(buffer, metadata=dict.fromkeys(_CHECKSUMS, _checksum(index_map)))
     return write_bytes(target, buffer.getvalue())
 
 
@@ -48,8 +48,8 @@ def read_map_table(source: Path) -> Map:
     """Return the map of a table."""
     table = read_table(source)
     coordinates = {name: f"{name} [{at.unit}]" for name, at in COORDINATES.items()}
-    wanted = {**coordinates, **{index.name: headed(index) for index in ALL.values()}}
-    columns = {name: _column(table, name, full) for name, full in wanted.items()}
+    headings = {**coordinates, **{index.name: headed(index) for index in ALL.values()}}
+    columns = {name: _column(table, name, full) for name, full in headings.items()}
     columns = {name: column for name, column in columns.items() if column}
     names = tuple(name for name in COORDINATES if name in columns)
     indices = [name for name in columns if name in ALL]
@@ -58,52 +58,55 @@ def read_map_table(source: Path) -> Map:
     poses = table.numbers([columns[name] for name in names])
     status = _whole(table, len(names))
     grid, order = _grid(table, names, poses)
-    found = table.numbers([columns[name] for name in indices], "nan")[order]
-    values = {name: own.reshape(grid.shape) for name, own in zip(indices, found.T, strict=True)}
-    made = Map(source.stem, grid, values, status[order].reshape(grid.shape))
+    columns_of_indices = table.numbers([columns[name] for name in indices], "nan")[order]
+    values = {
+        name: numbers.reshape(grid.shape)
+        for name, numbers in zip(indices, columns_of_indices.T, strict=True)
+    }
+    index_map = Map(source.stem, grid, values, status[order].reshape(grid.shape))
     if source.suffix.lower() != ".csv":
-        _expect_whole(source, made)
-    return made
+        _expect_whole(source, index_map)
+    return index_map
 
 
 def _column(table: Table, name: str, heading: str) -> str:
     """Return the column of a coordinate or an index; empty where there is none."""
-    found = [one for one in table.columns if one.partition(" [")[0] == name]
-    if len(found) > 1:
-        raise DataError(f"{table.source}: columns {listed(found)} are all {name}; keep one")
-    if found and found[0] not in (name, heading):
-        raise DataError(f"{table.source}: column {listed(found)} given, {heading} expected")
-    return found[0] if found else ""
+    columns = [column for column in table.columns if column.partition(" [")[0] == name]
+    if len(columns) > 1:
+        raise DataError(f"{table.source}: columns {listed(columns)} are all {name}; keep one")
+    if columns and columns[0] not in (name, heading):
+        raise DataError(f"{table.source}: column {listed(columns)} given, {heading} expected")
+    return columns[0] if columns else ""
 
 
 def _whole(table: Table, legs: int) -> NDArray[np.int8]:
     """Return the status of each row."""
-    found = table.numbers([_STATUS])[:, 0]
-    wrong = (found != np.rint(found)) | (found < BEYOND_LIMITS) | (found > legs)
+    numbers = table.numbers([_STATUS])[:, 0]
+    wrong = (numbers != np.rint(numbers)) | (numbers < BEYOND_LIMITS) | (numbers > legs)
     if wrong.any():
         row = int(np.argmax(wrong))
         raise DataError(
-            f"{table.place(row)}, column {_STATUS}: {found[row]:g} given, {BEYOND_LIMITS} to "
+            f"{table.place(row)}, column {_STATUS}: {numbers[row]:g} given, {BEYOND_LIMITS} to "
             f"{legs} expected"
         )
-    return found.astype(np.int8)
+    return numbers.astype(np.int8)
 
 
 def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDArray[np.int64]]:
     """Return the grid of a table's poses (N, m), and its rows in the order of the grid."""
     axes: list[Axis] = []
-    held: list[float] = []
+    middles: list[float] = []
     ranks = []
-    for name, own in zip(names, poses.T, strict=True):
-        values, numbers = np.unique(own, return_inverse=True)
-        held.append(0.5 * float(values[0]) + 0.5 * float(values[-1]))
+    for name, coordinates in zip(names, poses.T, strict=True):
+        values, numbers = np.unique(coordinates, return_inverse=True)
+        middles.append(0.5 * float(values[0]) + 0.5 * float(values[-1]))
         if len(values) > 1:
             axes.append(_axis(table, name, values))
             ranks.append(numbers)
-    grid = Grid(names, tuple(held), tuple(axes))
-    found = np.array(ranks, dtype=np.int64).reshape(len(axes), len(poses))
-    order = np.lexsort(found[::-1]) if axes else np.arange(len(poses))
-    again = (np.diff(found[:, order]) == 0).all(axis=0)
+    grid = Grid(names, tuple(middles), tuple(axes))
+    places = np.array(ranks, dtype=np.int64).reshape(len(axes), len(poses))
+    order = np.lexsort(places[::-1]) if axes else np.arange(len(poses))
+    again = (np.diff(places[:, order]) == 0).all(axis=0)
     if again.any():
         first, second = sorted(order[int(np.argmax(again)) :][:2].tolist())
         raise DataError(
@@ -112,12 +115,12 @@ def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDA
         )
     if grid.size > len(poses):
         lost = dict(grid.held)
-        for axis, rank in zip(axes, _first_missing(grid.shape, found[:, order]), strict=True):
+        for axis, rank in zip(axes, _first_missing(grid.shape, places[:, order]), strict=True):
             lost[axis.name] = float(axis.values[rank])
-        told = ", ".join(f"{name} = {lost[name]:g}" for name in names)
+        first_missing = ", ".join(f"{name} = {lost[name]:g}" for name in names)
         raise DataError(
             f"{table.source}: {grid.size - len(poses)} of {grid.size} poses of a grid are missing, "
-            f"the first at {told}"
+            f"the first at {first_missing}"
         )
     return grid, order
 
@@ -125,34 +128,37 @@ def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDA
 def _first_missing(shape: tuple[int, ...], ranks: NDArray[np.int64]) -> tuple[int, ...]:
     """Return the place in a grid of the first pose that sorted places (axes, N) lack."""
     places, known = product(*map(range, shape)), map(tuple, ranks.T.tolist())
-    return next(place for place, one in zip_longest(places, known) if place != one)
+    return next(
+        place for place, place_present in zip_longest(places, known) if place != place_present
+    )
 
 
 def _axis(table: Table, name: str, values: Array) -> Axis:
     """Return the axis of a coordinate's values, after a check that their steps are equal."""
     axis = Axis(name, float(values[0]), float(values[-1]), len(values))
-    apart = np.abs(values - axis.values)
-    if apart.max() > _EQUAL * (axis.greatest - axis.least) / (axis.count - 1):
+    differences = np.abs(values - axis.values)
+    if differences.max() > _EQUAL * (axis.greatest - axis.least) / (axis.count - 1):
         raise DataError(
-            f"{table.source}: {name} = {values[int(apart.argmax())]:g} is not in equal steps with "
+            f"{table.source}: {name} = {values[int(differences.argmax())]:g} is not in equal steps with "
             "the others, so that these are not the poses of a grid"
         )
     return axis
 
 
-def _checksum(given: Map) -> str:
+def _checksum(index_map: Map) -> str:
     """Return the checksum of what a table holds of a map."""
     values: dict[str, Any] = {
-        name: np.where(np.isfinite(own), own, np.nan) for name, own in given.values.items()
+        name: np.where(np.isfinite(array), array, np.nan)
+        for name, array in index_map.values.items()
     }
-    return checksum(given.grid.plain(), {**values, _STATUS: given.status})
+    return checksum(index_map.grid.plain(), {**values, _STATUS: index_map.status})
 
 
-def _expect_whole(source: Path, found: Map) -> None:
+def _expect_whole(source: Path, index_map: Map) -> None:
     """Refuse a Parquet file whose checksum, if it has one, is not that of what it holds."""
     import polars as pl
 
     metadata = pl.read_parquet_metadata(source)
-    told = {metadata[key] for key in _CHECKSUMS if key in metadata}
-    if told - {_checksum(found)} or (not told and _WRITER not in metadata):
+    recorded = {metadata[key] for key in _CHECKSUMS if key in metadata}
+    if recorded - {_checksum(index_map)} or (not recorded and _WRITER not in metadata):
         raise DataError(f"{source}: is damaged: it does not hold what was written; save it again")

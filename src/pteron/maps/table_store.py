@@ -47,22 +47,22 @@ class TableStore:
     def __init__(self, folder: str | Path, plan: Mapping[str, Any]) -> None:
         self.folder = make_folder(folder)
         file = self.folder / _PLAN
-        wanted = json.loads(json.dumps(plan))
-        self._plan = json.dumps(wanted, sort_keys=True)
+        plan_as_json = json.loads(json.dumps(plan))
+        self._plan = json.dumps(plan_as_json, sort_keys=True)
         if file.exists():
             try:
-                found = json.loads(file.read_text(encoding="utf-8"))
+                stored = json.loads(file.read_text(encoding="utf-8"))
             except (OSError, ValueError, RecursionError):
                 raise OutputError(
                     f"{file}: is damaged; remove {self.folder}, or name another place"
                 ) from None
-            expect_same(self.folder, found, wanted)
+            expect_same(self.folder, stored, plan_as_json)
         elif any(self.folder.iterdir()):
             raise OutputError(
                 f"{self.folder}: holds other files; name a folder that is empty or not there yet"
             )
         else:
-            write_text(file, json.dumps(wanted, indent=1) + "\n")
+            write_text(file, json.dumps(plan_as_json, indent=1) + "\n")
 
     def finished(self) -> frozenset[int]:
         """Return the numbers of the chunks that are there as they were written."""
