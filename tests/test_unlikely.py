@@ -18,7 +18,7 @@ from pteron.motion import line_path, with_payload
 from pteron.playback import playback
 from pteron.tables import Table
 from pteron.workspace import Box, home_pose, pose_margins, prove
-from pteron.workspace.mode_places import elbow_warnings, mode_places
+from pteron.workspace.mode_places import mode_places, mode_warnings
 
 
 def mirrored(robot):
@@ -146,14 +146,14 @@ def test_a_shaft_that_makes_many_turns_has_the_limits_it_has():
 def test_elbows_that_raise_a_hanging_machine_are_doubted(name):
     upside = mirrored(CATALOG[name])
     modes = mode_places(upside, home_pose(upside))
-    (told,) = elbow_warnings(modes)
+    (told,) = mode_warnings(modes)
     assert told.startswith("elbow: the platform stands ")
     assert told.endswith("is that the working mode that is meant?")
     (named,), (likely,) = ([m for m in modes if getattr(m, key)] for key in ("named", "likely"))
     assert (named.place, likely.place) == ("above", "below")
     assert f"with elbows {likely.signs} it hangs" in told
     right = mode_places(CATALOG[name], home_pose(CATALOG[name]))
-    assert elbow_warnings(right) == ()
+    assert mode_warnings(right) == ()
     (named,) = (mode for mode in right if mode.named)
     assert named.likely
     assert named.place == "below"
@@ -168,7 +168,7 @@ def test_elbows_that_raise_a_hanging_machine_are_doubted(name):
 )
 def test_machines_that_stand_or_have_no_such_side_are_not(name):
     modes = mode_places(CATALOG[name], home_pose(CATALOG[name]))
-    assert elbow_warnings(modes) == ()
+    assert mode_warnings(modes) == ()
     if name == "linear-delta":
         assert [mode.place for mode in modes if mode.named] == ["below"]
 

@@ -37,8 +37,8 @@ def expect_same(path: str | Path, stored: Any, plan: Mapping[str, Any]) -> None:
             differences.append(f"and {len(lines) - _MANY} more of the {shown(key, bare=True)}")
     if differences:
         raise OutputError(
-            f"{path}: holds results of another plan ({'; '.join(differences)}); name another place, "
-            "or remove it"
+            f"{path}: holds results of another plan ({'; '.join(differences)}); name another "
+            "place, or remove it"
         )
 
 

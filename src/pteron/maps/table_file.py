@@ -139,8 +139,8 @@ def _axis(table: Table, name: str, values: Array) -> Axis:
     differences = np.abs(values - axis.values)
     if differences.max() > _EQUAL * (axis.greatest - axis.least) / (axis.count - 1):
         raise DataError(
-            f"{table.source}: {name} = {values[int(differences.argmax())]:g} is not in equal steps with "
-            "the others, so that these are not the poses of a grid"
+            f"{table.source}: {name} = {values[int(differences.argmax())]:g} is not in equal steps "
+            "with the others, so that these are not the poses of a grid"
         )
     return axis
 

@@ -14,7 +14,7 @@ from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.workspace.holding import Holding, holding, holding_warnings
 from pteron.workspace.leg_layout import layout_warnings
 from pteron.workspace.load_warnings import load_warnings
-from pteron.workspace.mode_places import ModePlace, elbow_warnings, mode_places
+from pteron.workspace.mode_places import ModePlace, mode_places, mode_warnings
 from pteron.workspace.screw_lengths import screw_warnings
 
 _TILTS = (
@@ -54,7 +54,7 @@ def examine(robot: Manipulator, home: Array) -> Examination:
         *((_TILTS,) if layout.holds is False else ()),
         *layout_warnings(robot, home),
         *holding_warnings(measures),
-        *elbow_warnings(modes),
+        *mode_warnings(modes),
         *load_warnings(robot, home),
         *screw_warnings(robot),
     )

@@ -111,7 +111,7 @@ def _depth(robot: Manipulator, pose: Array) -> float:
     return float(away @ np.array(robot.gravity) / np.linalg.norm(robot.gravity))
 
 
-def elbow_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
+def mode_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
     """Return a warning that another working mode may be meant, where the platform stands upright.
 
     Most machines hang below their base. One that stands above it, and that would hang there with
