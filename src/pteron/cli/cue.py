@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
+from typing import TYPE_CHECKING
 
 from pteron.cli.arguments import Machine
 from pteron.cli.motion_table import motion_frame, peaks_table
@@ -10,6 +12,10 @@ from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import note
 from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
+    from pteron.motion import Cue
 
 
 def cue(
@@ -32,7 +38,7 @@ def cue(
     The file holds t (s), accelerations ax ay az without gravity (m/s^2) and angular rates wx wy wz
     (rad/s) in the vehicle's axes: x ahead, y to the left, z up. What is quick is moved, what lasts
     is tilted into, and the platform comes back to the middle. It never leaves a box of poses that
-    is proved to lie in the workspace: what is too large for it is pressed together.
+    is proved to lie in the workspace: amplitudes are reduced where they are too large for it.
 
     Arguments
     ---------
@@ -63,7 +69,7 @@ def cue(
     import numpy as np
 
     from pteron.motion import Washout, cue as shown, limits_of, peaks
-    from pteron.tables import check_output, write_table
+    from pteron.tables import check_output
 
     if out is None and page is None:
         raise DataError("nothing to write; give --out FILE.csv, --page FILE.html or both")
@@ -79,14 +85,7 @@ def cue(
     with spinner(f"Showing {motion} with {machine.name}"):
         cued = shown(machine, motion, washout=washout, type_ii=type_ii)
         largest = peaks(machine, cued.pose, cued.velocity, cued.acceleration, limits_of(machine))
-        files = []
-        if out is not None:
-            write_table(motion_frame(machine, cued), out)
-            files.append(out)
-        if page is not None:
-            from pteron.report.write import write_motion_page
-
-            files.append(str(write_motion_page(machine, cued, page)))
+        files = _write(machine, cued, out, page)
     for peak in largest:
         if peak.share > 1.0:
             note(f"Note: {peak.told()}; a smaller --scale asks less")
@@ -101,17 +100,38 @@ def cue(
         "pressed": cued.pressed,
         "files": files,
     }
-    units = (machine.platform.units, low, high)
-    sides = ", ".join(
-        f"{name} {1e3 * a:.4g} to {1e3 * b:.4g} mm"
-        if unit == "m"
-        else f"{name} {57.29578 * a:.4g} to {57.29578 * b:.4g} deg"
-        for name, unit, a, b in zip(machine.coordinates, *units, strict=True)
-    )
-    length = f"{cued.duration:.4g} s, {len(cued.time)} samples"
     lines = [
-        f"{length}, within a box that is proved: {sides}",
-        f"pressed together by at most {cued.pressed:.0%}",
+        f"{cued.duration:.4g} s, {len(cued.time)} samples, within a box that is proved: "
+        f"{_box_text(machine, cued)}",
+        f"amplitudes reduced by at most {cued.pressed:.0%}, so that the motion stays in the box",
         peaks_table(largest),
     ]
     return Result(data, lines, files)
+
+
+def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:
+    """Write the motion's table and page where they are asked for; return their names."""
+    files = []
+    if out is not None:
+        from pteron.tables import write_table
+
+        write_table(motion_frame(machine, cued), out)
+        files.append(out)
+    if page is not None:
+        from pteron.report.write import write_motion_page
+
+        files.append(str(write_motion_page(machine, cued, page)))
+    return files
+
+
+def _box_text(machine: Manipulator, cued: Cue) -> str:
+    """Return the box that the motion stays in, mm and degrees."""
+    low, high = cued.region.box
+    return ", ".join(
+        f"{name} {1e3 * a:.4g} to {1e3 * b:.4g} mm"
+        if unit == "m"
+        else f"{name} {math.degrees(a):.4g} to {math.degrees(b):.4g} deg"
+        for name, unit, a, b in zip(
+            machine.coordinates, machine.platform.units, low, high, strict=True
+        )
+    )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from pteron.cli.arguments import Machine, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, replayed
@@ -24,6 +25,21 @@ if TYPE_CHECKING:
 
 Kind = Literal["adept", "line", "joints", "replay"]
 """Kinds of motion: pick-and-place, straight line, motion of the joints, or one from a table."""
+
+_KINDS_OF: dict[str, tuple[Kind, ...]] = {
+    "to": ("line", "joints"),
+    "via": ("line",),
+    "from": ("line", "joints", "replay"),
+    "corner": ("line",),
+    "back": ("line",),
+    "around": ("adept",),
+    "scale": ("adept",),
+    "table": ("replay",),
+    "optimal": ("line", "adept"),
+    "duration": ("line", "adept"),
+    "jerk": ("joints",),
+}
+"""Kinds of motion that an option belongs to."""
 
 _ROUNDING = 1e-6
 """Share of a limit by which a motion may exceed it without a note."""
@@ -125,22 +141,15 @@ def cycle(
         tool_acceleration=tool_acceleration,
     )
     way = kind or ("replay" if table else "line" if to or via else "adept")
-    _expect_fitting(
-        way,
-        {
-            "to": (to, ("line", "joints")),
-            "via": (via, ("line",)),
-            "from": (from_, ("line", "joints", "replay")),
-            "corner": (corner, ("line",)),
-            "back": (back, ("line",)),
-            "around": (around, ("adept",)),
-            "scale": (scale, ("adept",)),
-            "table": (table, ("replay",)),
-            "optimal": (optimal, ("line", "adept")),
-            "duration": (duration, ("line", "adept")),
-            "jerk": (jerk, ("joints",)),
-        },
-    )
+    options: dict[str, object] = {
+        "to": to,
+        "via": via,
+        "from": from_,
+        "corner": corner,
+        "back": back,
+    }
+    options |= {"around": around, "scale": scale, "table": table, "optimal": optimal}
+    _expect_fitting(way, options | {"duration": duration, "jerk": jerk})
     if optimal and duration is not None:
         raise DataError("--duration and --optimal given; give one of them")
     with spinner(f"A motion of {machine.name}"):
@@ -161,13 +170,13 @@ def cycle(
     return _result(machine, way, motion, limits, carried, out)
 
 
-def _expect_fitting(way: str, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
+def _expect_fitting(way: str, options: Mapping[str, object]) -> None:
     """Refuse options of another kind of motion."""
-    for name, (value, kinds) in options.items():
-        if value not in (None, False, 0.0) and way not in kinds:
+    for name, value in options.items():
+        if value not in (None, False, 0.0) and way not in _KINDS_OF[name]:
             raise DataError(
                 f"--{name}: has no use in a motion of kind {way}; leave it out, or give --kind "
-                f"{' or '.join(kinds)}"
+                f"{' or '.join(_KINDS_OF[name])}"
             )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 from pteron.cli.arguments import Machine
 from pteron.cli.progress import progress_bar
@@ -12,9 +13,17 @@ from pteron.cli.terminal import note, table
 from pteron.errors import ModelError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.table import Table
 
-    from pteron.identification.excitation import Excitation, Limits, Margins, RepeatedCycle
+    from pteron.identification.excitation import (
+        Excitation,
+        Layout,
+        Limits,
+        Margins,
+        RepeatedCycle,
+    )
     from pteron.manipulator import Manipulator
 
 _CLEARANCE = "joint_clearance"
@@ -28,37 +37,91 @@ _MEASURES = {
 """Names of limits in the output, where they are not those of the code."""
 
 
+@dataclass(frozen=True)
+class _SeriesOptions:
+    """Of the Fourier series and its repetition."""
+
+    space: Literal["platform", "joints"] = "platform"
+    harmonics: int = 5
+    period: float = 5.0
+    periods: int = 3
+    stribeck: bool = False
+
+
+@dataclass(frozen=True)
+class _LimitOptions:
+    """Of the limits that the motion keeps."""
+
+    speed: float | None = None
+    acceleration: float = 10.0
+    force: float | None = None
+    type_i: float = 0.25
+    type_ii: float = 0.3
+    clearance: float = 0.005
+    keep_off: float = 0.02
+    passive_clearance: float = 0.02
+
+    def limits(self, machine: Manipulator) -> Limits:
+        """Return the limits of a machine, its drives' where none are given."""
+        from pteron.identification.excitation import Limits
+
+        return Limits.of(
+            machine,
+            speed=self.speed,
+            acceleration=self.acceleration,
+            force=self.force,
+            type_i=self.type_i,
+            type_ii=self.type_ii,
+            joint_clearance=self.clearance,
+            joint_share=self.keep_off,
+            passive_clearance=self.passive_clearance,
+        )
+
+
+@dataclass(frozen=True)
+class _FileOptions:
+    """Of the table's columns and form."""
+
+    rate: float = 1000.0
+    contents: Literal["all", "joints", "poses"] = "all"
+    columns: str | None = None
+    length_unit: Literal["m", "mm", "um"] = "m"
+    angle_unit: Literal["rad", "deg"] = "rad"
+    time_unit: Literal["s", "ms", "us"] = "s"
+    separator: Literal[",", ";", "tab", "|"] | None = None
+    decimal: Literal[".", ","] = "."
+
+    @property
+    def layout(self) -> Layout:
+        """The layout of the table."""
+        from pteron.identification.excitation import Layout
+
+        names = None if self.columns is None else tuple(n.strip() for n in self.columns.split(","))
+        separator = "\t" if self.separator == "tab" else self.separator
+        units = self.length_unit, self.angle_unit, self.time_unit
+        return Layout(self.contents, names, *units, separator, self.decimal)
+
+
+@dataclass(frozen=True)
+class _SearchOptions:
+    """Of the search for the best motion."""
+
+    criterion: Literal["condition", "logdet"] = "condition"
+    starts: int = 12
+    draws: int = 100
+    seconds: float = 60.0
+    seed: int = 0
+    workers: int | None = None
+
+
 def excite(
     machine: Machine,
     *,
     out: str | None = None,
-    space: Literal["platform", "joints"] = "platform",
-    harmonics: int = 5,
-    period: float = 5.0,
-    periods: int = 3,
-    stribeck: bool = False,
-    speed: float | None = None,
-    acceleration: float = 10.0,
-    force: float | None = None,
-    type_i: float = 0.25,
-    type_ii: float = 0.3,
-    clearance: float = 0.005,
-    keep_off: float = 0.02,
-    passive_clearance: float = 0.02,
-    rate: float = 1000.0,
-    contents: Literal["all", "joints", "poses"] = "all",
-    columns: str | None = None,
-    length_unit: Literal["m", "mm", "um"] = "m",
-    angle_unit: Literal["rad", "deg"] = "rad",
-    time_unit: Literal["s", "ms", "us"] = "s",
-    separator: Literal[",", ";", "tab", "|"] | None = None,
-    decimal: Literal[".", ","] = ".",
-    criterion: Literal["condition", "logdet"] = "condition",
-    starts: int = 12,
-    draws: int = 100,
-    seconds: float = 60.0,
-    seed: int = 0,
-    workers: int | None = None,
+    series: _SeriesOptions,
+    limited: _LimitOptions,
+    file: _FileOptions,
+    search: _SearchOptions,
     json: bool = False,
 ) -> Result:
     """Find a periodic trajectory from whose forces the base parameters are seen best.
@@ -126,96 +189,83 @@ def excite(
     pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60
     pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,
     """
-    import numpy as np
+    from pteron.identification.excitation import check_sampling, motion_paths, optimal_excitation
 
-    from pteron.identification.excitation import (
-        Layout,
-        Limits,
-        check_sampling,
-        motion_paths,
-        optimal_excitation,
-    )
-    from pteron.motion.overloads import overloads_of
-
-    check_sampling(period, rate, periods)
-    layout = Layout(
-        contents,
-        None if columns is None else tuple(name.strip() for name in columns.split(",")),
-        length_unit,
-        angle_unit,
-        time_unit,
-        "\t" if separator == "tab" else separator,
-        decimal,
-    )
-    layout.description(machine)
+    check_sampling(series.period, file.rate, series.periods)
+    file.layout.description(machine)
     if out is not None:
-        motion_paths(out, layout)
-    limits = Limits.of(
-        machine,
-        speed=speed,
-        acceleration=acceleration,
-        force=force,
-        type_i=type_i,
-        type_ii=type_ii,
-        joint_clearance=clearance,
-        joint_share=keep_off,
-        passive_clearance=passive_clearance,
-    )
+        motion_paths(out, file.layout)
+    limits = limited.limits(machine)
     if out is None and not json:
         note("Note: no file will be written; to have the trajectory, add --out FILE.csv")
     with progress_bar(f"Exciting {machine.name}") as progress:
-        found = optimal_excitation(
+        excitation = optimal_excitation(
             machine,
-            space=space,
-            harmonics=harmonics,
-            period=period,
+            space=series.space,
+            harmonics=series.harmonics,
+            period=series.period,
             limits=limits,
-            criterion=criterion,
-            starts=starts,
-            draws=draws,
-            seed=seed,
-            seconds=seconds,
-            workers=workers,
             progress=progress,
+            **vars(search),
         )
-    if found.interrupted:
+    if excitation.interrupted:
         note("Note: interrupted; this is the best until then")
-    led, cycles = found.with_leads(periods), _held_out(found, rate)
-    slow = found.slow() if stribeck else None
-    left = {"motion": led.margins(limits, rate)}
-    if cycles is not None:
-        left["held out"] = cycles.margins(limits, rate)
-    if slow is not None:
-        left["slow"] = slow.margins(limits, rate)
-    for name, margins in left.items():
-        if not margins.kept:
+    return _result(machine, excitation, limits, series, file, out)
+
+
+def _result(
+    machine: Manipulator,
+    excitation: Excitation,
+    limits: Limits,
+    series: _SeriesOptions,
+    file: _FileOptions,
+    out: str | None,
+) -> Result:
+    """Check the motions between samples, write them, and return what is said of them."""
+    import numpy as np
+
+    from pteron.motion.overloads import overloads_of
+
+    rate = file.rate
+    led, cycles = excitation.with_leads(series.periods), _held_out(excitation, rate)
+    slow = excitation.slow() if series.stribeck else None
+    motions = {"motion": led, "held out": cycles, "slow": slow}
+    margins = {name: m.margins(limits, rate) for name, m in motions.items() if m is not None}
+    for name, of_motion in margins.items():
+        if not of_motion.kept:
             raise ModelError(
                 f"{name}: the limits are not kept between samples; choose another --seed"
             )
     time = np.linspace(0.0, led.duration, int(led.duration * rate) + 1)
     for text in overloads_of(machine, led.at(time)):
         note(f"Note: {text}")
-    files = [] if out is None else found.write(out, rate, periods, layout, cycles, slow)
-    more: dict[str, Any] = {"start": led.start, "end": led.end, "duration": led.duration}
-    more |= {"held_out": cycles and cycles.as_dict(), "slow": slow and slow.duration}
-    data = {**found.as_dict(), **more, "files": [str(path) for path in files]}
-    told: list[str | Table] = [
-        _quality(found),
-        found.progress_text,
-        _margins(left),
-        *_kept_off(machine, limits, left),
+    files: list[Path] = []
+    if out is not None:
+        files = excitation.write(out, rate, series.periods, file.layout, cycles, slow)
+    data = {
+        **excitation.as_dict(),
+        "start": led.start,
+        "end": led.end,
+        "duration": led.duration,
+        "held_out": cycles and cycles.as_dict(),
+        "slow": slow and slow.duration,
+        "files": [str(path) for path in files],
+    }
+    lines: list[str | Table] = [
+        *(_quality(excitation), excitation.progress_text, _margins(margins)),
+        *_kept_off(machine, limits, margins),
         f"From rest to rest in {led.duration:g} s: periodic from {led.start:g} to {led.end:g} s, "
         "lead-in before, lead-out behind.",
     ]
     if cycles is not None:
-        told.append(
+        lines.append(
             f"To hold out: {cycles.count} pick-and-place cycles of {cycles.length:.4g} s, "
             f"{cycles.cycle.scale:.0%} of the standard size."
         )
     if slow is not None:
         slowly = f"the same way in {slow.duration:g} s, for friction that falls with speed."
-        told.append(f"Slowly: {slowly}")
-    return Result(data, told, files)
+        lines.append(f"Slowly: {slowly}")
+    return Result(data, lines, files)
 
 
 def _held_out(excitation: Excitation, rate: float) -> RepeatedCycle | None:

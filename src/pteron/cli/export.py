@@ -97,15 +97,9 @@ def export(
     """
     folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
     targets = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
-    options = {
-        "function": function,
-        "float": float_,
-        "specialised": specialised,
-        "wrench": wrench,
-        "output": output != "force",
-        "base": base,
-        "gains": gains,
-    }
+    options: dict[str, object] = {"function": function, "float": float_, "gains": gains}
+    options |= {"specialised": specialised, "wrench": wrench, "base": base}
+    options |= {"output": output != "force"}
     _check(targets, [name for name, is_set in options.items() if is_set])
     if tool is not None and base is not None:
         raise DataError(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, cleandoc, signature
 from typing import Annotated, Any, get_type_hints
@@ -62,14 +63,22 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
 
     Its `machine` is loaded from ROBOT in the working mode of --elbows, what it carries is read from
     --payload and --tool, and its result is printed for a person or, with --json, for a program.
+    A parameter whose type is a dataclass stands for an option for each of its fields.
     """
     hints, arguments = get_type_hints(command), signature(command).parameters
     options: dict[str, Parameter] = {}
+    groups = {name: hints[name] for name in arguments if _is_group(hints[name])}
     for name, argument in arguments.items():
         if hints[name] is Machine:
             options["robot"] = argument.replace(name="robot", annotation=str)
         elif hints[name] is Carried:
             options |= {each: _option(each, str | None) for each in ("payload", "tool")}
+        elif name in groups:
+            kinds = get_type_hints(groups[name])
+            options |= {
+                field.name: _option(field.name, kinds[field.name], default=field.default)
+                for field in fields(groups[name])
+            }
         else:
             options[name] = argument.replace(annotation=hints[name])
     if "machine" in arguments:
@@ -83,6 +92,8 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
             vars(command)["before"](passed)
         if "carried" in arguments:
             passed["carried"] = Carried.of(values["payload"], values["tool"])
+        for name, group in groups.items():
+            passed[name] = group(**{field.name: values[field.name] for field in fields(group)})
         if "machine" in arguments:
             quiet = "warns" in vars(command)  # the command tells the file's warnings itself
             passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
@@ -93,6 +104,11 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
     run.__dict__["__signature__"] = Signature(list(options.values()))
     run.__annotations__ = {name: option.annotation for name, option in options.items()}
     return run
+
+
+def _is_group(hint: Any) -> bool:
+    """Say whether a parameter's type is a group of options."""
+    return isinstance(hint, type) and is_dataclass(hint) and hint not in (Machine, Carried)
 
 
 def _option(name: str, kind: Any, *, default: Any = None) -> Parameter:
