@@ -25,20 +25,19 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-_SOURCES = Path(__file__).parents[1] / "src" / "pteron"
+_SOURCES = Path(__file__).resolve().parents[1] / "src" / "pteron"
 _KINDS = ("vague", "arguments", "bare", "twice", "long", "branched", "lines")
 _VAGUE = """found one given own told rest kept asked made such more whole wanted held left apart
 still before along across result value values data item output entry""".split()
 _PREPOSITIONS = """about above across after against along among around at before behind below beside
 between beyond by down during for in inside into near of off on onto out outside over past per since
 through towards under until up upon within without""".split()
-_EMPTY = """a an the as from to with and is all another any both each it its itself
-less many more most none one other others own rest same some such that them these they this those
-what which whole alike apart away back bare even far here how likely not once only so still straight
-then there thus too well when where why begun bent bought brought built caught come cut done felt
-found gone heard held hung kept known laid led left lent let lost made meant met paid put read run
-said sent set shown sold spent split spread stood taught thought told understood won worn
-wound""".split()
+_EMPTY = """a an the as from to with and all another any both each it its itself less many more most
+none one other others own rest same some such that them these they this those what which whole alike
+apart away back bare even far here how likely not once only so still straight then there thus too
+well when where why begun bent bought brought built caught come cut done felt found gone heard held
+hung kept known laid led left lent let lost made meant met paid said sent shown sold spent split
+spread stood taught thought told understood won worn wound""".split()
 _NOUNS = """bearing embed feed grouping heading need open reading ring screen seed setting spacing
 speed spring string token""".split()
 _Function = ast.FunctionDef | ast.AsyncFunctionDef

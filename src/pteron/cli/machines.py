@@ -102,7 +102,7 @@ def new(
         return catalog()
     from pteron.atomic import write_text
     from pteron.manipulator import load
-    from pteron.manipulator.explained import explained, kept
+    from pteron.manipulator.commented_file import commented_text, kept_numbers_sentence
 
     given = {
         "base_radius": base_radius,
@@ -116,14 +116,14 @@ def new(
     given = {key: value for key, value in given.items() if value not in (None, {})}
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
-    text = explained(kind, given)
+    text = commented_text(kind, given)
     if out is not None:
         write_text(out, text)
     data = {"kind": kind, "file": out, "text": text}
     if out is None:
         return Result(data, partial(write, text))
     told = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
-    return Result(data, [told, *map(plain, kept(load(kind), given))])
+    return Result(data, [told, *map(plain, kept_numbers_sentence(load(kind), given))])
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
@@ -248,7 +248,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
-    from pteron.manipulator.explained import pointing
+    from pteron.manipulator.commented_file import crank_direction_text
 
     rows = (
         (
@@ -277,7 +277,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         f"working mode {signs(robot)}",
         table(*headings, rows=rows, numbers=("leg",)),
         *(f"A {joint.noun} {joint.zero}." for joint in joints if joint.zero),
-        *([f"At 0 cranks point {zero}."] if (zero := pointing(robot)) else []),
+        *([f"At 0 cranks point {zero}."] if (zero := crank_direction_text(robot)) else []),
         *_drives(robot),
         *singular,
         *_home_lines(robot, found),

@@ -9,7 +9,7 @@ from pteron.design.design import Design
 from pteron.design.proofs import start_design
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import told_legs
+from pteron.manipulator.manipulator import legs_text
 from pteron.renamed import former_attribute
 
 _NONE = 1e-9
@@ -81,7 +81,7 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
                 key = what, round(before, 9), round(after, 9), unit
                 found.setdefault(key, []).append(place.leg)
     return [
-        Change(f"{what} of {told_legs(legs)}", before, after, unit)
+        Change(f"{what} of {legs_text(legs)}", before, after, unit)
         for (what, before, after, unit), legs in found.items()
     ]
 
@@ -95,7 +95,7 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
             if abs(after - before) > _NONE:
                 found.setdefault((leg.names[letter], before, round(after, 9)), []).append(i)
     return [
-        Change(f"mass of {name} of {told_legs(legs)}", before, after, "kg")
+        Change(f"mass of {name} of {legs_text(legs)}", before, after, "kg")
         for (name, before, after), legs in found.items()
     ]
 

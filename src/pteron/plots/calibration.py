@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_guides, enlarged_points, greatest_difference
@@ -91,7 +91,7 @@ def differences_figure(
     """
     one, other = as_manipulator(drawn), as_manipulator(found)
     expect_alike(one, other)
-    shown = home_pose(one) if pose is None else checked(one, pose, "pose").ravel()
+    shown = home_pose(one) if pose is None else finite_rows(one, pose, "pose").ravel()
     points, there = joint_points(one, shown), joint_points(other, shown)
     guides = joint_guides(one, shown)
     size = scene_of(points, guides, None).size

@@ -9,7 +9,7 @@ import numpy as np
 from pteron.dynamics import inverse_dynamics
 from pteron.kernels import Array, bare
 from pteron.kinematics.ram_figures import similarity
-from pteron.kinematics.sampling import drawn_poses
+from pteron.kinematics.sampling import draw_poses
 from pteron.kinematics.singular_distance import coordinate_distances
 from pteron.kinematics.unit_rows import least_singular_values, unit_rows
 from pteron.manipulator import Manipulator
@@ -69,7 +69,7 @@ def holding(robot: Manipulator, home: Array) -> Holding:
     """Return how the drives hold the platform at home (m,) and about it."""
     poses = home[None]
     length = unit_rows(robot, poses).length
-    drawn = drawn_poses(bare(robot), _POSES, np.random.default_rng(0), limits=False)
+    drawn = draw_poses(bare(robot), _POSES, np.random.default_rng(0), limits=False)
     distances = coordinate_distances(robot, np.vstack([poses, drawn]))
     near = _about(robot, home)
     weight = _weight(robot)

@@ -175,7 +175,7 @@ def run(
             break
     done, fault = int(arrays["done"].item()), arrays["fault"].item()
     columns = {name: value[0, :done] for name, value in found.items()}
-    kind = DriveKind.of(robot)
+    kind = DriveKind.from_robot(robot)
     parts = kind.parts(columns.pop("states"))
     pose, velocity = parts["pose"], parts["velocity"]
     columns |= {"pose": pose, "velocity": velocity, "memory": columns.pop("memories")}
