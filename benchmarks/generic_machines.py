@@ -16,7 +16,7 @@ from measuring import quick
 
 from pteron.equations.pose_paths import Closed
 from pteron.kernels import Array
-from pteron.kinematics.pose_paths import FILE, Complex, Generic, followed, key_of, rotation
+from pteron.kinematics.pose_paths import FILE, Complex, Generic, follow_paths, key_of, rotation
 
 _ALL = {
     Closed(3, 0, False): 8,
@@ -66,7 +66,7 @@ def known_machine(closed: Closed, count: int, rng: np.random.Generator) -> Gener
     while len(found) < count:
         ends, here = found, machine
         for there in (*(random_machine(closed, rng)[0] for _ in range(2)), machine):
-            ends, _, converged = followed(Generic(closed, here, ends), there[None])
+            ends, _, converged = follow_paths(Generic(closed, here, ends), there[None])
             ends, here = ends[0][converged[0]], there
         for z in ends:
             alike = np.abs(found.conj() @ z) ** 2

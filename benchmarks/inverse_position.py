@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import pteron
 from pteron.kernels import count_operations
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
 from pteron.legs.circles import perpendicular_to
 
 Links = tuple[ca.SX, ca.SX, ca.SX]
@@ -74,7 +74,7 @@ def whole(robot: Quadrupteron, links: Callable[..., Links]) -> ca.Function:
     ]
     outputs = [ca.vertcat(*(leg[0] for leg in legs))]
     outputs += [ca.horzcat(*(leg[k] for leg in legs)) for k in (1, 2)]
-    return optimised(ca.Function("links", [pose], ca.cse(outputs)))
+    return optimise_function(ca.Function("links", [pose], ca.cse(outputs)))
 
 
 def platform_points(robot: Quadrupteron, pose: ca.SX) -> list[ca.SX]:
@@ -167,7 +167,7 @@ def newton_function(robot: Quadrupteron) -> ca.Function:
         lowers.append(ll * (cl * a + sl * b))
     outputs = [ca.horzcat(*stepped), ca.horzcat(*closures), ca.vertcat(*sliders)]
     outputs += [ca.horzcat(*uppers), ca.horzcat(*lowers)]
-    return optimised(ca.Function("newton", [pose, angles], ca.cse(outputs)))
+    return optimise_function(ca.Function("newton", [pose, angles], ca.cse(outputs)))
 
 
 def iterate(

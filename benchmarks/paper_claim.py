@@ -157,7 +157,7 @@ def dense_virtual_work_operations(base: BaseParameters) -> int:
 def sparse_kernels(base: BaseParameters) -> dict[str, Kernel]:
     """Return kernels of the products alone, given the factors, with structural zeros dropped."""
     robot = base.robot
-    machine, m, n = Machine.of(robot), robot.freedom, len(robot.legs)
+    machine, m, n = Machine.numeric(robot), robot.freedom, len(robot.legs)
     symbols = [ca.SX.sym("", m) for _ in range(3)]
     parts = regressor.terms(machine, machine.state(*symbols))
     count = len(parts.links)

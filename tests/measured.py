@@ -6,7 +6,7 @@ import numpy as np
 
 import pteron
 from pteron.calibration import TOLERANCES
-from pteron.equations.variations import variations, varied
+from pteron.equations.variations import variations, vary_geometry
 from pteron.workspace.margins import distance_to_limits
 
 NOISE = 2e-5
@@ -17,7 +17,9 @@ def built(robot, seed=0, share=1.0):
     """Return a machine as it may be built: every value off by a share of its tolerance."""
     rng = np.random.default_rng(seed)
     ways = variations(robot)
-    return varied(robot, ways, share * rng.normal(0.0, [TOLERANCES[way.group] for way in ways]))
+    return vary_geometry(
+        robot, ways, share * rng.normal(0.0, [TOLERANCES[way.group] for way in ways])
+    )
 
 
 def positions(robot, true, count, seed=1):

@@ -15,7 +15,7 @@ from pteron import ModelError
 from pteron.bodies import PlanarInertia
 from pteron.legs.cones import Cone
 from pteron.manipulator.machine_warnings import machine_warnings
-from pteron.manipulator.manipulator import told_legs
+from pteron.manipulator.manipulator import legs_text
 from pteron.manipulator.variants import turned
 from pteron.workspace import home_pose, pose_margins
 from pteron.workspace.load_warnings import load_warnings
@@ -567,7 +567,7 @@ def test_a_drive_s_unlikely_numbers_are_doubted(words):
     legs = legs_of(name, lambda i, leg: replace(leg, drive=pteron.legs.Drive(**keys)) if i else leg)
     found = machine_warnings(replace(CATALOG[name], legs=legs))
     assert all(text.split(": ")[1] == "drive" for text in found)
-    others = told_legs(range(2, len(legs) + 1))
+    others = legs_text(range(2, len(legs) + 1))
     assert next(text.split(":")[0] for text in found if words in text) == others, found
 
 

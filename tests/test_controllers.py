@@ -70,7 +70,7 @@ def times(matrices, vectors):
 def test_two_velocities_meet_as_christoffels_symbols_say(name):
     """J^T F = M a + C(x, v) w + g, with J a + J' w the joints' acceleration."""
     robot = MACHINES[name]
-    machine, n = Machine.of(robot), robot.freedom
+    machine, n = Machine.numeric(robot), robot.freedom
     pose, v, a = states(robot, 20)
     w = np.random.default_rng(1).normal(size=v.shape)
     symbols = [ca.SX.sym(letter, n) for letter in "xvwa"]

@@ -42,7 +42,7 @@ from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.indices import Elasticity, Tolerances, evaluate, pose_error, stiffness
 from pteron.manipulator.machine_record import expect_machine
-from pteron.manipulator.stretched_links import stretched
+from pteron.manipulator.stretched_links import stretch_link
 from pteron.motion import Motor, choose, pick_and_place, size, with_payload
 from pteron.workspace import Box, conditions, largest_cube, prove
 from pteron.workspace.conditions import keeps
@@ -112,7 +112,7 @@ def test_a_stretched_link_is_that_of_a_longer_bar():
         inertia = mass * (length**2 / 3.0 + off**2)
         return pteron.bodies.PlanarInertia.of_body(mass, (length / 2.0, off), inertia)
 
-    np.testing.assert_allclose(stretched(bar(0.2), 1.7).values, bar(0.34).values)
+    np.testing.assert_allclose(stretch_link(bar(0.2), 1.7).values, bar(0.34).values)
 
 
 def test_slopes_of_the_conditions_are_those_of_differences(task):

@@ -83,7 +83,7 @@ def test_the_factors_of_equation_15_multiply_to_the_regressor(name):
 def test_what_a_leg_needs_is_what_its_bodies_need(name):
     """The leg's own, cheaper form against the sum of J_b^T F_b over its bodies."""
     robot = MACHINES[name]
-    machine = Machine.of(robot)
+    machine = Machine.numeric(robot)
     x, dx, ddx = (ca.SX.sym(v, robot.freedom) for v in ("x", "dx", "ddx"))
     state = machine.state(x, dx, ddx)
     inertia, _ = machine.moments(ca.SX.eye(len(machine.parameters)))

@@ -10,7 +10,7 @@ from mechanisms import BATCH_SHAPES, MECHANISMS, relative_error, states
 
 import pteron
 from pteron.equations.friction import passive_joints
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 
 SOME = [
     "quadrupteron turned",
@@ -43,7 +43,7 @@ def passive_rates(robot, pose, velocity):
 def test_a_column_of_passive_friction_does_the_work_of_its_joint(name):
     robot = machine(name)
     pose, velocity, _ = states(robot, 50)
-    columns = unchecked(robot, "passive_friction", pose, velocity)
+    columns = evaluate_unchecked(robot, "passive_friction", pose, velocity)
     rates = passive_rates(robot, pose, velocity)
     sliders = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
     power = np.einsum("rnc,rn->rc", columns, sliders)
@@ -57,10 +57,10 @@ def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
     robot = machine(name)
     n = len(robot.legs)
     pose, velocity, _ = states(robot, 20)
-    columns = unchecked(robot, "passive_friction", pose, velocity)
+    columns = evaluate_unchecked(robot, "passive_friction", pose, velocity)
     rates = passive_rates(robot, pose, velocity)
     sliders = pteron.kinematics.joint_rates(robot, pose, velocity).actuated
-    invert = partial(unchecked, robot, "platform_motion")
+    invert = partial(evaluate_unchecked, robot, "platform_motion")
     for j in range(n):
 
         def moved(steps, j=j):
@@ -78,7 +78,9 @@ def test_motion_of_the_platform_inverts_that_of_the_sliders(name):
     pose, velocity, acceleration = states(robot, 100)
     rates = pteron.kinematics.joint_rates(robot, pose, velocity)
     accelerations = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration)
-    back = unchecked(robot, "platform_motion", pose, rates.actuated, accelerations.actuated)
+    back = evaluate_unchecked(
+        robot, "platform_motion", pose, rates.actuated, accelerations.actuated
+    )
     assert relative_error(back[0], velocity) < 1e-10
     assert relative_error(back[1], acceleration) < 1e-10
 
@@ -88,10 +90,10 @@ def test_columns_broadcast(shape):
     robot = MECHANISMS["quadrupteron-oblique"]
     count = int(np.prod(shape))
     pose, velocity, _ = states(robot, max(count, 1))
-    flat = unchecked(robot, "passive_friction", pose, velocity)[:count]
+    flat = evaluate_unchecked(robot, "passive_friction", pose, velocity)[:count]
     batch = pose[:count].reshape(*shape, 4), velocity[:count].reshape(*shape, 4)
     assert np.array_equal(
-        unchecked(robot, "passive_friction", *batch), flat.reshape(*shape, *flat.shape[1:])
+        evaluate_unchecked(robot, "passive_friction", *batch), flat.reshape(*shape, *flat.shape[1:])
     )
 
 
@@ -100,6 +102,6 @@ def test_a_joint_at_rest_asks_for_nothing():
     robot = MECHANISMS["tripteron"]
     pose, velocity, _ = states(robot, 10)
     direction = np.array(robot.legs[0].direction)
-    columns = unchecked(robot, "passive_friction", pose, velocity[:, :1] * direction)
+    columns = evaluate_unchecked(robot, "passive_friction", pose, velocity[:, :1] * direction)
     assert np.abs(columns[..., :3]).max() < 1e-14 * np.abs(columns).max()
     assert np.abs(columns[..., 3:]).max() > 1e-3

@@ -20,7 +20,7 @@ CHOSEN += TILTED
 
 def served(robots):
     """Return the closures of machines, each with the platform under which it stands."""
-    return {(type(Machine.of(r).closure), r.platform.kind) for r in robots}
+    return {(type(Machine.numeric(r).closure), r.platform.kind) for r in robots}
 
 
 def test_every_closure_is_there_under_each_platform_that_it_serves():

@@ -20,7 +20,7 @@ from mechanisms import CLIENTS
 
 import pteron
 from pteron.kernels import numeric
-from pteron.kernels.choice import Tier
+from pteron.kernels.choice import SharedCode
 
 SURFACE = {
     "load",
@@ -396,7 +396,7 @@ def test_a_fork_while_code_is_compiled_goes_on():
         "from pteron.kernels import numeric\n"
         "robot = pteron.load('delta')\n"
         "kernel = numeric(robot, 'reach')\n"
-        "kernel.tier.missed(1.0)\n"  # it compiles in the background
+        "kernel.tier.add_interpreter_time(1.0)\n"  # it compiles in the background
         "child = os.fork()\n"
         "if child == 0:\n"
         "    kernel.tier.fetch(at_any_cost=True)\n"
@@ -426,9 +426,9 @@ def test_an_interrupt_while_a_compilation_begins_leaves_the_way_free(monkeypatch
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        Tier(Interrupted(), 0.1).missed(1.0)
+        SharedCode(Interrupted(), 0.1).add_interpreter_time(1.0)
     # Another function is compiled without waiting for ever.
-    other = Tier(code, 0.1)
+    other = SharedCode(code, 0.1)
     worker = threading.Thread(target=other.fetch, kwargs={"at_any_cost": True}, daemon=True)
     worker.start()
     worker.join(60.0)

@@ -11,7 +11,7 @@ from mechanisms import NIGHTLY
 import pteron
 from pteron.cli.kept_machines import kept_machine
 from pteron.kernels import cache
-from pteron.kernels.kept import EQUATIONS, kept_result
+from pteron.kernels.program_cache import EQUATIONS, cached_result
 from pteron.workspace import home
 
 PACKAGE = Path(pteron.__file__).parent
@@ -62,7 +62,7 @@ def everything(*start):
 
 def key_of(package, **options):
     """Return the name under which a copy of the package would keep something."""
-    spec = importlib.util.spec_from_file_location("copy", package / "kernels" / "kept.py")
+    spec = importlib.util.spec_from_file_location("copy", package / "kernels" / "program_cache.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.name_of("what", 1.0, **options)
@@ -108,7 +108,7 @@ def spoilt(path, damage):
     elif damage == "empty":
         path.write_bytes(b"")
     else:
-        cache.keep_text(path.name, damage)
+        cache.store_text(path.name, damage)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_a_damaged_result_is_found_again_and_kept(damage, tmp_path, monkeypatch)
     value, asked = (0.1, ("rho1", -2), None), []
 
     def result():
-        return kept_result(("what", 1.0), (), lambda: asked.append(1) or value)
+        return cached_result(("what", 1.0), (), lambda: asked.append(1) or value)
 
     assert result() == value
     assert result() == value

@@ -11,7 +11,7 @@ import pteron
 from pteron.controllers import ComputedTorque
 from pteron.equations.drives import Drives, drive_names
 from pteron.equations.machine import number_places, numbers
-from pteron.equations.variations import variations, varied, varied_numbers
+from pteron.equations.variations import variations, varied_numbers, vary_geometry
 from pteron.legs import Elastic
 from pteron.motion import (
     Machines,
@@ -101,7 +101,7 @@ def test_machines_of_other_geometry_are_what_simulate_makes_of_them(monkeypatch)
     drawn = replace(drawn, legs=tuple(replace(leg, drive=DRIVE) for leg in drawn.legs))
     changes = variations(drawn)
     amounts = np.random.default_rng(0).uniform(-5e-4, 5e-4, (9, len(changes)))
-    built = [varied(drawn, changes, row) for row in amounts]
+    built = [vary_geometry(drawn, changes, row) for row in amounts]
     usual = machines_about(drawn, 9)
     machines = replace(usual, geometry=np.array([numbers(one) for one in built]))
     motion = pick_and_place(drawn, home_pose(drawn), least=0.1)
@@ -148,7 +148,7 @@ def test_tolerances_of_geometry_are_drawn_about_the_drawing(robot):
                 assert 1e-4 < np.abs(off[:, at]).max() < 5e-3
     changes = variations(robot)
     amounts = np.random.default_rng(1).uniform(-1e-3, 1e-3, (2, len(changes)))
-    same = [numbers(varied(robot, changes, row)) for row in amounts]
+    same = [numbers(vary_geometry(robot, changes, row)) for row in amounts]
     np.testing.assert_allclose(varied_numbers(robot, changes, amounts), same, atol=1e-12)
 
 

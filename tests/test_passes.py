@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 from mechanisms import CATALOG, gated, relative_error, states
 
 from pteron.kernels import RationalField, count_operations, evaluate, program
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
 from pteron.manipulator import parameter_names
 
 A, B, C, D, X, Y = SYMBOLS = [ca.SX.sym(name) for name in "abcdxy"]
@@ -50,13 +50,13 @@ def effort(found):
     ],
 )
 def test_what_is_saved(outputs, operations):
-    assert count_operations(optimised(function(*outputs))) == operations
+    assert count_operations(optimise_function(function(*outputs))) == operations
 
 
 def test_a_reciprocal_stays_one_division():
     """A division takes as long as several products."""
     inverse = 1 / X
-    found = optimised(
+    found = optimise_function(
         ca.Function("f", SYMBOLS, [ca.vertcat(-inverse * A + Y + Y * inverse, inverse)])
     )
     assert divisions(found) <= 2
@@ -64,7 +64,7 @@ def test_a_reciprocal_stays_one_division():
 
 def test_what_divides_several_is_divided_by_once():
     given = function(A / X * (B - C) + D, B / X * Y - A, C / X + Y)
-    found = optimised(given)
+    found = optimise_function(given)
     assert divisions(found) == 1
     assert effort(found) < effort(given)
 
@@ -86,7 +86,7 @@ def functions(draw):
 
 @given(functions(), st.lists(st.integers(1, 97), min_size=6, max_size=6, unique=True))
 def test_values_stay_exactly(plain, numbers):
-    found = optimised(plain)
+    found = optimise_function(plain)
     point = [[Fraction(number, 7)] for number in numbers]
     assert evaluate(found, RationalField(), point) == evaluate(plain, RationalField(), point)
     assert effort(found) <= effort(plain)
@@ -98,7 +98,7 @@ def test_values_stay_exactly(plain, numbers):
 def test_programs_keep_their_values_at_less_effort(name, what):
     robot = CATALOG[name]
     plain = program(robot, what, plain=True)
-    found = optimised(plain.function)
+    found = optimise_function(plain.function)
     assert effort(found) <= effort(plain.function)
     assert effort(found) < effort(plain.function) or what == "inverse_kinematics"
     pose, velocity, acceleration = states(robot, 20)
@@ -111,18 +111,18 @@ def test_programs_keep_their_values_at_less_effort(name, what):
 
 def test_out_of_reach_stays_nan():
     plain = program(CATALOG["quadrupteron"], "inverse_kinematics").function
-    assert np.isnan(np.array(optimised(plain)([1.0, 2.0, 3.0, 0.0]))).all()
+    assert np.isnan(np.array(optimise_function(plain)([1.0, 2.0, 3.0, 0.0]))).all()
 
 
 def test_shapes_and_empty_elements_stay():
     outputs = [ca.SX(2, 3), ca.SX.zeros(2, 2), ca.SX(0, 3), ca.diag(ca.vertcat(A * X + B * X, 1))]
     plain = ca.Function("plain", SYMBOLS, outputs)
-    found = optimised(plain)
+    found = optimise_function(plain)
     assert count_operations(found) < count_operations(plain)
     assert all(found.sparsity_out(i) == plain.sparsity_out(i) for i in range(4))
 
 
 def test_an_operation_that_has_no_name_is_kept():
-    found = optimised(function(ca.tanh(A) * X + ca.tanh(A) * Y))
+    found = optimise_function(function(ca.tanh(A) * X + ca.tanh(A) * Y))
     assert count_operations(found) == 3
     assert float(found(0.5, 0, 0, 0, 2, 3)) == pytest.approx(5 * np.tanh(0.5))

@@ -16,7 +16,7 @@ import pteron
 from pteron import Manipulator, OutputError
 from pteron.legs import KINDS
 from pteron.manipulator import with_dimensions
-from pteron.manipulator.explained import explained, pointing
+from pteron.manipulator.commented_file import commented_text, crank_direction_text
 from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.saving import document_of
 from pteron.manipulator.tables import PlatformTable
@@ -42,15 +42,15 @@ def program(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", CATALOG)
 def test_an_explained_file_is_that_machine_and_is_read_at_once(name, tmp_path):
     file = tmp_path / "robot.toml"
-    file.write_text(explained(name), encoding="utf-8")
+    file.write_text(commented_text(name), encoding="utf-8")
     robot, known = pteron.load(file), CATALOG[name]
     assert robot == Manipulator(f"my {name}", known.platform, known.legs, known.gravity)
-    assert max(map(len, explained(name).splitlines())) <= 125
+    assert max(map(len, commented_text(name).splitlines())) <= 125
 
 
 @pytest.mark.parametrize("name", ["quadrupteron", "delta-4", "linear-delta", "3-prr", "five-bar"])
 def test_it_says_of_every_key_what_it_is(name):
-    text = explained(name)
+    text = commented_text(name)
     legs = {leg.type: leg_table(type(leg)) for leg in CATALOG[name].legs}
     spoken = re.sub(r"\s+#? ?", " ", text)
     for model in (PlatformTable, *legs.values()):
@@ -76,7 +76,7 @@ def test_what_may_be_left_out_has_a_value_that_could_stand_there():
 
 @pytest.mark.parametrize("name", ["par4", "quadrupteron", "linear-delta", "delta-4", "3-prr"])
 def test_what_a_leg_may_have_may_stand_there_as_it_is_written(name, tmp_path):
-    head, first, *others = explained(name).split("[[legs]]")
+    head, first, *others = commented_text(name).split("[[legs]]")
     keys = re.findall(r"(?m)^#\w+ = ", first)
     assert keys
     for key in keys:
@@ -88,7 +88,7 @@ def test_what_a_leg_may_have_may_stand_there_as_it_is_written(name, tmp_path):
 def test_it_is_written_to_a_file_and_none_is_replaced_unasked(program):
     assert program("new", "delta", "--out", "robot.toml").exit_code == 0
     text = Path("robot.toml").read_text(encoding="utf-8")
-    assert text == explained("delta") == program("new", "delta").stdout
+    assert text == commented_text("delta") == program("new", "delta").stdout
     Path("robot.toml").write_text("mine")
     refused = program("new", "delta", "--out", "robot.toml")
     assert refused.exit_code == 2
@@ -112,7 +112,7 @@ def test_a_file_of_one_s_own_is_explained_too(tmp_path):
     robot = CATALOG["quadrupteron"]
     file = pteron.save(robot, tmp_path / "plain.toml")
     again = tmp_path / "explained.toml"
-    again.write_text(explained(file), encoding="utf-8")
+    again.write_text(commented_text(file), encoding="utf-8")
     assert pteron.load(again).legs == robot.legs
     assert tomllib.loads(again.read_text())["name"] == "my quadrupteron"
     with pytest.raises(OutputError):
@@ -255,7 +255,7 @@ def test_what_a_new_machine_keeps_of_the_old_one_is_told(program):
     assert "kg (lower) (--mass-from)" in told
     assert "(upper)" not in told
     assert "where a crank is at 0, 5.33 deg below horizontal." in told
-    assert pointing(pteron.load("new.toml")) == "5.33 deg below horizontal"
+    assert crank_direction_text(pteron.load("new.toml")) == "5.33 deg below horizontal"
 
 
 @pytest.mark.parametrize("name", sorted(set(CATALOG) - {"five-bar"}))

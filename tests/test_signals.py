@@ -31,7 +31,7 @@ from pteron.identification.signals import (
 from pteron.identification.signals.derivatives import LOST
 from pteron.identification.signals.repetition import repeating_rows
 from pteron.identification.signals.samples import blocks
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.workspace import home_pose
 
 log_of = partial(log_of, rate=500.0)  # rows are counted here
@@ -373,7 +373,7 @@ def test_states_are_those_of_the_motion(name):
 def in_mode(robot, mode):
     """Return a log of poses in an assembly mode: the sign of the determinant tells it."""
     pose, _, _ = states(robot, 400)
-    type_ii = unchecked(robot, "type_ii", pose)
+    type_ii = evaluate_unchecked(robot, "type_ii", pose)
     pose = pose[(type_ii < 0.0) == bool(mode)]
     assert len(pose) > 10
     sliders = pteron.inverse_kinematics(robot, pose)
@@ -500,7 +500,7 @@ def test_a_singular_sample_is_named():
     accelerations = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     motion_of = [sliders, rates.actuated, accelerations.actuated]
-    _, margin, _ = unchecked(robot, "reach", pose[17:18])
+    _, margin, _ = evaluate_unchecked(robot, "reach", pose[17:18])
     leg = robot.legs[0]
     # Across the direction of leg 1, until the first leg is all but stretched.
     across = np.eye(3)[int(np.argmin(np.abs(leg.direction)))]

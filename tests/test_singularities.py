@@ -97,7 +97,7 @@ def test_singular_orientations_are_the_roots_of_det_j_for_1000_layouts():
     s = rng.uniform(-0.06, 0.06, (1000, 4, 3))
     # The closed form as it is compiled, for all layouts in one call.
     robot = CATALOG["quadrupteron"]
-    machine, vector = Machine.symbols(robot)
+    machine, vector = Machine.symbolic(robot)
     coefficients = ca.Function("coefficients", [vector], [ca.vertcat(*machine.closure.orientation)])
     given = np.tile(numbers(robot), (1000, 1))
     legs = given[:, :-12].reshape(1000, 4, -1)

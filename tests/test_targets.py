@@ -42,8 +42,8 @@ from pteron.kernels import (
     program,
 )
 from pteron.kernels.c import Code, compiler
-from pteron.kernels.choice import Adaptive, Tier
-from pteron.kernels.kept import kept
+from pteron.kernels.choice import SharedCode, TieredKernel
+from pteron.kernels.program_cache import cached_program
 from pteron.kernels.programs import bare
 
 ROBOT = CATALOG["quadrupteron"]
@@ -762,7 +762,7 @@ def test_a_second_start_builds_no_program(fresh):
             keys.append(key)
             return built
 
-        return kept(key, build)
+        return cached_program(key, build)
 
     one, close, foreign = (
         (bare(ROBOT), 0.1),
@@ -782,7 +782,7 @@ def test_a_second_start_builds_no_program(fresh):
 
 def test_the_oldest_texts_give_way(fresh):
     for k in range(9):
-        cache.keep_text(str(k), f"text {k}", most=4)
+        cache.store_text(str(k), f"text {k}", most=4)
     assert len([*(fresh / cache.TEXTS).iterdir()]) <= 4
     assert cache.find_text("8") == "text 8"
     assert cache.find_text("0") is None
@@ -924,14 +924,14 @@ def is_running(number):
     return found != "" and not found.startswith("Z")
 
 
-class Turning(Tier):
+class Turning(SharedCode):
     """A tier that is ready when it has been missed three times."""
 
     def __init__(self, code):
         super().__init__(code, np.inf)
         self.times = 0
 
-    def missed(self, seconds):
+    def add_interpreter_time(self, seconds):
         self.times += 1
         if self.times == 3:
             self.ready = self.code.module is not None
@@ -942,7 +942,7 @@ def test_a_large_batch_changes_over_on_its_way():
     vm = pteron.compile(ROBOT, DYNAMICS, grade="parametric")
     motion = [np.tile(value, (40, 1)) for value in states(ROBOT, 100)]
     tier = Turning(Code(vm.name, vm.function, vm.ports, vm.outputs))
-    kernel = Adaptive(vm, tier, chunk=64)
+    kernel = TieredKernel(vm, tier, chunk=64)
     assert_same_bits(kernel(*motion), vm(*motion))
     assert tier.times == 3
 

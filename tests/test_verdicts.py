@@ -17,7 +17,7 @@ import pteron
 from pteron.cli.main import app
 from pteron.kinematics.singular_distance import coordinate_distances
 from pteron.manipulator import with_dimensions
-from pteron.manipulator.explained import explained
+from pteron.manipulator.commented_file import commented_text
 from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.template_masses import template_masses
 from pteron.thresholds import (
@@ -362,7 +362,7 @@ def test_machines_as_they_are_built_are_reported_and_exported(sort, seed):
 
 def test_templates_keep_their_centres_of_mass_where_mass_is_edited(tmp_path):
     path = tmp_path / "robot.toml"
-    text = explained("delta", {"base_radius": 0.18, "crank": 0.2, "rod": 0.42})
+    text = commented_text("delta", {"base_radius": 0.18, "crank": 0.2, "rod": 0.42})
     assert "first_moment =" not in text.replace("#first_moment =", "")
     path.write_text(text, "utf-8")
     before = pteron.load(path)

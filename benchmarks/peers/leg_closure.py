@@ -19,7 +19,7 @@ import numpy as np
 
 import pteron
 from peers.closure import Array, Expression, frame_of
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
 
 __all__ = ["KINDS", "LegClosure", "printed", "sparse"]
 
@@ -320,7 +320,7 @@ class LegClosure:
         # The rows of a platform that turns end with its cosine and sine.
         rows += [cosine, sine] if self.turns else []
         outputs = [ca.vertcat(*part) for part in (*joints, rows)]
-        return optimised(ca.Function("joints", motion, outputs))
+        return optimise_function(ca.Function("joints", motion, outputs))
 
     def _angle(self, pose: Expression) -> tuple[Expression, Expression]:
         return (ca.cos(pose[-1]), ca.sin(pose[-1])) if self.turns else (ca.SX(1), ca.SX(0))
@@ -363,7 +363,7 @@ class LegClosure:
         # J = B^-1 A with the divisors in B and the links in A's rows.
         held = _held(columns, load, lengths)
         found = [pull.own + pull.divisor * held[i] for i, pull in enumerate(pulls)]
-        return optimised(ca.Function("forces", [tau, rows], [ca.vertcat(*found)]))
+        return optimise_function(ca.Function("forces", [tau, rows], [ca.vertcat(*found)]))
 
     def in_c(self, unbounded: bool) -> tuple[str, Array]:
         """Return a header with both functions, and the numbers that it does not hold: none."""

@@ -20,7 +20,7 @@ from peers.compiled_closure import closed_form
 from peers.leg_closure import printed
 from peers.library import Missing, Sweep, compiled
 from peers.tree import Body, tree
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
 
 __all__ = ["c_generated", "cpp_plain", "cpp_tuned", "cpp_usual", "python_tuned", "python_usual"]
 
@@ -156,7 +156,7 @@ def c_generated(robot: pteron.Manipulator) -> Sweep:
     motion = closure.joints(unbounded=True).sx_in()
     *moved, rows = closure.joints(unbounded=True).call(motion)
     found = closure.forces().call([rnea(*moved), rows])
-    whole = optimised(ca.Function("inverse", motion, ca.cse(found)))
+    whole = optimise_function(ca.Function("inverse", motion, ca.cse(found)))
     text = printed([whole]) + f"\nenum {{ M = {len(robot.legs)} }};\n"
     return Sweep(compiled("gcc", "generated_peer.c", ["-lm"], version("casadi"), text))
 

@@ -16,7 +16,7 @@ import pteron
 from peers.closure import Array, Expression
 from peers.leg_closure import KINDS, LegClosure, sparse
 from peers.library import Missing
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
 
 __all__ = ["TiltingClosure"]
 
@@ -86,7 +86,7 @@ class TiltingClosure(LegClosure):
         joints[1] += [velocity, own]
         joints[2] += [acceleration, own_rate]
         outputs = [ca.vertcat(*part) for part in (*joints, [*rows, *arms, ca.vec(rotation)])]
-        return optimised(ca.Function("joints", motion, ca.cse(outputs)))
+        return optimise_function(ca.Function("joints", motion, ca.cse(outputs)))
 
     def forces(self) -> ca.Function:
         """Return the function from (tau, rows) to the actuator forces."""
@@ -109,7 +109,7 @@ class TiltingClosure(LegClosure):
             columns.append(ca.vertcat(link, ca.cross(s, link)))
         held = _solved(ca.horzcat(*columns), ca.vertcat(force, moment), self.order)
         found = [pull.own + pull.divisor * held[i] for i, pull in enumerate(pulls)]
-        return optimised(ca.Function("forces", [tau, rows], [ca.cse(ca.vertcat(*found))]))
+        return optimise_function(ca.Function("forces", [tau, rows], [ca.cse(ca.vertcat(*found))]))
 
 
 def _turned(angles: Expression) -> tuple[Expression, Expression]:

@@ -76,7 +76,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "P2": (f"{_E}.closing.closure_rows",),
     "P3": (f"{_E}.closing.closure_rows", "pteron.kinematics.assembly.every_pose"),
     "P4": (f"{_E}.closing.newton_step", f"{_E}.closing.direct_step"),
-    "P5": (f"{_E}.pose_paths.stepped", "pteron.kinematics.tilting_assembly.tilting_poses"),
+    "P5": (f"{_E}.pose_paths.advance_path", "pteron.kinematics.tilting_assembly.tilting_poses"),
     # Singularities.
     "T1": ("pteron.closures.closure.Closure.measure",),
     "T2": ("pteron.closures.constant_rows.ConstantRows", "pteron.kinematics.singular_orientations"),
@@ -86,7 +86,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "C2": (f"{_E}.clearance.squared_distance",),
     # Indices, reactions, stiffness, errors.
     "G1": (f"{_E}.indices.homogeneous", f"{_E}.singular_values.singular_values"),
-    "G2": (f"{_E}.indices.by_points",),
+    "G2": (f"{_E}.indices.point_jacobian",),
     "G3": ("pteron.indices.conditioning.global_conditioning",),
     "G4": (f"{_E}.indices.pressure_angle", f"{_E}.indices.output_pressure_angle"),
     "G5": (f"{_E}.reactions.equilibrium", "pteron.indices.joint_reactions.reactions"),

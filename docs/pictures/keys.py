@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from pteron.bodies.tables import Bar, Geared, PlanarBody, Table
+from pteron.bodies.tables import BarTable, GearedTable, PlanarBody, TomlTable
 from pteron.legs import KINDS
 from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.tables import (
@@ -29,15 +29,15 @@ from pteron.manipulator.tables import (
     WindingTable,
 )
 
-TABLES: dict[str, type[Table]] = {
+TABLES: dict[str, type[TomlTable]] = {
     "the machine": MachineTable,
     "radii": RadiiTable,
     "tools": ToolTable,
     "home": HomeTable,
     "platform": PlatformTable,
     "a platform that tilts": TiltingTable,
-    "bars": Bar,
-    "geared": Geared,
+    "bars": BarTable,
+    "geared": GearedTable,
     "a body": PlanarBody,
     "a cone": ConeTable,
     "a drive": DriveTable,
@@ -54,7 +54,7 @@ TABLES: dict[str, type[Table]] = {
 _MARKED = re.compile(r"(<!-- keys of ([^>]*) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
-def key_table(model: type[Table]) -> str:
+def key_table(model: type[TomlTable]) -> str:
     """Return the keys of a table of the file in Markdown, what they are and their defaults."""
     lines = ["| key | what it is | default |", "| --- | --- | --- |"]
     for key, field in model.model_fields.items():

@@ -14,27 +14,31 @@ from numpy.typing import NDArray
 from pteron.bodies.motion import Expression
 
 _SAME = 1e-9
-"""Greatest relative difference of quantities that count as equal."""
+"""Relative tolerance of equal quantities."""
 
 _SMALL = 1e-3
-"""Least size to which a difference is relative, SI units."""
+"""Lower bound of the size that differences are relative to, SI units."""
 
 TIME = ca.SX.sym("t")
 
 
-def rate_of(value: Expression) -> Expression:
+def rate_of(expression: Expression) -> Expression:
     """Return the derivative of an expression with respect to `TIME`."""
-    return ca.jtimes(value, TIME, ca.SX(1))
+    return ca.jtimes(expression, TIME, ca.SX(1))
 
 
-def differing(pairs: Mapping[str, tuple[Expression, Expression]]) -> Iterator[str]:
+def mismatched_names(pairs: Mapping[str, tuple[Expression, Expression]]) -> Iterator[str]:
     """Yield the names of pairs whose two expressions differ at t = 0."""
-    for name, (found, expected) in pairs.items():
-        one, other = _now(found), _now(expected)
-        size = max(np.abs(one).max(initial=0.0), np.abs(other).max(initial=0.0), _SMALL)
-        if not np.abs(one - other).max(initial=0.0) <= _SAME * size:  # NaN differs too
+    for name, (actual, expected) in pairs.items():
+        value_now, expected_now = _evaluate_at_zero(actual), _evaluate_at_zero(expected)
+        size = max(
+            np.abs(value_now).max(initial=0.0), np.abs(expected_now).max(initial=0.0), _SMALL
+        )
+        if not np.abs(value_now - expected_now).max(initial=0.0) <= _SAME * size:  # NaN differs too
             yield name
 
 
-def _now(value: Expression) -> NDArray[np.float64]:
-    return np.asarray(ca.DM(ca.evalf(ca.substitute(ca.densify(ca.SX(value)), TIME, 0)))).ravel()
+def _evaluate_at_zero(expression: Expression) -> NDArray[np.float64]:
+    return np.asarray(
+        ca.DM(ca.evalf(ca.substitute(ca.densify(ca.SX(expression)), TIME, 0)))
+    ).ravel()

@@ -13,7 +13,7 @@ from pteron.bodies.vectors import number, numbers, positive
 from pteron.errors import ModelError
 
 _ROUNDING = 1e-12
-"""Relative rounding by which an inertia may be below the least that a real body has."""
+"""Relative tolerance of the least inertia of a real body."""
 
 
 @runtime_checkable
@@ -41,8 +41,8 @@ class Inertia(Protocol):
 
 def with_center(inertia: Inertia) -> dict[str, float]:
     """Return a body's values by kind, with its centre of mass (m) in place of first moments."""
-    values = dict(zip(inertia.kinds, inertia.values, strict=True))
-    return values | {k: values[k] / values["m"] for k in ("mgx", "mgy", "mgz") if k in values}
+    by_kind = dict(zip(inertia.kinds, inertia.values, strict=True))
+    return by_kind | {k: by_kind[k] / by_kind["m"] for k in ("mgx", "mgy", "mgz") if k in by_kind}
 
 
 @dataclass(frozen=True)
@@ -89,8 +89,8 @@ class _TurningInertia:
                 f"of mass, and about the reference point, it must be above {least:g} kg m^2"
                 f"{mend if inertia > 0.0 else ''}"
             )
-        for key, value in (("mass", mass), ("first_moment", moment), ("inertia", inertia)):
-            object.__setattr__(self, key, value)
+        for key, quantity in (("mass", mass), ("first_moment", moment), ("inertia", inertia)):
+            object.__setattr__(self, key, quantity)
 
     @classmethod
     def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> Self:
@@ -216,18 +216,18 @@ class SpatialInertia:
         object.__setattr__(self, "mass", positive(self.mass, "mass", "kg"))
         for name, count in (("first_moment", 3), ("inertia", 6)):
             object.__setattr__(self, name, numbers(getattr(self, name), name, count))
-        whole = self.tensor
-        # Of second moments of mass about the reference point no less is real than of a point mass.
+        tensor = self.tensor
+        # The second moments about the reference point exceed those of a point mass at the centre.
         h = np.array(self.first_moment)
-        second = 0.5 * np.trace(whole) * np.eye(3) - whole - np.outer(h, h) / self.mass
-        size = max(float(np.abs(whole).max()), float(h @ h) / self.mass)
-        if np.linalg.eigvalsh(second).min() < -_ROUNDING * size or not np.trace(whole) > 0.0:
+        second = 0.5 * np.trace(tensor) * np.eye(3) - tensor - np.outer(h, h) / self.mass
+        size = max(float(np.abs(tensor).max()), float(h @ h) / self.mass)
+        if np.linalg.eigvalsh(second).min() < -_ROUNDING * size or not np.trace(tensor) > 0.0:
             c = h / self.mass
             least = self.mass * (c @ c * np.eye(3) - np.outer(c, c))
-            own = [f"{v:.4g}" for v in np.linalg.eigvalsh(whole - least)]
+            moments = [f"{v:.4g}" for v in np.linalg.eigvalsh(tensor - least)]
             raise ModelError(
                 f"inertia: {list(self.inertia)} kg m^2 belongs to no real body; with this mass and "
-                f"centre of mass its principal moments about that centre are {', '.join(own)} "
+                f"centre of mass its principal moments about that centre are {', '.join(moments)} "
                 "kg m^2, of which none may be below 0 nor above the sum of the other two; is it "
                 "about the centre of mass? It must be about the reference point, as [Ixx, Ixy, "
                 "Ixz, Iyy, Iyz, Izz]"
@@ -289,7 +289,7 @@ class SpatialInertia:
         return (self.mass, *self.first_moment, *self.inertia)
 
     def turned(self, rotation: NDArray[np.float64]) -> SpatialInertia:
-        """Return the same of a frame that is turned: a vector v of this one is R v in that."""
+        """Return the inertia in a rotated frame, in which a vector v of this one is R v."""
         tensor = rotation @ self.tensor @ rotation.T
         x, y, z = (rotation @ self.first_moment).tolist()
         xx, xy, xz, yy, yz, zz = tensor[np.triu_indices(3)].tolist()
@@ -297,7 +297,7 @@ class SpatialInertia:
 
 
 def inertia_count(kinds: Sequence[str]) -> int:
-    """Return how many of the kinds of a body's parameters are of its inertia tensor."""
+    """Return the number of a body's parameters that belong to its inertia tensor."""
     return sum(kind.startswith("I") for kind in kinds)
 
 
@@ -314,5 +314,5 @@ def carried_values(
     and Izz. All may be expressions.
     """
     shares = kind.shares_of_point(*center).values()
-    own = [0] * (len(shares) - len(inertia)) + list(inertia)
-    return [mass * share + extra for share, extra in zip(shares, own, strict=True)]
+    central = [0] * (len(shares) - len(inertia)) + list(inertia)
+    return [mass * share + extra for share, extra in zip(shares, central, strict=True)]

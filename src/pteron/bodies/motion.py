@@ -1,4 +1,4 @@
-"""A body in motion, and the wrench that its motion needs: CasADi expressions for one state.
+"""A body in motion, and the wrench required to move it: CasADi expressions for one state.
 
 Inertial parameters come as rows (1, K) of K columns: one column for the values of a machine, or a
 column for each parameter, which turns every force below into the regressor of that force. Rows
@@ -25,7 +25,7 @@ class PointMotion(NamedTuple):
 
 
 def point_rows(rows: Expression) -> Expression:
-    """Return rows (k, 6) against (c', omega) from rows (k, 3) against c' alone."""
+    """Return rows (k, 6) in (c', omega) from rows (k, 3) in c' alone."""
     return ca.horzcat(rows, ca.SX(rows.shape[0], 3))
 
 
@@ -85,7 +85,7 @@ class Moments(NamedTuple):
 
 
 class BodyMotion(NamedTuple):
-    """A rigid body that moves in a plane, a rod that swings, or a slider: all are written alike.
+    """Motion of a slider, a rod, or a rigid body in a plane.
 
     A body is its reference point and its axes x and y. A rod has no y, a slider no axes.
     """
@@ -123,15 +123,15 @@ class BodyMotion(NamedTuple):
 
 def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Moments:
     """Return the parameters of a body from its rows, which are in the order of its kinds."""
-    given = dict(zip(kinds, rows, strict=True))
-    none = ca.SX(1, rows[0].shape[1])
-    return Moments(*(given.get(kind, none) for kind in ("m", "mgx", "mgy", "I")))
+    by_kind = dict(zip(kinds, rows, strict=True))
+    zero = ca.SX(1, rows[0].shape[1])
+    return Moments(*(by_kind.get(kind, zero) for kind in ("m", "mgx", "mgy", "I")))
 
 
 def needed_wrench(
     body: BodyMotion, inertia: Moments, gravity: Expression
 ) -> tuple[Expression, Expression]:
-    """Return the force and the moment, each (3, K), that a body needs at its reference point.
+    """Return the force and the moment, each (3, K), required at a body's reference point.
 
     With h = hx x + hy y: force m (a - g) + h'' and moment h x (a - g) + I x x x''. For a body in a
     plane the last is I theta'' z. The paper's F is what acts on the body, minus this.
@@ -150,14 +150,14 @@ def needed_wrench(
 
 
 def wrench_matrix(body: BodyMotion, gravity: Expression) -> Expression:
-    """Return Om (6, k) of Eq. (15): what acts on a body, per unit of each of its k parameters."""
+    """Return Om (6, k) of Eq. (15): the wrench on a body per unit of each of its k parameters."""
     unit = ca.SX.eye(len(body.kinds))
     inertia = moments_of(body.kinds, ca.vertsplit(unit))
     return -ca.vertcat(*needed_wrench(body, inertia, gravity))  # Eq. (15), Omega of one body
 
 
 def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:
-    """Return the mass matrix (6, 6) of a body against (c', omega).
+    """Return the mass matrix (6, 6) of a body in (c', omega).
 
     T = m v.v / 2 + v.h' + I omega.omega / 2, omega being perpendicular to x.
     """

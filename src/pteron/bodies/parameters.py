@@ -84,7 +84,7 @@ class Parameter:
 
     @property
     def suffix(self) -> str:
-        """The end of its name, which tells its legs."""
+        """The end of its name: the numbers of its legs."""
         if self.everyone or not self.legs:
             return ""
         return str(self.legs[0]) if len(self.legs) == 1 else f"({','.join(map(str, self.legs))})"
@@ -96,7 +96,7 @@ class Parameter:
 
 
 def body_places(parameters: Iterable[Parameter]) -> dict[str, dict[str, int]]:
-    """Return where the parameters of each body stand, by the body's name and their kind."""
+    """Return the index of each parameter, by its body's name and its kind."""
     places: dict[str, dict[str, int]] = {}
     for k, parameter in enumerate(parameters):
         places.setdefault(parameter.owner, {})[parameter.kind] = k
@@ -110,8 +110,8 @@ def parameter_list(
 ) -> tuple[Parameter, ...]:
     """Return the inertial parameters in the paper's order, Eq. (16).
 
-    Sliders first, then upper links and cranks, then lower links and rods, then the platform; a body
-    that a leg has not is left out.
+    Sliders first, then upper links and cranks, then lower links and rods, then the platform; bodies
+    that a leg lacks are omitted.
 
     Parameters
     ----------
@@ -123,11 +123,11 @@ def parameter_list(
         Legs, from 1, that share one parameter set; those of a group have the same bodies.
     """
     groups = groups or [(i + 1,) for i in range(len(legs))]
-    found = [
+    leg_parameters = [
         Parameter(kind, body, group, unit_of(kind), 1 < len(legs) == len(group))
         for body in LEG_BODIES
         for group in groups
         for kind in legs[group[0] - 1].get(body, ())
     ]
-    carried = [Parameter(kind, PLATFORM, (), unit_of(kind)) for kind in platform]
-    return (*found, *carried)  # Eq. (16)
+    platform_parameters = [Parameter(kind, PLATFORM, (), unit_of(kind)) for kind in platform]
+    return (*leg_parameters, *platform_parameters)  # Eq. (16)

@@ -1,4 +1,4 @@
-"""A rigid body that turns about any axis: the wrench that its motion needs, for ten parameters.
+"""A rigid body in space: the wrench required to move it, for ten parameters.
 
 All of it is written in the body's own frame, where the inertia tensor is constant.
 """
@@ -56,7 +56,7 @@ class SpatialMotion(NamedTuple):
 def needed_twist_wrench(
     body: SpatialMotion, inertia: SpatialMoments, gravity: Expression
 ) -> tuple[Expression, Expression]:
-    """Return the force and the moment, each (3, K), that a body needs at its reference point.
+    """Return the force and the moment, each (3, K), required at a body's reference point.
 
     With h = R m gamma and I = R I_P R^T: m (a - g) + alpha x h + omega x (omega x h), and I alpha +
     omega x I omega + h x (a - g).
@@ -72,7 +72,7 @@ def needed_twist_wrench(
 
 
 def twist_mass_matrix(axes: Expression, inertia: SpatialMoments) -> Expression:
-    """Return the mass matrix (6, 6) against (v, omega), for one column of parameters."""
+    """Return the mass matrix (6, 6) in (v, omega), for one column of parameters."""
     xx, xy, xz, yy, yz, zz = ca.vertsplit(inertia.i)
     tensor = ca.blockcat([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     h = ca.skew(ca.mtimes(axes, inertia.h))

@@ -1,7 +1,7 @@
 """Pydantic models of the bodies and vectors in TOML files.
 
-They check shape and type only; whether the numbers are those of a real body is checked by what they
-build, such as `RodInertia`. A key's description is shown in new files and in the documentation.
+They check shape and type only; the classes that they build, such as `RodInertia`, check whether the
+numbers are those of a real body. A key's description appears in new files and the documentation.
 The module is imported only where a file is read, as pydantic loads slowly.
 """
 
@@ -18,10 +18,10 @@ Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Count = Annotated[int, Field(ge=1, strict=True)]
 
 
-def _only_x(given: Any) -> Any:
-    if isinstance(given, list) and len(given) > 1:
-        raise ValueError(f"{shown(given)} given, a list of 1 number expected: a rod has x only")
-    return given
+def _only_x(entries: Any) -> Any:
+    if isinstance(entries, list) and len(entries) > 1:
+        raise ValueError(f"{shown(entries)} given, a list of 1 number expected: a rod has x only")
+    return entries
 
 
 One = Annotated[tuple[Number], BeforeValidator(_only_x)]
@@ -31,37 +31,37 @@ Six = tuple[Number, Number, Number, Number, Number, Number]
 
 
 def key(about: str, default: Any = ..., *example: Any) -> Any:
-    """Return a key of a table: what it is, its default where it has one, and an example."""
+    """Return the field of a table's key, from its description, default and example."""
     return Field(default, description=about, examples=list(example) or None)
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A TOML table in which an unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
-class Slider(Table):
+class Slider(TomlTable):
     """`{ mass }` of a body that does not turn."""
 
     mass: Number = Field(description="kg")
 
 
-class Bar(Table):
+class BarTable(TomlTable):
     """`{ mass, hinge }` of a part that moves with the platform and does not turn."""
 
     mass: Number = Field(description="kg")
     hinge: Three = Field(description="its hinge on the part that turns, in the platform frame, m")
 
 
-class Geared(Table):
+class GearedTable(TomlTable):
     """`{ inertia, ratio }` of a part that a gear turns with the platform."""
 
     inertia: Number = Field(description="about its own axis, which is parallel to axis, kg m^2")
     ratio: Number = Field(description="its angle over phi")
 
 
-class _Body(Table):
+class _Body(TomlTable):
     mass: Number = Field(description="kg")
     center_of_mass: Any = None
     first_moment: Any = None
@@ -71,27 +71,27 @@ class _Body(Table):
 
     @property
     def unit(self) -> Any:
-        """A body with mass and inertia 1, in place of one whose numbers are refused."""
+        """A body with mass and inertia 1, which replaces an invalid one."""
         kinds = self.kind.kinds
         ones = ("m", "I", "Ixx", "Iyy", "Izz")
         return self.kind.of_values([float(kind in ones) for kind in kinds])
 
     def inertia_of(self, key: str) -> Any:
-        """Build the inertia; `key` goes before what an error names."""
+        """Build the inertia; `key` is the prefix of an error's key."""
         try:
             if (self.center_of_mass is None) == (self.first_moment is None):
-                given = "neither" if self.first_moment is None else "both"
+                present = "neither" if self.first_moment is None else "both"
                 raise ModelError(
-                    f"center_of_mass: {given} it and first_moment given; give one of the two"
+                    f"center_of_mass: {present} it and first_moment given; give one of the two"
                 )
             if self.first_moment is not None:
-                return self._of_first_moment()
+                return self._build_from_first_moment()
             return self.kind.of_body(self.mass, self.center_of_mass, self.inertia)
         except ModelError as error:
             raise ModelError(f"{key}.{error}" if key else str(error)) from None
 
-    def _of_first_moment(self) -> Any:
-        """Build the inertia from the first moment, and say if this alone makes it impossible."""
+    def _build_from_first_moment(self) -> Any:
+        """Build the inertia from the first moment; raise its own message where that is at fault."""
         try:
             return self.kind(self.mass, self.first_moment, self.inertia)
         except ModelError as error:
@@ -101,7 +101,7 @@ class _Body(Table):
                 self.kind(self.mass, nothing, self.inertia)
             except ModelError:
                 raise error from None
-        center = ", ".join(f"{value / self.mass:.4g}" for value in moment)
+        center = ", ".join(f"{component / self.mass:.4g}" for component in moment)
         raise ModelError(
             f"first_moment: {moment} kg m with a mass of {self.mass:g} kg puts the centre of mass "
             f"at ({center}) m, too far out for the inertia of {self.inertia} kg m^2; was mass "

@@ -14,59 +14,61 @@ from pteron.errors import ModelError, shown
 Vector = tuple[float, float, float]
 
 UNIT_TOLERANCE = 1e-6
-"""Greatest difference from 1 of the length of a unit vector that is normalised, not refused."""
+"""Tolerance of a unit vector's length: within it a vector is normalised, beyond it an error."""
 
 PARALLEL_TOLERANCE = 1e-9
 """Sine of the angle under which two unit vectors count as parallel."""
 
 _VANISHING = 1e-9
-"""Singular value of stacked unit vectors below which they do not span its direction."""
+"""Singular value of stacked unit vectors that counts as zero."""
 
 _ROUNDING = 4 * math.ulp(1.0)
-"""Greatest difference of the length from 1 of a vector that is kept bit for bit."""
+"""Tolerance of the length of a vector that stays bit for bit: rounding."""
 
 _UPRIGHT = 1e-15
-"""Greatest cosine of two unit vectors that count as perpendicular to rounding."""
+"""Tolerance of the cosine of two perpendicular unit vectors: rounding."""
 
 
 def number(value: object, key: str) -> float:
     """Return `value` as a finite float, or raise an error that names its `key`."""
     try:
-        result = float(value)  # type: ignore[arg-type]
+        converted = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ModelError(f"{key}: {value!r} is not a number") from None
     except OverflowError:
         raise ModelError(f"{key}: {shown(value)} is too large a number") from None
-    if not math.isfinite(result):
-        raise ModelError(f"{key}: {result} is not a finite number")
-    return result
+    if not math.isfinite(converted):
+        raise ModelError(f"{key}: {converted} is not a finite number")
+    return converted
 
 
 def positive(value: object, key: str, unit: str) -> float:
     """Return `value` as a float above zero."""
-    result = number(value, key)
-    if result <= 0.0:
-        raise ModelError(f"{key}: {result:g} {unit} is not positive; give a value above 0 {unit}")
-    return result
+    converted = number(value, key)
+    if converted <= 0.0:
+        raise ModelError(
+            f"{key}: {converted:g} {unit} is not positive; give a value above 0 {unit}"
+        )
+    return converted
 
 
 def not_negative(value: object, key: str, unit: str) -> float:
     """Return `value` as a float of zero or more."""
-    result = number(value, key)
-    if result < 0.0:
-        raise ModelError(f"{key}: {result:g} {unit} is negative; give 0 or more")
-    return result
+    converted = number(value, key)
+    if converted < 0.0:
+        raise ModelError(f"{key}: {converted:g} {unit} is negative; give 0 or more")
+    return converted
 
 
 def numbers(values: Sequence[object], key: str, count: int) -> tuple[float, ...]:
     """Return `values` as a tuple of `count` finite floats."""
     try:
-        items = list(values)
+        components = list(values)
     except TypeError:
         raise ModelError(f"{key}: {values!r} is not a list of {count} numbers") from None
-    if len(items) != count:
-        raise ModelError(f"{key}: {len(items)} numbers given, {count} expected")
-    return tuple(number(item, f"{key}[{i}]") for i, item in enumerate(items))
+    if len(components) != count:
+        raise ModelError(f"{key}: {len(components)} numbers given, {count} expected")
+    return tuple(number(component, f"{key}[{i}]") for i, component in enumerate(components))
 
 
 def interval(values: Sequence[object], key: str) -> tuple[float, float]:
@@ -84,53 +86,52 @@ def vector(values: Sequence[object], key: str) -> Vector:
 
 
 def unit_vector(values: Sequence[object], key: str) -> Vector:
-    """Return `values` normalised; a length further than `UNIT_TOLERANCE` from 1 is refused.
+    """Return `values` normalised; raise where the length differs from 1 by over `UNIT_TOLERANCE`.
 
     A vector that is a unit vector to rounding is kept bit for bit, so that a file that is read and
     written again does not drift.
     """
-    given = vector(values, key)
-    length = norm(given)
+    raw = vector(values, key)
+    length = norm(raw)
     if abs(length - 1.0) > UNIT_TOLERANCE:
         mend = (
             "a zero vector has no direction"
             if length == 0.0
-            else "write " + str([float(f"{c / length:.12g}") for c in given])
+            else "write " + str([float(f"{c / length:.12g}") for c in raw])
         )
-        raise ModelError(f"{key}: {list(given)} has length {length:.6g}, not 1; {mend}")
+        raise ModelError(f"{key}: {list(raw)} has length {length:.6g}, not 1; {mend}")
     if abs(length - 1.0) <= _ROUNDING:
-        return given
-    return scaled(given, 1.0 / length)
+        return raw
+    return scale_vector(raw, 1.0 / length)
 
 
 def perpendicular(values: Sequence[object], axis: Vector, key: str, other: str) -> Vector:
     """Return `values` as `unit_vector` does, made perpendicular to a unit vector to rounding.
 
-    A vector that is not perpendicular is refused before its length is checked: the message then has
-    one that is right in both.
+    Perpendicularity is checked before the length, so that the message can propose a vector that
+    satisfies both.
     """
-    given = vector(values, key)
-    lean, size = dot(given, axis), norm(given)
+    raw = vector(values, key)
+    lean, size = dot(raw, axis), norm(raw)
     if abs(lean) > UNIT_TOLERANCE * size:
-        upright = _across(given, axis)
+        upright = _perpendicular_part(raw, axis)
         if norm(upright) < UNIT_TOLERANCE * size:
             raise ModelError(
-                f"{key}: {list(given)} is along {other} {list(axis)}; give one at right angles to "
-                "it"
+                f"{key}: {list(raw)} is along {other} {list(axis)}; give one at right angles to it"
             )
-        near = [float(f"{c / norm(upright):.12g}") + 0.0 for c in upright]
+        suggestion = [float(f"{c / norm(upright):.12g}") + 0.0 for c in upright]
         raise ModelError(
-            f"{key}: {list(given)} is not perpendicular to {other} {list(axis)}; {near} is"
+            f"{key}: {list(raw)} is not perpendicular to {other} {list(axis)}; {suggestion} is"
         )
-    unit = unit_vector(given, key)
+    unit = unit_vector(raw, key)
     if abs(dot(unit, axis)) <= _UPRIGHT:
         return unit
-    upright = _across(unit, axis)
-    return scaled(upright, 1.0 / norm(upright))
+    upright = _perpendicular_part(unit, axis)
+    return scale_vector(upright, 1.0 / norm(upright))
 
 
-def _across(v: Vector, axis: Vector) -> Vector:
-    """Return the part of a vector that is perpendicular to a unit vector."""
+def _perpendicular_part(v: Vector, axis: Vector) -> Vector:
+    """Return the component of a vector perpendicular to a unit vector."""
     lean = dot(v, axis)
     return (v[0] - lean * axis[0], v[1] - lean * axis[1], v[2] - lean * axis[2])
 
@@ -150,13 +151,13 @@ def norm(a: Vector) -> float:
     return math.hypot(*a)
 
 
-def scaled(a: Vector, factor: float) -> Vector:
+def scale_vector(a: Vector, factor: float) -> Vector:
     """Return `factor` times `a`."""
     return (factor * a[0], factor * a[1], factor * a[2])
 
 
-def moved(point: Vector, direction: Vector, way: float) -> Vector:
-    """Return a point moved by `way`, m, along a direction."""
+def shift_point(point: Vector, direction: Vector, way: float) -> Vector:
+    """Return a point shifted by `way`, m, along a direction."""
     return (
         point[0] + way * direction[0],
         point[1] + way * direction[1],
@@ -165,14 +166,14 @@ def moved(point: Vector, direction: Vector, way: float) -> Vector:
 
 
 def parallel(a: Vector, b: Vector) -> bool:
-    """Say whether two unit vectors are parallel, in the same or in opposite sense."""
+    """Return whether two unit vectors are parallel, in the same or in opposite sense."""
     return norm(cross(a, b)) < PARALLEL_TOLERANCE
 
 
 def vertical(d: Vector, gravity: Vector) -> bool:
-    """Say whether gravity has no component perpendicular to a unit vector."""
+    """Return whether gravity has no component perpendicular to a unit vector."""
     size = norm(gravity)
-    return size == 0.0 or parallel(d, scaled(gravity, 1.0 / size))
+    return size == 0.0 or parallel(d, scale_vector(gravity, 1.0 / size))
 
 
 def complement(axes: ArrayLike) -> NDArray[np.float64]:

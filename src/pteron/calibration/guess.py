@@ -14,7 +14,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.measurements import TOOL, Measurements, Place, Plane
-from pteron.equations.variations import Variation, varied
+from pteron.equations.variations import Variation, vary_geometry
 from pteron.manipulator import Manipulator
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ class Block:
     def move(self, guess: Guess, step: Array) -> Guess:
         """Return a guess whose unknowns of this block are moved by a step."""
         if self.kind == "geometry":
-            return replace(guess, robot=varied(guess.robot, self.changes, step))
+            return replace(guess, robot=vary_geometry(guess.robot, self.changes, step))
         if self.kind in ("zeros", "scales"):
             values = getattr(guess, self.kind).copy()
             values[list(self.legs)] += step

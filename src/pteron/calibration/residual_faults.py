@@ -19,7 +19,7 @@ from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
 from pteron.calibration.thresholds import OFF_TOLERANCES, ORDINARY_ERROR
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -294,7 +294,7 @@ def _rod_trials(
     if robot.platform.angular.any():
         return
     poses = fit.poses[chosen]
-    couples: Array = evaluated(robot, "beams", "nan", poses)[-1]
+    couples: Array = evaluate_kernel(robot, "beams", "nan", poses)[-1]
     if couples.shape[1] != 3 or not np.isfinite(couples).all(axis=(1, 2)).any():
         return
     good = np.isfinite(couples).all(axis=(1, 2)) & (given.origins[chosen] < 0)

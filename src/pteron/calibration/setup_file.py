@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from pteron.bodies.tables import Number, Table, Three
+from pteron.bodies.tables import Number, Three, TomlTable
 from pteron.bodies.vectors import unit_vector
 from pteron.calibration.measurements import KINDS, Place, Plane, Setup
 from pteron.errors import DataError, shown
@@ -30,7 +30,7 @@ def _named(given: Any) -> Any:
 Noise = Annotated[Number, Field(gt=0.0)]
 
 
-class NoiseTable(Table):
+class NoiseTable(TomlTable):
     """`noise` by kind of value, m or rad."""
 
     position: Noise | None = Field(default=None, description="of x, y and z, m")
@@ -40,7 +40,7 @@ class NoiseTable(Table):
     readings: Noise | None = Field(default=None, description="of the joints' readings, m or rad")
 
 
-class MeasuredTable(Table):
+class MeasuredTable(TomlTable):
     """`[measured]`: how exactly."""
 
     noise: Annotated[NoiseTable, BeforeValidator(_named)] = Field(
@@ -49,7 +49,7 @@ class MeasuredTable(Table):
     )
 
 
-class PlaceTable(Table):
+class PlaceTable(TomlTable):
     """`[marks.NAME]` on the platform, `[anchors.NAME]` in the base frame."""
 
     at: Three = Field((0.0, 0.0, 0.0), description="m; where free, where it is sought from")
@@ -62,7 +62,7 @@ class PlaceTable(Table):
         return self
 
 
-class PlaneTable(Table):
+class PlaneTable(TomlTable):
     """`[planes.NAME]`: normal . p = offset in the base frame."""
 
     known: bool = Field(default=True, description="false: it is found with the geometry")
@@ -72,7 +72,7 @@ class PlaneTable(Table):
     offset: Number = Field(default=0.0, description="m")
 
 
-class InstrumentTable(Table):
+class InstrumentTable(TomlTable):
     """`[instrument]`: what measured positions and angles."""
 
     frame: Literal["known", "unknown"] = Field(
@@ -80,7 +80,7 @@ class InstrumentTable(Table):
     )
 
 
-class G33Table(Table):
+class G33Table(TomlTable):
     """`[g33]`: what a report of Marlin's G33 leaves out."""
 
     radius: Annotated[Number, Field(gt=0.0)] | None = Field(
@@ -88,7 +88,7 @@ class G33Table(Table):
     )
 
 
-class MeasuredLog(Table):
+class MeasuredLog(TomlTable):
     """The whole file; each table may be left out."""
 
     csv: Dialect | None = None

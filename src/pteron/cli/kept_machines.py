@@ -19,11 +19,11 @@ def kept_machine(name_or_path: str) -> tuple[Manipulator, tuple[str, ...]]:
     """
     from pydantic import VERSION
 
-    from pteron.kernels.kept import kept_result, name_of
+    from pteron.kernels.program_cache import cached_result, name_of
     from pteron.manipulator.files import contents, read_machine
 
     data, source = contents(name_or_path)
-    return kept_result(
+    return cached_result(
         ("machine", data.decode("latin-1"), source, name_or_path, VERSION),
         _READING,
         lambda: read_machine(data, source, name_or_path),

@@ -96,7 +96,7 @@ def new(
         return catalog()
     from pteron.atomic import write_text
     from pteron.manipulator import load
-    from pteron.manipulator.explained import explained, kept
+    from pteron.manipulator.commented_file import commented_text, kept_numbers_sentence
 
     dimensions = {
         "base_radius": base_radius,
@@ -110,14 +110,14 @@ def new(
     dimensions = {key: value for key, value in dimensions.items() if value not in (None, {})}
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
-    text = explained(kind, dimensions)
+    text = commented_text(kind, dimensions)
     if out is not None:
         write_text(out, text)
     data = {"kind": kind, "file": out, "text": text}
     if out is None:
         return Result(data, partial(write, text))
     written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
-    return Result(data, [written, *map(plain, kept(load(kind), dimensions))])
+    return Result(data, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))])
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
@@ -231,7 +231,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
-    from pteron.manipulator.explained import pointing
+    from pteron.manipulator.commented_file import crank_direction_text
 
     rows = (
         (
@@ -260,7 +260,7 @@ def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
         f"working mode {signs(robot)}",
         table(*headings, rows=rows, numbers=("leg",)),
         *(f"A {joint.noun} {joint.zero}." for joint in joints if joint.zero),
-        *([f"At 0 cranks point {zero}."] if (zero := pointing(robot)) else []),
+        *([f"At 0 cranks point {zero}."] if (zero := crank_direction_text(robot)) else []),
         *_drives(robot),
         *singular,
         *_home_lines(robot, findings),

@@ -17,12 +17,12 @@ from operator import mul
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.determinants import determinant, solved, solved_across
+from pteron.closures.determinants import determinant, solve, solve_transposed
 from pteron.legs.leg import LegEquations, LegMotion, Plane, Turned
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _COINCIDENT = 1e-9
-"""Share of platform points' distances from P within which they count as one, or on one line."""
+"""Tolerance, relative to the platform points' distances from P, of coincident points."""
 
 
 class Closure(ABC):
@@ -34,7 +34,7 @@ class Closure(ABC):
     @classmethod
     @abstractmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        """Say whether this kind of closure serves machines of such legs and platform."""
+        """Return whether this kind of closure serves machines of such legs and platform."""
 
     @property
     @abstractmethod
@@ -48,7 +48,7 @@ class Closure(ABC):
 
         With J = B^-1 A, B being the divisors: F = B A^-T wrench.
         """
-        shares, volume = solved_across(plain_rows(platform, legs), wrench)
+        shares, volume = solve_transposed(plain_rows(platform, legs), wrench)
         rows = zip(legs, ca.vertsplit(shares), strict=True)
         return ca.vertcat(*(leg.divisor / volume * share for leg, share in rows))
 
@@ -57,7 +57,7 @@ class Closure(ABC):
     ) -> Expression:
         """Return x (m, K) with J x = joints (n, K)."""
         right = ca.vertcat(*(leg.divisor * joints[i, :] for i, leg in enumerate(legs)))
-        quasi, volume = solved(plain_rows(platform, legs), right)
+        quasi, volume = solve(plain_rows(platform, legs), right)
         return platform.pose_rates(quasi / volume)
 
     @abstractmethod
@@ -65,7 +65,7 @@ class Closure(ABC):
         """Return every pose that joint coordinates allow, as columns (m, k); NaN if not real."""
 
     closed_form: bool = True
-    """Whether `poses` is one; if not, `kinematics.assembly` finds the poses."""
+    """Whether `poses` is a closed form; if not, `kinematics.assembly` computes the poses."""
 
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
         """Return the type-II measure: 1 in size at most, 0 where J is singular, without unit.
@@ -101,27 +101,27 @@ class Closure(ABC):
         forces = sum(not isinstance(locus, Turned) for locus in loci)
         bound = (forces / lengths) ** (lengths / 2)
         if forces == len(self.legs) and self.platform.angles():
-            if self._in_line:  # no force has a moment
+            if self._points_are_collinear:  # no force has a moment
                 return ca.SX(0)
-            bound = bound * self._lever
-        return determinant(against(platform, rows)) / (bound * reduce(mul, sizes))
+            bound = bound * self._moment_bound
+        return determinant(rows_in_quasi_velocities(platform, rows)) / (bound * reduce(mul, sizes))
 
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> list[Expression]:
-        """Return the square of the type-II measure, in each form that may be the cheapest.
+        """Return equivalent expressions of the type-II measure's square.
 
-        That depends on what else a program computes.
+        Which of them is the cheapest depends on what else a program computes.
         """
         measure = self.measure(platform, legs)
         return [measure * measure]
 
     @property
-    def _lever(self) -> Expression:
-        """Return the root of the sum of squares of the platform points' distances from their mean.
+    def _moment_bound(self) -> Expression:
+        """Return an upper bound of the norm of the moments (n,) of unit forces on the points, m.
 
-        About an axis along k through it. The moments of unit forces on these points, as one vector
-        with an entry for each force, are this long at most.
+        It is the root of the sum of squares of the platform points' distances from the axis along
+        k through their mean.
         """
         # From the first point, so that points that coincide do so to the last bit.
         first = self.platform.offsets[0].a
@@ -130,18 +130,18 @@ class Closure(ABC):
         return ca.sqrt(sum(ca.dot(point - center, point - center) for point in points))
 
     @property
-    def _in_line(self) -> bool:
-        """Whether all platform points are on one line along k, but for rounding, in numbers."""
+    def _points_are_collinear(self) -> bool:
+        """Whether all platform points are numbers and, up to rounding, on one line along k."""
         size = sum(ca.norm_2(offset.a) for offset in self.platform.offsets)
         if not size.is_constant():
             return False
-        return bool(float(self._lever) <= _COINCIDENT * float(size))
+        return bool(float(self._moment_bound) <= _COINCIDENT * float(size))
 
     keeps_modes: bool = False
-    """Whether each column of `poses` is one assembly mode throughout."""
+    """Whether each column of `poses` belongs to one assembly mode for all joint coordinates."""
 
     def vanishes(self) -> bool | None:
-        """Say whether J is singular at every pose, for a machine in numbers; None: not known."""
+        """Return whether J is singular at every pose of a numerical machine; None if unknown."""
         return None
 
     orientation: tuple[Expression, Expression] | None = None
@@ -149,16 +149,16 @@ class Closure(ABC):
     are singular (type II); None where that depends on the position, or never happens."""
 
 
-def nan_below_zero(value: Expression) -> Expression:
-    """Return NaN where a value is below zero, else 0."""
-    return ca.if_else(value < 0, ca.SX.nan(), 0)
+def nan_below_zero(radicand: Expression) -> Expression:
+    """Return the validity of a square root: NaN where the radicand is below zero, else 0."""
+    return ca.if_else(radicand < 0, ca.SX.nan(), 0)
 
 
 def plain_rows(platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-    """Return A (n, m): J's rows, against the platform's quasi-velocities, times their divisors."""
-    return against(platform, [leg.row for leg in legs])
+    """Return A (n, m), the rows of J in the platform's quasi-velocities, times their divisors."""
+    return rows_in_quasi_velocities(platform, [leg.row for leg in legs])
 
 
-def against(platform: PlatformMotion, rows: Sequence[Expression]) -> Expression:
-    """Return rows (n, m) against the quasi-velocities from the legs' (1, 6) against (c', omega)."""
+def rows_in_quasi_velocities(platform: PlatformMotion, rows: Sequence[Expression]) -> Expression:
+    """Return the legs' rows (1, 6) in (c', omega) as rows (n, m) in the quasi-velocities."""
     return ca.vertcat(*(ca.mtimes(*pair) for pair in zip(rows, platform.matrices, strict=True)))

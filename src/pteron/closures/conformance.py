@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.bodies.agreement import differing
+from pteron.bodies.agreement import mismatched_names
 from pteron.bodies.motion import Expression
 from pteron.closures import kind_for
 from pteron.closures.closure import plain_rows
@@ -44,16 +44,16 @@ def faults(
     points = [ca.SX(ca.DM(list(leg.platform_point))) for leg in legs]
     fixed = [ca.SX(ca.DM(list(leg.fixed_offset))) for leg in legs]
     frame = [ca.SX(ca.DM(list(axis))) for axis in platform.frame]
-    own = platform.kind(frame, points, fixed)
-    kind = kind_for([type(one) for one in equations], type(own))
+    platform_equations = platform.kind(frame, points, fixed)
+    kind = kind_for([type(leg) for leg in equations], type(platform_equations))
     if kind is None:
         return ("no closure fits these legs under this platform",)
-    closure = kind(equations, own)
+    closure = kind(equations, platform_equations)
     x = ca.SX(ca.DM(np.asarray(pose, dtype=float)))
-    rest = 0 * x
-    motion = own.motion(x, rest, rest)
-    trios = zip(equations, motion.points, fixed, strict=True)
-    state = [leg.motion(c, motion.rotation_at(c, t0)) for leg, c, t0 in trios]
+    zero_rates = 0 * x
+    motion = platform_equations.motion(x, zero_rates, zero_rates)
+    leg_points = zip(equations, motion.points, fixed, strict=True)
+    state = [leg.motion(c, motion.rotation_at(c, t0)) for leg, c, t0 in leg_points]
     joints = ca.vertcat(*(leg.coordinate for leg in state))
     divisors = ca.vertcat(*(leg.divisor for leg in state))
     jacobian = plain_rows(motion, state) / ca.repmat(divisors, 1, x.shape[0])
@@ -78,4 +78,4 @@ def faults(
         pairs["poses: the pose is not among them"] = ca.SX(columns[:, int(nearest)]), x
     size = abs(float(ca.evalf(closure.measure(motion, state))))
     faulty = () if 0.0 < size <= 1.0 + 1e-9 else (f"measure: {size:g}, not in (0, 1]",)
-    return (*differing(pairs), *faulty)
+    return (*mismatched_names(pairs), *faulty)

@@ -50,7 +50,7 @@ class ConstantRows(Closure):
             return
         normal = ca.mtimes(self.rows.T, self.rows)
         self.right_inverse = ca.mtimes(self.rows, adjugate(normal)) / determinant(normal)
-        null = ca.vertcat(*((-1) ** i * determinant(_without(self.rows, i)) for i in range(4)))
+        null = ca.vertcat(*((-1) ** i * determinant(_delete_row(self.rows, i)) for i in range(4)))
         self.null = null / ca.norm_inf(null) if null.is_constant() else null  # N
         # j = cosines cos(phi) + sines sin(phi) is the Jacobian's fourth column.
         pairs = list(zip(bars, platform.offsets, strict=True))
@@ -62,7 +62,7 @@ class ConstantRows(Closure):
     keeps_modes = True
 
     def vanishes(self) -> bool:
-        """Say so where all rows lie in a plane, and for layouts with fourfold symmetry about k."""
+        """Return whether all rows lie in a plane, or the layout has fourfold symmetry about k."""
         return self._vanishes
 
     @cached_property
@@ -70,11 +70,11 @@ class ConstantRows(Closure):
         sizes = np.linalg.svd(np.array(ca.evalf(self.rows)), compute_uv=False)
         if sizes[-1] <= _VANISHING * sizes[0] or self.orientation is None:
             return bool(sizes[-1] <= _VANISHING * sizes[0])
-        # Relative to what cannot vanish by cancellation, else noise is measured against noise.
+        # Relative to sizes that cannot vanish by cancellation: rounding has no other scale here.
         null = np.abs(np.array(ca.evalf(self.null))).max()
         bars = np.linalg.norm(np.array(ca.evalf(self.rows)), axis=1).max()
         points = max(float(ca.norm_2(ca.DM(ca.evalf(s)))) for s in self.platform.points)
-        a, b = (float(value) for value in self.orientation)
+        a, b = (float(coefficient) for coefficient in self.orientation)
         size = np.hypot(a, b)
         return bool(size <= _VANISHING * null * bars * points)
 
@@ -88,9 +88,9 @@ class ConstantRows(Closure):
         rows: Sequence[Expression],
         sizes: Sequence[Expression] | None = None,
     ) -> Expression:
-        """Return the measure, of N . j's sign, by which the columns of `poses` are told apart.
+        """Return the type-II measure, with the sign of N . j, which the columns of `poses` have.
 
-        Of a machine that is singular everywhere only rounding would be left: it is 0.
+        It is 0 for a machine that is singular everywhere, where N . j is rounding alone.
         """
         if self.rows.is_constant() and self.vanishes():
             return ca.SX(0)
@@ -130,29 +130,29 @@ class ConstantRows(Closure):
         The first column has N . j > 0, the second N . j < 0, so that each column is one assembly
         mode throughout. NaN where it is not real, C^2 > A'^2 + B'^2.
         """
-        known, sizes = [], []
+        constants, sizes = [], []
         for leg, offset, q in zip(
             self.legs, self.platform.offsets, ca.vertsplit(joints), strict=True
         ):
             locus = leg.locus(q)
             assert isinstance(locus, Plane)
-            still = offset.still if self.turns else offset.still + offset.a
-            known.append(locus.offset - ca.dot(locus.normal, still))
+            constant = offset.constant if self.turns else offset.constant + offset.a
+            constants.append(locus.offset - ca.dot(locus.normal, constant))
             sizes.append(locus.size)
-        right = ca.vertcat(*known)
+        right = ca.vertcat(*constants)
         if self.orientation is None:
             return ca.mtimes(self.right_inverse.T, right)
         # The derivative of d_bar . s with respect to phi is j, so that d_bar . s itself is
         # cosines sin(phi) - sines cos(phi); hence A' = -B and B' = A.
         a, b = self.orientation
         total, square = ca.dot(self.null, right), a * a + b * b
-        # At a singular orientation both poses meet and the radicand is all rounding: what is barely
-        # below zero counts as zero, an error of 1e-7 rad there. N . known cancels the sizes of its
-        # terms, but not their rounding.
-        rest = square - total * total
+        # At a singular orientation both poses meet and the radicand is rounding alone: a radicand
+        # barely below zero counts as zero, an error of 1e-7 rad there. N . constants cancels the
+        # sizes of its terms, but not their rounding.
+        discriminant = square - total * total
         size = ca.dot(ca.fabs(self.null), ca.vertcat(*sizes))
         slack = _ROUNDING * (square + ca.sqrt(square) * size)
-        radicand = ca.fmax(rest, ca.fmin(rest + slack, 0))
+        radicand = ca.fmax(discriminant, ca.fmin(discriminant + slack, 0))
         root = ca.sqrt(radicand)
         poses = []
         for branch in (1, -1):
@@ -164,13 +164,13 @@ class ConstantRows(Closure):
 
 
 def _sparse_inverse(rows: Expression) -> Expression:
-    """Return a P with D^T P = 1 that loads three legs only: those that hold a force best."""
-    best = max(range(4), key=lambda i: abs(float(determinant(_without(rows, i)))))
-    held = _without(rows, best)
-    inverse = ca.vertsplit(adjugate(held).T / determinant(held))
+    """Return a P with D^T P = 1 whose forces act on three legs, those of the largest minor of D."""
+    best = max(range(4), key=lambda i: abs(float(determinant(_delete_row(rows, i)))))
+    three_rows = _delete_row(rows, best)
+    inverse = ca.vertsplit(adjugate(three_rows).T / determinant(three_rows))
     inverse.insert(best, ca.SX.zeros(1, 3))
     return ca.vertcat(*inverse)
 
 
-def _without(rows: Expression, i: int) -> Expression:
+def _delete_row(rows: Expression, i: int) -> Expression:
     return ca.vertcat(*(rows[j, :] for j in range(rows.shape[0]) if j != i))

@@ -18,16 +18,16 @@ def determinant(m: Expression) -> Expression:
     if m.shape[0] == 6:
         upper, lower = (_triples(ca.horzsplit(half)) for half in (m[:3, :], m[3:, :]))
         return sum(
-            _sign((*three, *_others(three))) * volume * lower[_others(three)]
+            _sign((*three, *_complement(three))) * volume * lower[_complement(three)]
             for three, volume in upper.items()
         )
     return ca.mtimes(m[0, :], adjugate(m)[:, 0])
 
 
-def solved(m: Expression, right: Expression) -> tuple[Expression, Expression]:
+def solve(m: Expression, right: Expression) -> tuple[Expression, Expression]:
     """Return x (n, K) and d = det m with m x = d right."""
-    across = adjugate(m)
-    return ca.mtimes(across, right), ca.mtimes(m[0, :], across[:, 0])
+    adj = adjugate(m)
+    return ca.mtimes(adj, right), ca.mtimes(m[0, :], adj[:, 0])
 
 
 def adjugate(m: Expression) -> Expression:
@@ -45,16 +45,16 @@ def adjugate(m: Expression) -> Expression:
     return ca.horzcat(*columns)
 
 
-def solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (n, K) and d with A^T x = d w; for A's rows, n = 2 to 4 or 6.
+def solve_transposed(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
+    """Return x (n, K) and d with A^T x = d w, from the rows of A (n, n), n = 2 to 4 or 6.
 
-    d is det A, or 1 where x is found without it, and not finite where det A is 0.
+    d is det A, or 1 where the solution needs no determinant; x is not finite where det A is 0.
     """
     if rows.shape[0] == 6 and right.shape[1] == 1:
-        return _six_solved_across(rows, right), ca.SX(1)
+        return _solve_six_transposed(rows, right), ca.SX(1)
     if right.shape[1] > 1 or rows.shape[0] == 2:
-        across = adjugate(rows)
-        return ca.mtimes(across.T, right), ca.mtimes(rows[0, :], across[:, 0])
+        adj = adjugate(rows)
+        return ca.mtimes(adj.T, right), ca.mtimes(rows[0, :], adj[:, 0])
     # Cramer's rule, with each minor computed once.
     if rows.shape[0] == 3:
         a, b, c = (row.T for row in ca.vertsplit(rows))
@@ -69,7 +69,7 @@ def solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expr
         terms = ((i, j), (k, m), 1), ((i, k), (j, m), -1), ((i, m), (j, k), 1)
         return sum(s * (upper[a] * lower[b] + upper[b] * lower[a]) for a, b, s in terms)
 
-    # With w in place of one row's vector, put last: its sign is that of the way there.
+    # Cramer's numerators: w replaces one row's vector and stands last, hence the signs.
     swapped = -volume(1, 2, 3, 4), volume(0, 2, 3, 4), -volume(0, 1, 3, 4), volume(0, 1, 2, 4)
     return ca.vertcat(*swapped), volume(0, 1, 2, 3)
 
@@ -85,12 +85,12 @@ def _minors(rows: Expression) -> dict[tuple[int, int], Expression]:
 def _cofactors(m: Expression, row: int, minors: dict[tuple[int, int], Expression]) -> Expression:
     """Return the cofactors of a row (4, 1), from the minors of the pair of rows it is not in."""
     other = m[row ^ 1, :]
-    found = []
+    cofactors = []
     for column in range(4):
         i, j, k = (c for c in range(4) if c != column)
         minor = other[i] * minors[j, k] - other[j] * minors[i, k] + other[k] * minors[i, j]
-        found.append((-1) ** (row + column) * minor)
-    return ca.vertcat(*found)
+        cofactors.append((-1) ** (row + column) * minor)
+    return ca.vertcat(*cofactors)
 
 
 # Six rows: Laplace's expansion by three rows and three, whose minors are triple products.
@@ -111,7 +111,7 @@ def _crosses(columns: Sequence[Expression]) -> dict[tuple[int, int], Expression]
     return {(i, j): ca.cross(columns[i], columns[j]) for i, j in pairs}
 
 
-def _others(three: _Three) -> _Three:
+def _complement(three: _Three) -> _Three:
     return tuple(i for i in range(6) if i not in three)
 
 
@@ -127,34 +127,34 @@ def _adjugate_of_six(m: Expression) -> Expression:
     for c in range(6):
         slopes = [ca.SX(3, 1), ca.SX(3, 1)]
         for i, j in combinations([k for k in range(6) if k != c], 2):
-            rest = _others((i, j, c))
-            for half, order in enumerate([(i, j, c, *rest), (*rest, i, j, c)]):
-                slopes[half] += _sign(order) * crosses[half][i, j] * triples[1 - half][rest]
+            complement = _complement((i, j, c))
+            for half, order in enumerate([(i, j, c, *complement), (*complement, i, j, c)]):
+                slopes[half] += _sign(order) * crosses[half][i, j] * triples[1 - half][complement]
         rows.append(ca.vertcat(*slopes).T)
     return ca.vertcat(*rows)
 
 
-class _Reflected(NamedTuple):
-    """The factors of A^T = L Q for six rows, Q being a product of Householder's reflections.
+class _LQFactors(NamedTuple):
+    """The LQ factors of A^T for six rows, Q being a product of Householder reflections.
 
     L is lower triangular. A reflection takes x to x - v (v.x) 2/(v.v); row by row it makes zeros
-    right of L's diagonal, whose sign is that which cancels nothing in v.
+    right of L's diagonal, whose sign avoids cancellation in v.
     """
 
     lower: list[list[Expression]]
     """L's rows."""
     squares: list[Expression]
-    """Those of L's diagonal."""
+    """Squares of L's diagonal."""
     mirrors: list[tuple[Expression, Expression]]
     """v and 2/(v.v), of each row but the last."""
 
     @classmethod
-    def of(cls, rows: Expression) -> _Reflected:
+    def factorise(cls, rows: Expression) -> _LQFactors:
         """Return the factors for the rows of A."""
-        lower, squares, mirrors = made = cls([], [], [])
+        lower, squares, mirrors = factors = cls([], [], [])
         for k, row in enumerate(ca.horzsplit(rows)):
             for mirror in mirrors:
-                row = _mirrored(row, mirror)
+                row = _reflect(row, mirror)
             first, square = row[k], ca.dot(row[k:], row[k:])
             if k < 5:
                 size = ca.sqrt(square) * (ca.if_else(first > 0, 2, 0) - 1)
@@ -163,25 +163,25 @@ class _Reflected(NamedTuple):
                 first = -size
             lower.append([*ca.vertsplit(row[:k]), first])
             squares.append(square)
-        return made
+        return factors
 
 
-def _mirrored(x: Expression, mirror: tuple[Expression, Expression]) -> Expression:
+def _reflect(x: Expression, mirror: tuple[Expression, Expression]) -> Expression:
     v, factor = mirror
     return x - v * (ca.dot(v, x) * factor)
 
 
 def determinant_square(rows: Expression) -> Expression:
-    """Return the square of the determinant of six rows, at no cost beside `solved_across`."""
-    return reduce(mul, _Reflected.of(rows).squares)
+    """Return the square of the determinant of six rows, at no cost beside `solve_transposed`."""
+    return reduce(mul, _LQFactors.factorise(rows).squares)
 
 
-def _six_solved_across(rows: Expression, right: Expression) -> Expression:
+def _solve_six_transposed(rows: Expression, right: Expression) -> Expression:
     """Return x with A^T x = w: L Q x = w."""
-    lower, _, mirrors = _Reflected.of(rows)
-    found: list[Expression] = []
-    for row, rest in zip(lower, ca.vertsplit(right), strict=True):
-        for value, entry in zip(found, row, strict=False):
-            rest = rest - value * entry
-        found.append(rest / row[-1])
-    return reduce(_mirrored, reversed(mirrors), ca.vertcat(*found))
+    lower, _, mirrors = _LQFactors.factorise(rows)
+    components: list[Expression] = []
+    for row, residual in zip(lower, ca.vertsplit(right), strict=True):
+        for component, coefficient in zip(components, row, strict=False):
+            residual = residual - component * coefficient
+        components.append(residual / row[-1])
+    return reduce(_reflect, reversed(mirrors), ca.vertcat(*components))

@@ -17,7 +17,7 @@ _ROUNDING = 1e-14
 """Share of the sum of two squares up to which a difference below zero counts as rounding."""
 
 
-def moved(locus: Locus, offset: Expression) -> Locus:
+def shift_locus(locus: Locus, offset: Expression) -> Locus:
     """Return the locus of the platform's point P from that of P + offset."""
     assert not isinstance(locus, Turned)
     if isinstance(locus, Plane):
@@ -30,8 +30,8 @@ def meeting_points(
 ) -> tuple[Expression, Expression]:
     """Return the points, as columns, in which as many loci meet as the platform has lengths.
 
-    They are two, mirrored in a plane or a line; planes alone meet in one. Where they are not real
-    they are NaN, and so is the number returned beside them, which else is 0.
+    Two points, mirrored in a plane or a line; planes alone meet in one. The second value is the
+    validity, 0, or NaN where the points are not real, as they then are themselves.
     """
     if platform.directions.shape[1] == 2:
         return _meeting_in_plane(loci, platform)
@@ -43,22 +43,22 @@ def _meeting_in_space(loci: Sequence[Locus]) -> tuple[Expression, Expression]:
     planes = [(locus.normal, locus.offset) for locus in loci if isinstance(locus, Plane)]
     if not spheres:
         normals, offsets = (ca.horzcat(*parts) for parts in zip(*planes, strict=True))
-        across = adjugate(normals.T)
-        point = ca.mtimes(across, offsets.T) / ca.mtimes(normals[:, 0].T, across[:, 0])
+        adj = adjugate(normals.T)
+        point = ca.mtimes(adj, offsets.T) / ca.mtimes(normals[:, 0].T, adj[:, 0])
         return point, ca.SX(0)
     first, *others = spheres
     # Two planes n . (p - o) = h, o being the centre of the first sphere.
     planes = [(normal, offset - ca.dot(normal, first.center)) for normal, offset in planes]
     for sphere in others:
-        apart = sphere.center - first.center
+        displacement = sphere.center - first.center
         gap = first.radius * first.radius - sphere.radius * sphere.radius
-        planes.append((apart, 0.5 * (gap + ca.dot(apart, apart))))
+        planes.append((displacement, 0.5 * (gap + ca.dot(displacement, displacement))))
     (n1, h1), (n2, h2) = planes
-    along = ca.cross(n1, n2)
-    square = ca.dot(along, along)
-    foot = (h1 * ca.cross(n2, along) + h2 * ca.cross(along, n1)) / square
-    share, beyond = _half_chord(first.radius * first.radius, ca.dot(foot, foot), square)
-    return _both_sides(first.center + foot, share * along, beyond)
+    line_direction = ca.cross(n1, n2)
+    square = ca.dot(line_direction, line_direction)
+    foot = (h1 * ca.cross(n2, line_direction) + h2 * ca.cross(line_direction, n1)) / square
+    share, validity = _half_chord(first.radius * first.radius, ca.dot(foot, foot), square)
+    return _mirrored_points(first.center + foot, share * line_direction, validity)
 
 
 def _meeting_in_plane(
@@ -78,26 +78,28 @@ def _meeting_in_plane(
     (first, square), *others = circles
     lines = [(normal, offset - ca.dot(normal, first)) for normal, offset in lines]
     for center, other in others:
-        apart = center - first
-        lines.append((apart, 0.5 * (square - other + ca.dot(apart, apart))))
+        displacement = center - first
+        lines.append((displacement, 0.5 * (square - other + ca.dot(displacement, displacement))))
     ((normal, height),) = lines
     n2 = ca.dot(normal, normal)
     foot = (height / n2) * normal
-    share, beyond = _half_chord(square, ca.dot(foot, foot), n2)
-    return _both_sides(first + foot, share * quarter_turn(normal), beyond)
+    share, validity = _half_chord(square, ca.dot(foot, foot), n2)
+    return _mirrored_points(first + foot, share * quarter_turn(normal), validity)
 
 
-def _both_sides(
-    middle: Expression, step: Expression, beyond: Expression
+def _mirrored_points(
+    middle: Expression, step: Expression, validity: Expression
 ) -> tuple[Expression, Expression]:
-    return ca.horzcat(*(middle + side * step + beyond for side in (-1, 1))), beyond
+    return ca.horzcat(*(middle + side * step + validity for side in (-1, 1))), validity
 
 
 def _half_chord(
     radius2: Expression, distance2: Expression, square: Expression
 ) -> tuple[Expression, Expression]:
-    """Return half a chord over the length of a vector of this square; and NaN if it is not real."""
+    """Return half a chord over the length of a vector of this square, and the validity (0, NaN)."""
     # Where both points meet the radicand is all rounding: barely below zero counts as zero.
-    rest = radius2 - distance2
-    radicand = ca.fmax(rest, ca.fmin(rest + _ROUNDING * (radius2 + distance2), 0))
+    square_difference = radius2 - distance2
+    radicand = ca.fmax(
+        square_difference, ca.fmin(square_difference + _ROUNDING * (radius2 + distance2), 0)
+    )
     return ca.sqrt(radicand / square), nan_below_zero(radicand)

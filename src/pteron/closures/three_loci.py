@@ -13,7 +13,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure
-from pteron.closures.loci import meeting_points, moved
+from pteron.closures.loci import meeting_points, shift_locus
 from pteron.legs.leg import LegEquations
 from pteron.platforms.motion import PlatformEquations
 
@@ -29,5 +29,5 @@ class ThreeLoci(Closure):
 
     def poses(self, joints: Expression) -> Expression:
         pairs = zip(self.legs, ca.vertsplit(joints), self.platform.offsets, strict=True)
-        loci = [moved(leg.locus(q), offset.a + offset.still) for leg, q, offset in pairs]
+        loci = [shift_locus(leg.locus(q), offset.a + offset.constant) for leg, q, offset in pairs]
         return meeting_points(loci, self.platform)[0]

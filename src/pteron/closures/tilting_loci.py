@@ -13,7 +13,7 @@ from operator import mul
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import Closure, against, plain_rows
+from pteron.closures.closure import Closure, plain_rows, rows_in_quasi_velocities
 from pteron.closures.determinants import determinant, determinant_square
 from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations, LegMotion
@@ -48,34 +48,34 @@ class TiltingLoci(Closure):
         rows: Sequence[Expression],
         sizes: Sequence[Expression] | None = None,
     ) -> Expression:
-        """Return the type-II measure, of the forces that legs and the platform's planes exert.
+        """Return the type-II measure of the forces that the legs and the platform's planes exert.
 
-        It is the determinant of their rows against (v, omega) of P, or omega where P stays, each a
-        unit force, over an upper bound of the determinant of so many unit forces on these points:
-        with moments counted by the root of a third of the sum of squares of the points' distances
-        from their mean, or from P. The bound need not be reached: `stewart` reaches 0.84 of it.
+        It is the determinant of their rows in (v, omega) of P, or omega where P stays, each row a
+        unit force, over an upper bound of the determinant of as many unit forces on these points.
+        The moments' unit of length is the root of a third of the sum of squares of the points'
+        distances from their mean, or from P. `stewart` reaches 0.84 of the bound.
         """
-        held, size = self.platform.held_rows(platform), reduce(mul, sizes or [ca.SX(1)])
-        if held is None:
-            return determinant(against(platform, rows)) / (self._bound(1) * size)
+        constraint_rows, size = self.platform.held_rows(platform), reduce(mul, sizes or [ca.SX(1)])
+        if constraint_rows is None:
+            return determinant(rows_in_quasi_velocities(platform, rows)) / (self._bound(1) * size)
         pairs = zip(rows, platform.point_twists, strict=True)
-        whole = ca.vertcat(*(ca.mtimes(row, twist) for row, twist in pairs), held)
-        return determinant(whole) / (self._bound(2) * size)
+        all_rows = ca.vertcat(*(ca.mtimes(row, twist) for row, twist in pairs), constraint_rows)
+        return determinant(all_rows) / (self._bound(2) * size)
 
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> list[Expression]:
-        """Return it by the determinant, or by the rows that `forces` makes orthogonal."""
-        found = super().measure_squares(platform, legs)
+        """Return the measure's square by the determinant, and by the LQ factors of `forces`."""
+        squares = super().measure_squares(platform, legs)
         if len(legs) == 6:
-            most = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))
-            found.append(determinant_square(plain_rows(platform, legs)) / (most * most))
-        return found
+            bound = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))
+            squares.append(determinant_square(plain_rows(platform, legs)) / (bound * bound))
+        return squares
 
     def _bound(self, forces: int) -> Expression:
-        """Return an upper bound of the determinant of so many unit forces at each point.
+        """Return an upper bound of the determinant of `forces` unit forces at each point.
 
-        By Fischer's inequality and that of the arithmetic and geometric means.
+        It follows from Fischer's inequality and that of the arithmetic and geometric means.
         """
         points, centred = self.platform.points, "z" not in self.platform.coordinates
         center = ca.SX(3, 1) if centred else sum(points) / len(points)

@@ -16,7 +16,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure
 from pteron.closures.determinants import adjugate
-from pteron.closures.loci import meeting_points, moved
+from pteron.closures.loci import meeting_points, shift_locus
 from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations, Plane, Turned
 from pteron.platforms.motion import PlatformEquations
@@ -27,16 +27,16 @@ class TurningLoci(Closure):
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)
-        held = any(isinstance(leg.locus(ca.SX(0)), Turned) for leg in legs)
-        curved = sum(not leg.row_is_constant for leg in legs) - held
-        self.closed_form = held or not curved
-        self._most = 2 * len(legs)
+        fixes_angle = any(isinstance(leg.locus(ca.SX(0)), Turned) for leg in legs)
+        curved = sum(not leg.row_is_constant for leg in legs) - fixes_angle
+        self.closed_form = fixes_angle or not curved
+        self._mode_count = 2 * len(legs)
         if self.closed_form:
-            self._most = 2 if curved else 1
+            self._mode_count = 2 if curved else 1
         elif platform.slides:
-            self._most = 2 * curved
+            self._mode_count = 2 * curved
         elif curved == 1:
-            self._most = 4
+            self._mode_count = 4
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
@@ -44,30 +44,32 @@ class TurningLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The degree of what is left of the closures."""
-        return self._most
+        """The degree of the polynomial that elimination leaves."""
+        return self._mode_count
 
     def poses(self, joints: Expression) -> Expression:
         loci = [leg.locus(q) for leg, q in zip(self.legs, ca.vertsplit(joints), strict=True)]
         offsets = self.platform.offsets
-        for held in loci:
-            if isinstance(held, Turned):
-                c, s = ca.cos(held.angle), ca.sin(held.angle)
+        for angle_locus in loci:
+            if isinstance(angle_locus, Turned):
+                c, s = ca.cos(angle_locus.angle), ca.sin(angle_locus.angle)
                 others = [
-                    moved(locus, still + a * c + b * s)
-                    for locus, (a, b, still) in zip(loci, offsets, strict=True)
-                    if locus is not held
+                    shift_locus(locus, constant + a * c + b * s)
+                    for locus, (a, b, constant) in zip(loci, offsets, strict=True)
+                    if locus is not angle_locus
                 ]
-                points, beyond = meeting_points(others, self.platform)
-                return ca.vertcat(points, ca.repmat(held.angle + beyond, 1, points.shape[1]))
+                points, validity = meeting_points(others, self.platform)
+                return ca.vertcat(
+                    points, ca.repmat(angle_locus.angle + validity, 1, points.shape[1])
+                )
         rows, heights = [], []
-        for locus, (a, _, still) in zip(loci, offsets, strict=True):
+        for locus, (a, _, constant) in zip(loci, offsets, strict=True):
             if not isinstance(locus, Plane):
                 raise ModelError(
                     "direct_kinematics: these legs have no closed form of it under a platform with "
                     'an angle; "direct_step" follows the pose from one that is near'
                 )
             rows.append(ca.horzcat(locus.normal.T, ca.dot(locus.normal, a)))
-            heights.append(locus.offset - ca.dot(locus.normal, still))
-        across = adjugate(ca.vertcat(*rows))
-        return ca.mtimes(across, ca.vertcat(*heights)) / ca.mtimes(rows[0], across[:, 0])
+            heights.append(locus.offset - ca.dot(locus.normal, constant))
+        adj = adjugate(ca.vertcat(*rows))
+        return ca.mtimes(adj, ca.vertcat(*heights)) / ca.mtimes(rows[0], adj[:, 0])

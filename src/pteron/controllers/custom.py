@@ -14,9 +14,9 @@ from pteron.controllers.joint_numbers import period_of
 from pteron.errors import DataError, shown
 from pteron.kernels import Array, Port, Program, as_array
 from pteron.kernels.code import C
-from pteron.kernels.exponential import straight
+from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import graph_of
-from pteron.kernels.loop_code import TOLD
+from pteron.kernels.loop_code import LOOP_INPUTS
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.toml import told
 
@@ -78,7 +78,7 @@ class Custom:
         object.__setattr__(self, "period", period_of(self.period))
         named, faults = set(self.parameters), []
         names = self.function.name_in(), self.function.name_out()
-        unknown = [name for name in names[0] if name not in {*TOLD, *named}]
+        unknown = [name for name in names[0] if name not in {*LOOP_INPUTS, *named}]
         if unknown:
             faults.append(
                 f"{', '.join(unknown)}: no sensor gives it; there are the readings joints, "
@@ -86,7 +86,9 @@ class Custom:
                 "memory; for a parameter give its numbers in `parameters`"
             )
         faults += [f"parameters: {n}: no input has that name" for n in named - set(names[0])]
-        faults += [f"parameters: {n}: is a reading or the reference" for n in named & set(TOLD)]
+        faults += [
+            f"parameters: {n}: is a reading or the reference" for n in named & set(LOOP_INPUTS)
+        ]
         expected = ["forces", *_MEMORY[1:]] if _MEMORY[0] in names[0] else ["forces"]
         if sorted(names[1]) != sorted(expected):
             faults.append(f"outputs: {', '.join(names[1])} given, {', '.join(expected)} expected")
@@ -109,7 +111,7 @@ class Custom:
             coordinates.
         """
         model = as_manipulator(model)
-        sizes = dict.fromkeys(TOLD, model.joint_count) | {"forces": model.joint_count}
+        sizes = dict.fromkeys(LOOP_INPUTS, model.joint_count) | {"forces": model.joint_count}
         sizes |= dict.fromkeys(_REFERENCE, model.freedom)
         for name in _MEMORY:
             sizes.pop(name, None)
@@ -146,7 +148,7 @@ class Custom:
             function.name(), columns, [ca.vec(ca.densify(results[name])) for name in names],
             function.name_in(), names,
         )  # fmt: skip
-        function = straight(function)
+        function = with_lowered_exponentials(function)
         graph = graph_of(function)
         without = sorted({graph.nodes[k].operation for k in graph.operations()} - {*C})
         if without:

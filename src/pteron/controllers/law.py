@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from pteron.equations.control import ADAPTED, GAINS, MEMORY, Layout, estimated, lengths
+from pteron.equations.control import ADAPTED, GAINS, MEMORY, Layout, estimate_count, lengths
 from pteron.equations.drives import drive_names
 from pteron.errors import DataError
 from pteron.kernels import Array, Program, as_array, columns_of, numeric, program
-from pteron.kernels.choice import Adaptive
+from pteron.kernels.choice import TieredKernel
 from pteron.kernels.loops import machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters
@@ -125,7 +125,7 @@ class Law:
         return machine | {"law_gains": self.gains.reshape(1, 1, -1)}
 
     @cached_property
-    def _kernel(self) -> Adaptive:
+    def _kernel(self) -> TieredKernel:
         return numeric(self.model, self.what, base=self.base)
 
     def estimates(self, memory: Array) -> Array:
@@ -178,7 +178,7 @@ class Law:
     def _sizes(self, layout: Layout) -> dict[str, int]:
         freedom = self.model.freedom
         inertial = 0 if self.base is None else self.base.selection.shape[1]
-        return lengths(layout[self.what], freedom, estimated(self.what, freedom, inertial))
+        return lengths(layout[self.what], freedom, estimate_count(self.what, freedom, inertial))
 
     def _parts(self, layout: Layout, vector: Array) -> dict[str, Array]:
         sizes = self._sizes(layout)

@@ -9,7 +9,7 @@ from pteron.design.design import Design
 from pteron.design.proofs import start_design
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import told_legs
+from pteron.manipulator.manipulator import legs_text
 from pteron.renamed import former_attribute
 
 _NONE = 1e-9
@@ -81,7 +81,7 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
                 key = what, round(drawn, 9), round(designed, 9), unit
                 legs_by_change.setdefault(key, []).append(place.leg)
     return [
-        Change(f"{what} of {told_legs(legs)}", drawn, designed, unit)
+        Change(f"{what} of {legs_text(legs)}", drawn, designed, unit)
         for (what, drawn, designed, unit), legs in legs_by_change.items()
     ]
 
@@ -97,7 +97,7 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
                     (leg.names[letter], drawn, round(designed, 9)), []
                 ).append(i)
     return [
-        Change(f"mass of {name} of {told_legs(legs)}", drawn, designed, "kg")
+        Change(f"mass of {name} of {legs_text(legs)}", drawn, designed, "kg")
         for (name, drawn, designed), legs in legs_by_change.items()
     ]
 

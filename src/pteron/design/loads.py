@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from pteron.bodies.inertia import inertia_count
-from pteron.bodies.tables import Number, Six, Table, Three, key
+from pteron.bodies.tables import Number, Six, Three, TomlTable, key
 from pteron.indices import ALUMINIUM, STEEL, Elasticity, Section, Tolerances
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -51,7 +51,7 @@ Each = Annotated[tuple[Least, ...], BeforeValidator(_numbers), Field(min_length=
 """One number of 0 or more for all legs, or one a leg."""
 
 
-class PayloadTable(Table):
+class PayloadTable(TomlTable):
     """`[payload]`: what the platform carries."""
 
     mass: Least = key("kg", 0.0)
@@ -72,7 +72,7 @@ class PayloadTable(Table):
         return carrying(robot, self.mass, self.center, tensor if tilts else tensor[5])
 
 
-class CycleTable(Table):
+class CycleTable(TomlTable):
     """`[[cycles]]`: a motion along lines through points, or the standard pick-and-place."""
 
     points: Annotated[list[tuple[Number, ...]], Field(min_length=2)] | None = key(
@@ -144,7 +144,7 @@ class CycleTable(Table):
         return sampled(course.at, course.duration, course.duration / (SAMPLES - 1))
 
 
-class ErrorsTable(Table):
+class ErrorsTable(TomlTable):
     """`[errors]`: what the machine's accuracy is worked out from, each to either side."""
 
     encoder: Each = key("errors of the joints, m or rad", (0.0,))
@@ -160,7 +160,7 @@ class ErrorsTable(Table):
         return Tolerances(joints, backlash, self.point, self.length, self.angle)
 
 
-class SectionTable(Table):
+class SectionTable(TomlTable):
     """A link's section: a round tube, a rod, or a square tube, of steel or aluminium."""
 
     diameter: Positive | None = key("of a round one, m", None)
@@ -187,7 +187,7 @@ class SectionTable(Table):
         return Section.tube(self.diameter, self.wall or self.diameter / 2.0, material)
 
 
-class ElasticityTable(Table):
+class ElasticityTable(TomlTable):
     """`[elasticity]`: what gives way under a force on the tool; what is left out is rigid."""
 
     force: Positive | None = key("on the tool, in any direction, N", None)
@@ -214,7 +214,7 @@ class ElasticityTable(Table):
         )
 
 
-class MotorsTable(Table):
+class MotorsTable(TomlTable):
     """`[motors]`: the motors to choose from, for `motor_margin`."""
 
     file: str = key("a CSV, Parquet or TOML file beside this one")

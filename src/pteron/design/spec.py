@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
-from pteron.bodies.tables import Count, Number, Table, Two, key
+from pteron.bodies.tables import Count, Number, TomlTable, Two, key
 from pteron.design.loads import (
     CycleTable,
     ElasticityTable,
@@ -41,7 +41,7 @@ def _rising(pair: tuple[float, float]) -> tuple[float, float]:
     return pair
 
 
-class VariableTable(Table):
+class VariableTable(TomlTable):
     """`[[variables]]`: numbers of the robot's file that move as one."""
 
     moves: Annotated[tuple[str, ...], BeforeValidator(listed), Field(min_length=1)] = key(
@@ -59,7 +59,7 @@ class VariableTable(Table):
     _rises = field_validator("range")(_rising)
 
 
-class WorkspaceTable(Table):
+class WorkspaceTable(TomlTable):
     """`[workspace]`: the region in which the machine must work.
 
     A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
@@ -144,21 +144,21 @@ class WorkspaceTable(Table):
         return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
 
 
-class FloorsTable(Table):
+class FloorsTable(TomlTable):
     """`[floors]`: least measures of the poses of the workspace, or of the cube."""
 
     type_i: Floor = key("type-I measure of every leg; 0: it need only reach", 0.05)
     type_ii: Floor = key("type-II measure of the machine; 0: it does not matter", 0.01)
 
 
-class MotionTable(Table):
+class MotionTable(TomlTable):
     """`[motion]`: the speed and acceleration, in every direction, that drives must give."""
 
     speed: Positive = key("of P in any direction, m/s", 1.0)
     acceleration: Positive = key("of P in any direction, m/s^2", 10.0)
 
 
-class ObjectiveTable(Table):
+class ObjectiveTable(TomlTable):
     """`[[objectives]]`: one quantity that is to be small, or large."""
 
     maximise: Annotated[str, Field()] | None = key("a quantity", None)
@@ -186,7 +186,7 @@ class ObjectiveTable(Table):
         return 1.0 if self.minimise else -1.0
 
 
-class RequirementTable(Table):
+class RequirementTable(TomlTable):
     """`[[requirements]]`: a quantity with a least or a greatest value."""
 
     quantity: str
@@ -226,7 +226,7 @@ class RequirementTable(Table):
         return f"{self.quantity} {' and '.join(bounds)}"
 
 
-class SearchTable(Table):
+class SearchTable(TomlTable):
     """`[search]`: size, length and seed of the search."""
 
     population: Annotated[int, Field(ge=4, strict=True)] = key("designs kept", 40)
@@ -237,7 +237,7 @@ class SearchTable(Table):
     seed: Annotated[int, Field(ge=0, strict=True)] = key("of all chance", 0)
 
 
-class Spec(Table):
+class Spec(TomlTable):
     """A search for a design, as in its TOML file."""
 
     robot: str = key("the machine to begin with: a catalog name or a TOML file")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import RobotLike
 from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PerJoint, PoseLike, Regressors
 
@@ -55,7 +55,9 @@ def inverse_dynamics(
     array([31.082, -1.881,  2.566,  0.685])
     """
     values = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
-    return evaluated(robot, "inverse_dynamics", on_failure, *values, wrench=wrench is not None)
+    return evaluate_kernel(
+        robot, "inverse_dynamics", on_failure, *values, wrench=wrench is not None
+    )
 
 
 def forward_dynamics(
@@ -107,7 +109,9 @@ def forward_dynamics(
     np.True_
     """
     values = [pose, velocity, forces, *([] if wrench is None else [wrench])]
-    return evaluated(robot, "forward_dynamics", on_failure, *values, wrench=wrench is not None)
+    return evaluate_kernel(
+        robot, "forward_dynamics", on_failure, *values, wrench=wrench is not None
+    )
 
 
 def drive_forces(
@@ -167,7 +171,7 @@ def drive_forces(
     """
     values = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
     what = "feed_forward" if smooth else "drive_forces"
-    return evaluated(robot, what, on_failure, *values, wrench=wrench is not None)
+    return evaluate_kernel(robot, what, on_failure, *values, wrench=wrench is not None)
 
 
 def drive_accelerations(
@@ -222,7 +226,9 @@ def drive_accelerations(
     array([1., 2., 3.])
     """
     values = [pose, velocity, forces, *([] if wrench is None else [wrench])]
-    return evaluated(robot, "drive_accelerations", on_failure, *values, wrench=wrench is not None)
+    return evaluate_kernel(
+        robot, "drive_accelerations", on_failure, *values, wrench=wrench is not None
+    )
 
 
 def regressor(
@@ -266,4 +272,4 @@ def regressor(
     >>> D.shape, np.allclose(D @ pteron.parameters(robot), pteron.inverse_dynamics(robot, *state))
     ((4, 40), True)
     """
-    return evaluated(robot, "regressor", on_failure, pose, velocity, acceleration)
+    return evaluate_kernel(robot, "regressor", on_failure, pose, velocity, acceleration)

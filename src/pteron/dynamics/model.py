@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import RobotLike
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
@@ -38,7 +38,7 @@ def mass_matrix(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "ra
     >>> np.allclose(M, M.T), np.linalg.eigvalsh(M).min() > 0
     (True, np.True_)
     """
-    return evaluated(robot, "mass_matrix", on_failure, pose)
+    return evaluate_kernel(robot, "mass_matrix", on_failure, pose)
 
 
 def coriolis_matrix(
@@ -68,7 +68,7 @@ def coriolis_matrix(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    return evaluated(robot, "coriolis_matrix", on_failure, pose, velocity)
+    return evaluate_kernel(robot, "coriolis_matrix", on_failure, pose, velocity)
 
 
 def bias_forces(
@@ -97,7 +97,7 @@ def bias_forces(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    return evaluated(robot, "bias_forces", on_failure, pose, velocity)
+    return evaluate_kernel(robot, "bias_forces", on_failure, pose, velocity)
 
 
 def gravity_forces(
@@ -126,7 +126,7 @@ def gravity_forces(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    return evaluated(robot, "gravity_forces", on_failure, pose)
+    return evaluate_kernel(robot, "gravity_forces", on_failure, pose)
 
 
 def kinetic_energy(
@@ -155,7 +155,7 @@ def kinetic_energy(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    return evaluated(robot, "kinetic_energy", on_failure, pose, velocity)
+    return evaluate_kernel(robot, "kinetic_energy", on_failure, pose, velocity)
 
 
 def potential_energy(
@@ -184,4 +184,4 @@ def potential_energy(
     SingularPose
         If the two ends of a leg coincide, so that its elbow is undetermined.
     """
-    return evaluated(robot, "potential_energy", on_failure, pose)
+    return evaluate_kernel(robot, "potential_energy", on_failure, pose)

@@ -1,14 +1,14 @@
 """Clearances between a machine's bodies: least distances of their centre lines.
 
-A body is one straight segment or more: a leg's links and rods, a slider's guide within its limits,
-the platform as arms from P to its points. Left out are pairs of bodies that share a joint, and
-pairs of guides, which do not move.
+A body is one or more straight segments: a leg's links and rods, a slider's guide within its limits,
+the platform as arms from P to its points. Pairs of bodies that share a joint, and pairs of guides,
+which do not move, are excluded.
 
 The squared distance of two segments is a convex quadratic over the unit square of the places s and
 t on them. Its least value is at its stationary point, where that is inside, else on one of the four
-edges, where one segment's end is nearest to the other. All five are places on the segments, so that
-the least of them is the distance and none needs a branch; for parallel segments the stationary
-point may be any, and an edge is as near.
+edges, where one segment's end is nearest to the other. All five are points of the segments, so that
+the least of their distances is exact and no branch is needed; for parallel segments the stationary
+point is arbitrary, and an edge is as near.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Kind = Literal["guide", "upper", "lower", "leg", "platform"]
 parts slide on one line (a ram or a shaft), the platform."""
 
 _COINCIDENT = 1e-9
-"""Distance below which points, or guides, count as one, m."""
+"""Distance below which points, or guides, count as coincident, m."""
 
 _TINY = 1e-24
 """Least value of a square (m^2, or a squared sine) in a denominator."""
@@ -44,7 +44,7 @@ _TINY = 1e-24
 
 @dataclass(frozen=True)
 class Body:
-    """A body that may meet others: what it is, and of which leg, from 1; 0 for the platform."""
+    """A body that may collide with others: its kind, and its leg, from 1; 0 for the platform."""
 
     kind: Kind
     leg: int
@@ -56,7 +56,7 @@ def bodies(robot: Manipulator) -> list[Body]:
 
     A guide without limits has no ends, and is left out.
     """
-    machine = Machine.of(robot)
+    machine = Machine.numeric(robot)
     state = machine.state(ca.SX.sym("pose", machine.freedom))
     return [body for body, _ in _segments(machine, state)]
 
@@ -73,31 +73,31 @@ def clearances(machine: Machine, pose: Expression) -> Expression:
 
 
 def meetings(robot: Manipulator) -> list[tuple[Kind, Kind]]:
-    """Return which kinds of bodies may meet, in the order of `least_clearances`."""
+    """Return the pairs of kinds of bodies that may collide, in the order of `least_clearances`."""
     return list(dict.fromkeys(_kinds(*pair) for pair in pairs(robot)))
 
 
 def least_clearances(machine: Machine, pose: Expression) -> Expression:
     """Return the least distance of centre lines over the pairs of the same kinds, (k, 1), m."""
-    found: dict[tuple[Kind, Kind], Expression] = {}
+    squares: dict[tuple[Kind, Kind], Expression] = {}
     for pair, square in _squares(machine, pose):
         kinds = _kinds(*pair)
-        found[kinds] = ca.fmin(found[kinds], square) if kinds in found else square
-    return ca.sqrt(ca.vertcat(*found.values())) if found else ca.SX(0, 1)
+        squares[kinds] = ca.fmin(squares[kinds], square) if kinds in squares else square
+    return ca.sqrt(ca.vertcat(*squares.values())) if squares else ca.SX(0, 1)
 
 
 def _kinds(a: Body, b: Body) -> tuple[Kind, Kind]:
-    one, other = sorted((a.kind, b.kind), key=get_args(Kind).index)
-    return one, other
+    first, second = sorted((a.kind, b.kind), key=get_args(Kind).index)
+    return first, second
 
 
 def _squares(machine: Machine, pose: Expression) -> Iterator[tuple[tuple[Body, Body], Expression]]:
     """Yield the pairs of bodies and their least squared distance."""
-    found = list(_segments(machine, machine.state(pose)))
-    for (one, first), (other, second) in combinations(found, 2):
-        if not _share_a_joint(machine.robot, one, other):
+    bodies = list(_segments(machine, machine.state(pose)))
+    for (body, first), (other_body, second) in combinations(bodies, 2):
+        if not _share_a_joint(machine.robot, body, other_body):
             squares = [squared_distance(a, b) for a in first for b in second]
-            yield (one, other), reduce(ca.fmin, squares)
+            yield (body, other_body), reduce(ca.fmin, squares)
 
 
 def squared_distance(first: Segment, second: Segment) -> Expression:
@@ -106,36 +106,36 @@ def squared_distance(first: Segment, second: Segment) -> Expression:
     u, v, w = p_end - p, q_end - q, p - q
     uu, vv, uv = ca.dot(u, u), ca.dot(v, v), ca.dot(u, v)
     uw, vw = ca.dot(u, w), ca.dot(v, w)
-    along_u, along_v = ca.fmax(uu, _TINY), ca.fmax(vv, _TINY)
+    u_square, v_square = ca.fmax(uu, _TINY), ca.fmax(vv, _TINY)
 
     def square(s: Expression, t: Expression) -> Expression:
-        apart = w + s * u - t * v
-        return ca.dot(apart, apart)
+        separation = w + s * u - t * v
+        return ca.dot(separation, separation)
 
-    across = ca.fmax(uu * vv - uv * uv, _TINY * along_u * along_v)
-    s = _within_one((uv * vw - vv * uw) / across)
-    found = square(s, _within_one((s * uv + vw) / along_v))
+    denominator = ca.fmax(uu * vv - uv * uv, _TINY * u_square * v_square)
+    s = _clip_to_unit((uv * vw - vv * uw) / denominator)
+    least = square(s, _clip_to_unit((s * uv + vw) / v_square))
     for end in (0.0, 1.0):
-        t = _within_one((end * uv + vw) / along_v)
-        s = _within_one((end * uv - uw) / along_u)
-        found = ca.fmin(found, ca.fmin(square(ca.SX(end), t), square(s, ca.SX(end))))
-    return found
+        t = _clip_to_unit((end * uv + vw) / v_square)
+        s = _clip_to_unit((end * uv - uw) / u_square)
+        least = ca.fmin(least, ca.fmin(square(ca.SX(end), t), square(s, ca.SX(end))))
+    return least
 
 
-def _within_one(share: Expression) -> Expression:
+def _clip_to_unit(share: Expression) -> Expression:
     return ca.fmin(ca.fmax(share, 0), 1)
 
 
 def _segments(machine: Machine, state: State) -> Iterator[tuple[Body, list[Segment]]]:
     robot = machine.robot
     for i, (leg, motion) in enumerate(zip(robot.legs, state.legs, strict=True), start=1):
-        yield from _of_leg(i, leg, motion, state.platform.points[i - 1].position)
+        yield from _leg_segments(i, leg, motion, state.platform.points[i - 1].position)
     arms = list(_arms(machine, state))
     if arms:
         yield Body("platform", 0, "platform"), arms
 
 
-def _of_leg(
+def _leg_segments(
     i: int, leg: LegKind, motion: LegMotion, c: Expression
 ) -> Iterator[tuple[Body, list[Segment]]]:
     if "p" in motion.bodies and leg.limits is not None and leg.joint_axis is not None:
@@ -183,7 +183,7 @@ def _arms(machine: Machine, state: State) -> Iterator[Segment]:
 
 
 def _share_a_joint(robot: Manipulator, a: Body, b: Body) -> bool:
-    """Say whether two bodies share a joint, are of one guide, or are both fixed."""
+    """Return whether two bodies share a joint or a guide, or are both fixed."""
     if a.kind == b.kind == "guide":
         return True
     last = [body.kind in ("lower", "leg") for body in (a, b)]
@@ -192,9 +192,11 @@ def _share_a_joint(robot: Manipulator, a: Body, b: Body) -> bool:
     if a.leg == b.leg:
         return {a.kind, b.kind} != {"guide", "lower"} or not _has_upper(robot.legs[a.leg - 1])
     if all(last):
-        return _at_one_point(robot, a.leg, b.leg)
+        return _share_platform_point(robot, a.leg, b.leg)
     guide, other = (a, b) if a.kind == "guide" else (b, a)
-    return guide.kind == "guide" and _first(robot, other) and _one_line(robot, guide.leg, other.leg)
+    return (
+        guide.kind == "guide" and _first(robot, other) and _share_line(robot, guide.leg, other.leg)
+    )
 
 
 def _has_upper(leg: LegKind) -> bool:
@@ -202,26 +204,26 @@ def _has_upper(leg: LegKind) -> bool:
 
 
 def _first(robot: Manipulator, body: Body) -> bool:
-    """Say whether a link is the one that begins at the slider."""
+    """Return whether a link is the one that begins at the slider."""
     return body.kind == "upper" or not _has_upper(robot.legs[body.leg - 1])
 
 
-def _at_one_point(robot: Manipulator, i: int, j: int) -> bool:
-    one, other = (
+def _share_platform_point(robot: Manipulator, i: int, j: int) -> bool:
+    first, second = (
         np.array([*leg.platform_point, *leg.fixed_offset])
         for leg in (robot.legs[i - 1], robot.legs[j - 1])
     )
-    return bool(np.abs(one - other).max() <= _COINCIDENT)
+    return bool(np.abs(first - second).max() <= _COINCIDENT)
 
 
-def _one_line(robot: Manipulator, i: int, j: int) -> bool:
-    """Say whether two guides lie on one line, as of sliders on one rail."""
-    one, other = robot.legs[i - 1], robot.legs[j - 1]
-    if one.joint_axis is None or other.joint_axis is None:
+def _share_line(robot: Manipulator, i: int, j: int) -> bool:
+    """Return whether two guides lie on one line, as of sliders on one rail."""
+    first, second = robot.legs[i - 1], robot.legs[j - 1]
+    if first.joint_axis is None or second.joint_axis is None:
         return False
-    along = np.array(one.joint_axis)
-    apart = np.array(other.guide_point) - np.array(one.guide_point)
-    if "p" not in one.bodies or "p" not in other.bodies:
+    axis = np.array(first.joint_axis)
+    separation = np.array(second.guide_point) - np.array(first.guide_point)
+    if "p" not in first.bodies or "p" not in second.bodies:
         return False
-    across = np.cross(along, apart), np.cross(along, other.joint_axis)
-    return bool(max(np.abs(v).max() for v in across) <= _COINCIDENT)
+    cross_products = np.cross(axis, separation), np.cross(axis, second.joint_axis)
+    return bool(max(np.abs(v).max() for v in cross_products) <= _COINCIDENT)

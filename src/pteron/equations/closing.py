@@ -11,8 +11,8 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression, point_rows
-from pteron.closures.closure import against, nan_below_zero, plain_rows
-from pteron.closures.determinants import determinant, solved
+from pteron.closures.closure import nan_below_zero, plain_rows, rows_in_quasi_velocities
+from pteron.closures.determinants import determinant, solve
 from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
 from pteron.legs.leg import Circle, LegEquations, Plane, Sphere, Turned
@@ -22,21 +22,21 @@ _STEPS = 4
 """Newton's steps of a controller: from some hundredths of a machine's size they reach rounding."""
 
 _CLOSED = 1e-6
-"""Greatest relative miss before the last step, which squares it: enough for single precision."""
+"""Tolerance of the relative residual before the last step, which squares it: single precision."""
 
 _STEADY = 0.01
 """Greatest relative difference of the determinants of the last two steps.
 
-Near a pose they are alike. Where no pose exists, next to a singularity, the miss may be small
-enough to count as closed, but each step halves the determinant or more.
+Near a solution they agree. Where no pose exists, next to a singularity, the residual may be within
+its tolerance, but each step halves the determinant or more.
 """
 
 
 _NOTHING = 1e-9
 """Length that counts as zero beside any machine, m."""
 
-_KEPT = 1e-300
-"""Factor of a term that is added to carry NaN along: no number changes by it."""
+_NO_CHANGE = 1e-300
+"""Factor of a term that is added to propagate NaN: it changes no finite number."""
 
 
 class Rows(NamedTuple):
@@ -67,10 +67,10 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
     origin, size = ca.SX(directions.shape[1], 1), ca.SX(1)
     for locus, offset in reversed(list(zip(loci, offsets, strict=True))):
         if isinstance(locus, Sphere | Circle):
-            origin, size = ca.mtimes(directions.T, locus.center - offset.still), locus.radius
-    found = []
-    for leg, locus, (a, b, still) in zip(machine.legs, loci, offsets, strict=True):
-        s = ca.mtimes(directions, origin) + still  # c = s + size v + a f_1 + b f_2
+            origin, size = ca.mtimes(directions.T, locus.center - offset.constant), locus.radius
+    leg_rows = []
+    for leg, locus, (a, b, constant) in zip(machine.legs, loci, offsets, strict=True):
+        s = ca.mtimes(directions, origin) + constant  # c = s + size v + a f_1 + b f_2
         w, m, h = ca.SX(1, 3), ca.SX(directions.shape[1], 3), ca.SX(1, 3)
         scale = ca.SX(1)
         if isinstance(locus, Turned):  # sin(phi - angle) = 0
@@ -81,22 +81,22 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
             h[0] -= locus.offset
             scale = ca.norm_2(m[:, 0])
         else:
-            apart = _counted(machine, leg, locus, s - locus.center)
+            arm = _component_in_plane(machine, leg, locus, s - locus.center)
             w[0] = size**2
-            m = 2 * size * ca.mtimes(directions.T, ca.horzcat(apart, a, b))
-            h = ca.mtimes(apart.T, ca.horzcat(apart, 2 * a, 2 * b))
+            m = 2 * size * ca.mtimes(directions.T, ca.horzcat(arm, a, b))
+            h = ca.mtimes(arm.T, ca.horzcat(arm, 2 * a, 2 * b))
             h[0] -= locus.radius**2
             h[2 if machine.platform.slides else 0] += ca.dot(a, a)  # |a f_1 + b f_2|^2
             scale = 2 * locus.radius * size
-        found.append(ca.vertcat(w, m, h) / scale)
-    zeroth, first, second = (ca.horzcat(*(rows[:, k] for rows in found)).T for k in range(3))
+        leg_rows.append(ca.vertcat(w, m, h) / scale)
+    zeroth, first, second = (ca.horzcat(*(rows[:, k] for rows in leg_rows)).T for k in range(3))
     return Rows(zeroth, first, second, origin, size)
 
 
-def _counted(
+def _component_in_plane(
     machine: Machine, leg: LegEquations, locus: Sphere | Circle, v: Expression
 ) -> Expression:
-    """Return what of a vector from a locus' center counts: for a circle its part in the plane."""
+    """Return a vector from a locus' center; for a circle, its component in the circle's plane."""
     if isinstance(locus, Sphere):
         return v
     if leg.holds is not None:
@@ -106,9 +106,9 @@ def _counted(
 
 
 def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
-    """Return the centers (n, 3) of spheres on which joints (n, 1) hold platform points, and r^2.
+    """Return centers (n, 3) and r^2 (n, 1) of the spheres on which held joints keep their points.
 
-    Where a plane holds a point too the center lies in it.
+    The center lies in the plane that the leg keeps its point in, if there is one.
     """
     centers, squares = [], []
     for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True):
@@ -123,32 +123,32 @@ def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expr
     return ca.vertcat(*centers), ca.vertcat(*squares)
 
 
-class Misses(NamedTuple):
-    """The distances by which a pose misses closures whose joints are held."""
+class ClosureResiduals(NamedTuple):
+    """Residuals of the closures of held joints at a pose, with their Jacobian."""
 
     lengths: Expression
     """(n, 1): m, or rad."""
     rows: Expression
-    """(n, m): their derivatives along the platform's quasi-velocities."""
+    """(n, m): their Jacobian in the platform's quasi-velocities."""
     relative: Expression
-    """The largest, as a share of the terms that they are the differences of, of all legs."""
+    """The largest residual, relative to the size of all legs' terms."""
     arms: list[Expression | None]
     """Vectors from the centers of spheres and circles to the platform points, (3, 1) each."""
     platform: PlatformMotion
-    own_rows: list[Expression]
+    leg_rows: list[Expression]
     """(1, 6) each: the legs' part of `rows`, against (c', omega)."""
 
     @property
     def step(self) -> tuple[Expression, Expression]:
         """Newton's step (m, 1) times the determinant of the rows, and the determinant."""
-        step, determinant = solved(self.rows, -self.lengths)
+        step, determinant = solve(self.rows, -self.lengths)
         return self.platform.pose_rates(step), determinant
 
 
-def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
-    """Return by how much a pose (m, 1) misses the closures of joints (n, 1)."""
-    rest = ca.SX.zeros(machine.freedom)
-    platform = machine.platform.motion(pose, rest, rest)
+def closure_residuals(machine: Machine, joints: Expression, pose: Expression) -> ClosureResiduals:
+    """Return the residuals of the closures of joints (n, 1) at a pose (m, 1)."""
+    zero_rates = ca.SX.zeros(machine.freedom)
+    platform = machine.platform.motion(pose, zero_rates, zero_rates)
     lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(_NOTHING)]
     arms: list[Expression | None] = []
     for leg, q, point in zip(machine.legs, ca.vertsplit(joints), platform.points, strict=True):
@@ -162,97 +162,101 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
             length, row = ca.dot(locus.normal, c) - locus.offset, point_rows(locus.normal.T)
             sizes.append(locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c)))
         else:
-            b = _counted(machine, leg, locus, c - locus.center)
+            b = _component_in_plane(machine, leg, locus, c - locus.center)
             length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)
             row = point_rows(b.T / locus.radius)
             sizes.append(locus.radius + ca.norm_1(c) + ca.norm_1(locus.center))
             arms[-1] = b
         lengths.append(length)
         rows.append(row)
-    # The terms of all legs are the measure: those of a plane through the origin may all be zero.
-    missed = [
+    # Relative to the terms of all legs: those of a plane through the origin may all be zero.
+    length_residuals = [
         ca.fabs(length)
         for leg, q, length in zip(machine.legs, ca.vertsplit(joints), lengths, strict=True)
         if not isinstance(leg.locus(q), Turned)
     ]
-    share = ca.mmax(ca.vertcat(*missed)) / ca.sum1(ca.vertcat(*sizes))
+    share = ca.mmax(ca.vertcat(*length_residuals)) / ca.sum1(ca.vertcat(*sizes))
     largest = ca.mmax(ca.vertcat(share, *angles))
-    whole = against(platform, rows)
-    return Misses(ca.vertcat(*lengths), whole, largest, arms, platform, rows)
+    quasi_rows = rows_in_quasi_velocities(platform, rows)
+    return ClosureResiduals(ca.vertcat(*lengths), quasi_rows, largest, arms, platform, rows)
 
 
 def newton_step(
     machine: Machine, joints: Expression, pose: Expression
 ) -> tuple[Expression, Expression]:
-    """Return the pose after one step, and what the pose before it missed (`Misses.relative`)."""
-    missed = misses(machine, joints, pose)
-    step, determinant = missed.step
-    # The largest drops what is not a number, which a sum keeps.
-    return pose + step / determinant, missed.relative + _KEPT * ca.norm_1(missed.lengths)
+    """Return the pose after one Newton step, and `ClosureResiduals.relative` before it."""
+    residuals = closure_residuals(machine, joints, pose)
+    step, determinant = residuals.step
+    # The maximum drops NaN, which a sum propagates.
+    return pose + step / determinant, residuals.relative + _NO_CHANGE * ca.norm_1(residuals.lengths)
 
 
-class Stepped(NamedTuple):
-    """The end of Newton's steps."""
+class NewtonEnd(NamedTuple):
+    """The pose after Newton's steps, and how far they converged."""
 
     pose: Expression
     """NaN where they do not converge, or a leg does not reach; not finite where the type-II
-    measure is not above what was asked."""
+    measure does not exceed the threshold."""
     measure: Expression
     """The type-II measure."""
     determinant: Expression
     """The determinant of the closures' slopes, which has the measure's zeros and their signs."""
-    missed: Misses
+    residuals: ClosureResiduals
     """Before the last step."""
 
 
-def followed_step(machine: Machine, joints: Expression, pose: Expression, least: float) -> Stepped:
-    """Return the pose of joints next to a pose, on whichever side of the singularities."""
-    missed = misses(machine, joints, pose)
-    step, divisor = missed.step
+def converged_step(
+    machine: Machine, joints: Expression, pose: Expression, least: float
+) -> NewtonEnd:
+    """Return the pose of joints (n, 1), by Newton's method from a pose, across singularities."""
+    residuals = closure_residuals(machine, joints, pose)
+    step, divisor = residuals.step
     for _ in range(_STEPS - 1):
-        before, pose = divisor, pose + step / divisor
-        missed = misses(machine, joints, pose)
-        step, divisor = missed.step
-    measure = machine.closure.measure_of(missed.platform, missed.own_rows)
-    lost = nan_below_zero(_CLOSED - missed.relative)
-    lost += nan_below_zero(_STEADY - ca.fabs(divisor / before - 1))
+        previous_divisor, pose = divisor, pose + step / divisor
+        residuals = closure_residuals(machine, joints, pose)
+        step, divisor = residuals.step
+    measure = machine.closure.measure_of(residuals.platform, residuals.leg_rows)
+    validity = nan_below_zero(_CLOSED - residuals.relative)
+    validity += nan_below_zero(_STEADY - ca.fabs(divisor / previous_divisor - 1))
     # The last step's divisor vanishes where the measure is too small.
     enough = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
-    found = pose + step / (divisor * enough)
-    for leg, q, at in zip(machine.legs, ca.vertsplit(joints), reach(machine, found), strict=True):
+    last_pose = pose + step / (divisor * enough)
+    for leg, q, at in zip(
+        machine.legs, ca.vertsplit(joints), reach(machine, last_pose), strict=True
+    ):
         if isinstance(leg.locus(q), Plane):  # it goes on where the leg does not reach
-            lost += nan_below_zero(at.discriminant)
-    return Stepped(found + lost, measure, divisor, missed)
+            validity += nan_below_zero(at.discriminant)
+    return NewtonEnd(last_pose + validity, measure, divisor, residuals)
 
 
 def direct_step(
     machine: Machine, joints: Expression, pose: Expression, least: float
 ) -> tuple[Expression, Expression, Expression]:
-    """Return the pose of joints next to a pose, its type-II measure, and the leg bent otherwise.
+    """Return the pose of joints near a pose, its type-II measure, and the leg that changed branch.
 
-    NaN where `followed_step` has it, where a leg does not reach the pose to start from, and where
-    it comes to the other side of a singularity than that pose in the robot's working mode: the
-    type-II measure has another sign, or a leg is bent the other way. That leg is the last result,
-    from 1; 0 where there is none, or Newton's steps do not converge.
+    The pose is NaN where `converged_step` has it, where a leg does not reach the start pose, and
+    beyond a singularity of the robot's working mode: the type-II measure changes its sign, or a leg
+    bends the other way. That leg is the last result, from 1; 0 where there is none, or Newton's
+    steps do not converge.
     """
-    stepped = followed_step(machine, joints, pose, least)
-    # The start is held by the loci of its own joints, not of those to come.
-    start, rows = machine.state(pose), ca.vertsplit(misses(machine, joints, pose).rows)
-    own = ca.vertsplit(plain_rows(start.platform, start.legs))
-    lost, bent = ca.SX(0), ca.SX(0)
+    end = converged_step(machine, joints, pose, least)
+    # At the start pose the loci are those of the joints there, not of the given joints.
+    start, rows = machine.state(pose), ca.vertsplit(closure_residuals(machine, joints, pose).rows)
+    closed_rows = ca.vertsplit(plain_rows(start.platform, start.legs))
+    validity, bent = ca.SX(0), ca.SX(0)
     legs = zip(machine.legs, ca.vertsplit(joints), start.legs, reach(machine, pose), strict=True)
     for i, (leg, q, motion, at) in enumerate(legs):
-        arm, joint = stepped.missed.arms[i], ca.SX.sym("joint")
+        arm, joint = end.residuals.arms[i], ca.SX.sym("joint")
         locus = leg.locus(joint)
         if arm is None or not isinstance(locus, Sphere | Circle):
             continue
-        rows[i] = own[i]
-        lost += nan_below_zero(at.discriminant)
-        moved = ca.substitute(ca.jacobian(locus.center, joint), joint, q)
-        turned = ca.dot(arm, moved) * motion.divisor
+        rows[i] = closed_rows[i]
+        validity += nan_below_zero(at.discriminant)
+        center_rate = ca.substitute(ca.jacobian(locus.center, joint), joint, q)
+        arm_rate = ca.dot(arm, center_rate) * motion.divisor
         # Below zero, as 1 would be a truth value.
-        bent = ca.fmin(bent, ca.if_else(turned < 0, -(i + 1), 0))
-    bent = ca.if_else(stepped.missed.relative < _CLOSED, -bent, 0)
-    side = determinant(ca.vertcat(*rows)) * stepped.determinant
-    lost += nan_below_zero(side) + nan_below_zero(-bent)
-    return stepped.pose + lost, stepped.measure, bent
+        bent = ca.fmin(bent, ca.if_else(arm_rate < 0, -(i + 1), 0))
+    bent = ca.if_else(end.residuals.relative < _CLOSED, -bent, 0)
+    side = determinant(ca.vertcat(*rows)) * end.determinant
+    validity += nan_below_zero(side) + nan_below_zero(-bent)
+    return end.pose + validity, end.measure, bent

@@ -1,4 +1,4 @@
-"""The constraint measure: how well the legs' couples keep the platform from forbidden turns.
+"""The constraint measure: how far the legs' couples are from leaving a rotation unconstrained.
 
 A leg whose end can turn about some axes only exerts couples perpendicular to these, whether its
 joint is held or not. Where the legs' couples no longer span the turns that the platform must not
@@ -15,12 +15,12 @@ from pteron.bodies.vectors import Vector
 from pteron.closures.determinants import determinant
 from pteron.equations.machine import Machine, State
 
-_ACROSS = 1e-9
+_PARALLEL = 1e-9
 """Sine, or cosine, of an angle between directions that counts as zero."""
 
 
 def constraint_rows(machine: Machine, state: State) -> Expression | None:
-    """Return the couples (K, u) on the turns they must prevent; None where a leg's is not known.
+    """Return the couples' rows (K, u) on the rotations they constrain; None if a leg's is unknown.
 
     The columns are the turns of the platform: all three where it does not turn, those across its
     axis k where it does or where the machine is planar. Then come the turns about k of its parts
@@ -29,34 +29,39 @@ def constraint_rows(machine: Machine, state: State) -> Expression | None:
     robot = machine.robot
     turns = robot.platform.turns and not robot.platform.slides
     x0, y0, k = machine.platform.frame
-    across = turns or robot.platform.planar
+    is_one_axis = turns or robot.platform.planar
     axis = robot.platform.axis if turns else None
-    columns = ca.horzcat(x0, y0) if across else ca.SX.eye(3)
+    columns = ca.horzcat(x0, y0) if is_one_axis else ca.SX.eye(3)
     couples: list[Expression] = []
     parts: list[Vector | None] = []
     for leg, motion in zip(robot.legs, state.legs, strict=True):
-        held = leg.couples(motion, axis)
-        if held is None:
+        leg_couples = leg.couples(motion, axis)
+        if leg_couples is None:
             return None
-        couples += held
-        parts += [leg.platform_point if turns and _along(m, k) else None for m in held]
+        couples += leg_couples
+        parts += [
+            leg.platform_point if turns and _may_act_along(m, k) else None for m in leg_couples
+        ]
     # A part on which one couple acts yields to it.
-    alone = [i for i, part in enumerate(parts) if part is not None and parts.count(part) == 1]
-    couples = [m for i, m in enumerate(couples) if i not in alone]
-    parts = [part for i, part in enumerate(parts) if i not in alone]
+    unpaired = [i for i, part in enumerate(parts) if part is not None and parts.count(part) == 1]
+    couples = [m for i, m in enumerate(couples) if i not in unpaired]
+    parts = [part for i, part in enumerate(parts) if i not in unpaired]
     if not couples:
         return ca.SX(0, columns.shape[1])
     rows = ca.mtimes(ca.horzcat(*couples).T, columns)
-    for one in dict.fromkeys(part for part in parts if part is not None):
-        own = [ca.dot(m, k) if part == one else 0 for m, part in zip(couples, parts, strict=True)]
-        rows = ca.horzcat(rows, ca.vertcat(*own))
+    for shared_part in dict.fromkeys(part for part in parts if part is not None):
+        couples_about_k = [
+            ca.dot(m, k) if part == shared_part else 0
+            for m, part in zip(couples, parts, strict=True)
+        ]
+        rows = ca.horzcat(rows, ca.vertcat(*couples_about_k))
     return rows
 
 
-def _along(couple: Expression, axis: Expression) -> bool:
-    """Say whether a couple may act along the axis."""
+def _may_act_along(couple: Expression, axis: Expression) -> bool:
+    """Return whether a couple has, or may have, a component along the axis."""
     share = ca.dot(couple, axis)
-    return not share.is_constant() or abs(float(share)) > _ACROSS
+    return not share.is_constant() or abs(float(share)) > _PARALLEL
 
 
 def constraint_measure(machine: Machine, state: State) -> Expression:

@@ -1,12 +1,12 @@
 """One sample of a controller: its inputs, gains and memory, and the errors e = q_d - q of joints.
 
-The wanted motion is the platform's, the measured one the joints'. A control law has no state of its
-own: its memory goes out at one sample and comes in at the next. The laws themselves are in `laws`.
+The desired motion is the platform's, the measured one the joints'. A control law is a pure
+function: its memory is an output at one sample and an input at the next. The laws are in `laws`.
 
-A controller holds its forces for a period while the machine moves on. So the model is taken in the
-middle of the period: the wanted motion is carried there by its Taylor series, with the change of
-the wanted acceleration since the last sample for the third derivative, and the measured joints by
-the change of the wanted ones. The errors are those at the sample.
+A controller holds its forces for a period while the machine moves on. So the model is evaluated in
+the middle of the period: the desired motion is extrapolated by its Taylor series, with the change
+of the desired acceleration since the last sample for the third derivative, and the measured joints
+by the change of the desired ones. The errors are those at the sample.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ MEMORY: Layout = {
     "adaptive": _LEARNT,
     "adaptive_drives": _LEARNT,
 }
-"""The parts of each law's memory, in order: the pose measured last, the acceleration wanted last,
-and what is learnt beyond the estimates at the start, as `estimates` has it."""
+"""The parts of each law's memory, in order: the last measured pose, the last desired acceleration,
+and the correction eta of the initial estimates, see `estimates`."""
 
 ADAPTED = ("inertia", "coulomb", "viscous", "offset")
 """Drives' numbers that `adaptive_drives` estimates after the inertial or base parameters, each for
@@ -72,7 +72,7 @@ all joints: the first of `Drives`, in which forces are linear."""
 
 
 def lengths(parts: Mapping[str, Per], freedom: int, estimates: int) -> dict[str, int]:
-    """Return how many numbers each part of gains or memory has."""
+    """Return the length of each part of gains or memory."""
     sizes = {
         "joint": freedom,
         "coordinate": freedom,
@@ -83,14 +83,14 @@ def lengths(parts: Mapping[str, Per], freedom: int, estimates: int) -> dict[str,
     return {name: sizes[per] for name, per in parts.items()}
 
 
-def estimated(what: str, freedom: int, inertial: int) -> int:
-    """Return how many estimates a law has, of so many inertial or base parameters."""
+def estimate_count(what: str, freedom: int, inertial: int) -> int:
+    """Return the number of a law's estimates, given that of its inertial or base parameters."""
     return inertial + (len(ADAPTED) * freedom if what == "adaptive_drives" else 0)
 
 
 def input_sizes(what: str, freedom: int, inertial: int) -> dict[str, int]:
-    """Return how many numbers a law's gains and its memory have; nothing for what is no law."""
-    estimates = estimated(what, freedom, inertial)
+    """Return the lengths of a law's gains and memory; an empty dict where `what` is no law."""
+    estimates = estimate_count(what, freedom, inertial)
     return {
         name: sum(lengths(parts[what], freedom, estimates).values())
         for name, parts in (("gains", GAINS), ("memory", MEMORY))
@@ -98,7 +98,7 @@ def input_sizes(what: str, freedom: int, inertial: int) -> dict[str, int]:
     }
 
 
-def split(vector: Expression, sizes: Mapping[str, int]) -> dict[str, Expression]:
+def split_parts(vector: Expression, sizes: Mapping[str, int]) -> dict[str, Expression]:
     """Return the parts of a vector by name."""
     bounds = [0]
     for size in sizes.values():
@@ -107,22 +107,22 @@ def split(vector: Expression, sizes: Mapping[str, int]) -> dict[str, Expression]
 
 
 def estimates(gains: Mapping[str, Expression], learnt: Expression) -> Expression:
-    """Return theta = theta_0 + L eta (K, 1): what is estimated, from what is learnt, eta."""
+    """Return the estimates theta = theta_0 + L eta (K, 1), from the learnt correction eta."""
     count = learnt.shape[0]
     return gains["start"] + ca.mtimes(ca.reshape(gains["learning"], count, count), learnt)
 
 
-class Wanted(NamedTuple):
-    """The wanted motion of the platform at a sample: pose, velocity, acceleration, (m, 1) each."""
+class DesiredMotion(NamedTuple):
+    """The platform's desired motion at a sample: pose, velocity, acceleration, (m, 1) each."""
 
     pose: Expression
     velocity: Expression
     acceleration: Expression
 
-    def middle(self, period: Expression, last: Expression) -> Wanted:
-        """Return what it is to do half a period later; `last` is the last sample's acceleration."""
+    def middle(self, period: Expression, last: Expression) -> DesiredMotion:
+        """Return the motion half a period later; `last` is the last sample's acceleration."""
         t, third = period / 2, (self.acceleration - last) / period
-        return Wanted(
+        return DesiredMotion(
             self.pose + t * (self.velocity + t / 2 * (self.acceleration + t / 3 * third)),
             self.velocity + t * (self.acceleration + t / 2 * third),
             self.acceleration + t * third,
@@ -134,7 +134,7 @@ class Sample:
     """The inputs of a law."""
 
     machine: Machine
-    wanted: Wanted
+    desired: DesiredMotion
     joints: Expression
     """Measured, (n, 1)."""
     rates: Expression
@@ -146,22 +146,22 @@ class Sample:
     selection: Expression
     """(N, K): inertial parameters = selection @ the estimates of them."""
     least: float
-    """The type-II measure below which a measured pose does not count."""
+    """The type-II measure below which a measured pose is invalid."""
 
     @cached_property
     def now(self) -> State:
-        """The wanted motion at the sample."""
-        return self.machine.state(*self.wanted)
+        """The desired motion at the sample."""
+        return self.machine.state(*self.desired)
 
     @cached_property
     def middle(self) -> State:
-        """The wanted motion in the middle of the period."""
-        ahead = self.wanted.middle(self.gains["period"], self.memory["acceleration"])
+        """The desired motion in the middle of the period."""
+        ahead = self.desired.middle(self.gains["period"], self.memory["acceleration"])
         return self.machine.state(*ahead)
 
     @cached_property
     def error(self) -> Expression:
-        """The joints' errors e (n, 1): a crank's is half a turn at most."""
+        """The joints' errors e (n, 1), m or rad; a crank's is wrapped to [-pi, pi]."""
         behind = ca.vertsplit(coordinates(self.now) - self.joints)
         legs = self.machine.robot.legs
         return ca.vertcat(
@@ -186,15 +186,15 @@ class Sample:
         """The measured joints' rates in the middle of the period."""
         return joint_motion(self.middle)[0] - self.error_rate
 
-    def found(self, joints: Expression) -> Expression:
+    def find_pose(self, joints: Expression) -> Expression:
         """Return the pose of measured joints, by Newton's method from the last one."""
         return direct_step(self.machine, joints, self.memory["measured"], self.least)[0]
 
     @cached_property
     def middle_pose(self) -> Expression:
         """The measured pose in the middle of the period."""
-        moved = coordinates(self.middle) - coordinates(self.now)
-        return self.found(self.joints + moved)
+        joint_motion_to_middle = coordinates(self.middle) - coordinates(self.now)
+        return self.find_pose(self.joints + joint_motion_to_middle)
 
 
 def coordinates(state: State) -> Expression:

@@ -1,4 +1,4 @@
-"""Drives: the forces that their friction and motors' inertia need, and the acceleration left.
+"""Drives: friction, motor inertia, and the machine's acceleration under drive forces.
 
 The numbers of a drive are those of `pteron.legs.drive.Drive`.
 """
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pteron.bodies.motion import Expression
 from pteron.equations.kinematics import jacobian
-from pteron.equations.lagrangian import applied, mass_matrix, solve_positive_definite
+from pteron.equations.lagrangian import generalized_wrench, mass_matrix, solve_positive_definite
 from pteron.equations.machine import Machine, State
 from pteron.equations.virtual_work import generalized_forces
 from pteron.legs import Drive, Stribeck
@@ -32,24 +32,24 @@ class Drives(NamedTuple):
     rest_speed: Expression
 
     @classmethod
-    def of(cls, values: Expression) -> Drives:
+    def from_vector(cls, numbers: Expression) -> Drives:
         """Return the numbers from a vector (7 n, 1), such as `drive_numbers` returns."""
-        return cls(*ca.vertsplit(values, values.shape[0] // len(cls._fields)))
+        return cls(*ca.vertsplit(numbers, numbers.shape[0] // len(cls._fields)))
 
 
 def drive_numbers(robot: Manipulator) -> NDArray[np.float64]:
-    """Return the numbers (7 n,) of a machine's drives for `Drives.of`.
+    """Return the numbers (7 n,) of a machine's drives for `Drives.from_vector`.
 
     A leg without a drive has no friction and no motor inertia.
     """
     rows = []
     for leg in robot.legs:
         drive = leg.drive or Drive()
-        more = drive.stribeck or Stribeck(0.0, 1.0)
+        stribeck = drive.stribeck or Stribeck(0.0, 1.0)
         rows.append(
             (
                 *(drive.inertia, drive.coulomb, drive.viscous, drive.offset),
-                *(more.force, more.speed, drive.rest_speed),
+                *(stribeck.force, stribeck.speed, drive.rest_speed),
             )
         )
     return np.array(rows).T.ravel()
@@ -67,7 +67,7 @@ def drive_names(robot: Manipulator) -> tuple[str, ...]:
 
 
 def dry_friction(drives: Drives, rates: Expression) -> Expression:
-    """Return the size (n, 1) of dry friction: Coulomb's, and what Stribeck's law adds at rest."""
+    """Return the size (n, 1) of dry friction: Coulomb's plus Stribeck's, N or N m."""
     return drives.coulomb + drives.stribeck * ca.exp(-((rates / drives.stribeck_speed) ** 2))
 
 
@@ -98,7 +98,7 @@ def joint_motion(state: State) -> tuple[Expression, Expression]:
 def drive_forces(
     drives: Drives, rates: Expression, accelerations: Expression, *, smooth: bool
 ) -> Expression:
-    """Return the forces (n, 1), N or N m, that the drives need for themselves at q' and q''."""
+    """Return friction, offset and motor inertia forces at q' and q'' (n, 1), N or N m."""
     return drives.inertia * accelerations + friction(drives, rates, smooth=smooth)
 
 
@@ -118,8 +118,8 @@ def drive_accelerations(
     """
     state = machine.state(pose, velocity)
     rows = jacobian(state)
-    own = drive_forces(drives, *joint_motion(state), smooth=True)
-    load = ca.mtimes(rows.T, forces - own) + applied(machine, state, wrench)
+    drive_loads = drive_forces(drives, *joint_motion(state), smooth=True)
+    load = ca.mtimes(rows.T, forces - drive_loads) + generalized_wrench(machine, state, wrench)
     load -= generalized_forces(machine, state, parameters)
     mass = mass_matrix(machine, pose, parameters)
     mass += ca.mtimes(rows.T, ca.mtimes(ca.diag(drives.inertia), rows))

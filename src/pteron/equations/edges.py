@@ -14,7 +14,7 @@ from pteron.equations.machine import Machine
 
 
 class Edge(NamedTuple):
-    """A condition of reach, or of a limit."""
+    """A condition of reach, or of a joint's limit."""
 
     leg: int
     """Its leg, from 1; 0 for the platform's angles."""
@@ -23,23 +23,27 @@ class Edge(NamedTuple):
     noun: str
     """The joint that it limits; empty for an edge of reach."""
     value: Expression
-    """Not negative on its right side."""
+    """Not negative where the condition holds."""
 
 
 def edges(machine: Machine, pose: Expression) -> list[Edge]:
     """Return the edges of every leg's reach, then the limits of its joint, then of passive ones."""
     state = machine.state(pose)
-    reached, limits, passive = [], [], []
-    trios = zip(machine.robot.legs, machine.legs, state.platform.points, state.legs, strict=True)
-    for i, (leg, own, point, motion) in enumerate(trios, start=1):
+    reach_edges, limits, passive = [], [], []
+    legs = zip(machine.robot.legs, machine.legs, state.platform.points, state.legs, strict=True)
+    for i, (leg, leg_equations, point, motion) in enumerate(legs, start=1):
         c = point.position
-        reached += [Edge(i, cause, "", value) for cause, value in own.edges(c).items()]
+        reach_edges += [
+            Edge(i, cause, "", margin) for cause, margin in leg_equations.edges(c).items()
+        ]
         if leg.limits is not None:
-            found = own.within_limits(c, motion.coordinate, *leg.limits)
-            limits += [Edge(i, cause, leg.joint.noun, value) for cause, value in found.items()]
+            limit_edges = leg_equations.within_limits(c, motion.coordinate, *leg.limits)
+            limits += [
+                Edge(i, cause, leg.joint.noun, margin) for cause, margin in limit_edges.items()
+            ]
     for i, joints in enumerate(passive_joints(machine, pose)):
         for joint in joints:
             if not joint.only_most:
                 passive.append(Edge(i, "least", joint.noun, joint.value - joint.least))
             passive.append(Edge(i, "most", joint.noun, joint.most - joint.value))
-    return [*reached, *limits, *passive]
+    return [*reach_edges, *limits, *passive]

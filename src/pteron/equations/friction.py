@@ -18,7 +18,7 @@ class PassiveJoint(NamedTuple):
     leg: int | None
     """Number of its leg, from 1; None for joints of several legs about the platform's axis."""
     number: int
-    """Its place in the leg's chain, from 0."""
+    """Its index in the leg's chain, from 0."""
     kind: Literal["P", "R"]
 
 
@@ -31,15 +31,15 @@ def passive_friction(machine: Machine, state: State) -> Expression:
     rate, the platform's, so that only the sum of their coefficients acts.
     """
     columns = []
-    for joint in _moving(state):
+    for joint in _moving_passive_joints(state):
         if joint.leg is None:
             rows = [(turn.row, turn.rate) for turn in state.platform.rotation.turns]
             at_p = state.platform.matrix.T
             load = sum(ca.mtimes(at_p, row.T) * rate for row, rate in rows)
         else:
-            one = state.legs[joint.leg - 1].chain[joint.number]
-            row = ca.mtimes(one.row, state.platform.matrices[joint.leg - 1])
-            load = ca.mtimes(row.T, one.rate)
+            passive = state.legs[joint.leg - 1].chain[joint.number]
+            row = ca.mtimes(passive.row, state.platform.matrices[joint.leg - 1])
+            load = ca.mtimes(row.T, passive.rate)
         columns.append(load)
     return machine.closure.forces(ca.horzcat(*columns), state.platform, state.legs)
 
@@ -47,19 +47,19 @@ def passive_friction(machine: Machine, state: State) -> Expression:
 @lru_cache(maxsize=64)
 def passive_joints(robot: Manipulator) -> tuple[PassiveJoint, ...]:
     """Return the passive joint of each column of `passive_friction`."""
-    machine = Machine.of(robot)
-    return _moving(machine.state(ca.SX.sym("pose", machine.freedom)))
+    machine = Machine.numeric(robot)
+    return _moving_passive_joints(machine.state(ca.SX.sym("pose", machine.freedom)))
 
 
-def _moving(state: State) -> tuple[PassiveJoint, ...]:
-    """Return the passive joints; those that turn with the platform alone are one, the last."""
-    found, turning = [], []
+def _moving_passive_joints(state: State) -> tuple[PassiveJoint, ...]:
+    """Return the moving passive joints; all that turn with the platform alone count as the last."""
+    passive, turning = [], []
     for i, leg in enumerate(state.legs, start=1):
         for k, joint in enumerate(leg.chain):
             if joint.driven:
                 continue
             if not joint.row[:3].is_zero():
-                found.append(PassiveJoint(i, k, joint.kind))
+                passive.append(PassiveJoint(i, k, joint.kind))
             elif not joint.row[3:].is_zero():
                 turning.append(PassiveJoint(None, k, joint.kind))
-    return (*found, *turning[:1])
+    return (*passive, *turning[:1])

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import against, plain_rows
+from pteron.closures.closure import plain_rows, rows_in_quasi_velocities
 from pteron.closures.determinants import adjugate
 from pteron.equations.machine import Machine, State
 from pteron.equations.singular_values import largest, singular_values, smallest
@@ -23,7 +23,7 @@ from pteron.errors import ModelError
 
 
 class Homogeneous(NamedTuple):
-    """The Jacobian without units, and the length by which turning is measured, m."""
+    """The dimensionless Jacobian, and its characteristic length, m."""
 
     matrix: Expression
     length: Expression
@@ -39,67 +39,71 @@ def lever_arms(machine: Machine, state: State) -> list[Expression]:
 def homogeneous(machine: Machine, state: State) -> Homogeneous:
     """Return J with a crank's row times its length and the turns' columns over the length L.
 
-    L is the root mean square distance of the platform points that turn from the axis through P, or
-    from all axes through P; 1 m where none turns. The joint of a leg that follows
-    the angle counts as that angle times L: its gear does not count. Where the platform tilts the
-    turns are those about the base frame's axes, or of a tripod roll and pitch.
+    L is the root mean square distance of the moving platform points from the axis through P, or
+    from all axes through P; 1 m where none moves. The joint of a leg that follows the angle is that
+    angle times L, without its gear. Where the platform tilts, the turns are those about the base
+    frame's axes, or of a tripod roll and pitch.
     """
     if not machine.platform.angles():
-        return Homogeneous(_measured(machine, _jacobian(state), ca.SX(1)), ca.SX(1))
+        return Homogeneous(_with_joints_in_metres(machine, _jacobian(state), ca.SX(1)), ca.SX(1))
     arms = lever_arms(machine, state)
     square = sum(ca.sumsqr(arm) for arm in arms) / (len(arms) * arms[0].shape[1])
     length = _root_or_one(square)
-    rows = _measured(machine, _jacobian(state), length)
+    rows = _with_joints_in_metres(machine, _jacobian(state), length)
     lengths = _lengths_of(machine)
     return Homogeneous(ca.horzcat(rows[:, :lengths], rows[:, lengths:] / length), length)
 
 
-def by_points(machine: Machine, state: State) -> Expression:
-    """Return the Jacobian in terms of the platform points' velocities, with equal weights.
+def point_jacobian(machine: Machine, state: State) -> Expression:
+    """Return the Jacobian (n, m) in terms of the platform points' velocities, equally weighted.
 
     With V = S x' these velocities and S^T S = n R^T R it is J R^-1: that of the points' centroid,
-    with their root mean square distance from it for L. No length and no point P is chosen.
+    with their root mean square distance from it for L. It depends on no chosen length or point P.
     """
     if not machine.platform.angles():
         return homogeneous(machine, state).matrix
     if machine.robot.platform.tilts:
-        return _by_points_in_space(machine, state)
+        return _point_jacobian_in_space(machine, state)
     first, *_ = arms = lever_arms(machine, state)
-    # From the first one, so that points that coincide do so to the last bit.
+    # Relative to the first point, so that coincident points differ by exactly zero.
     offset = sum(arm - first for arm in arms) / len(arms)
-    apart = [arm - first - offset for arm in arms]
-    length = _root_or_one(sum(ca.dot(arm, arm) for arm in apart) / len(arms))
-    rows = _measured(machine, _jacobian(state), length)
+    centred = [arm - first - offset for arm in arms]
+    length = _root_or_one(sum(ca.dot(arm, arm) for arm in centred) / len(arms))
+    rows = _with_joints_in_metres(machine, _jacobian(state), length)
     # The joint rates for a turn about the centroid.
-    moved = ca.mtimes(rows[:, :-1], ca.mtimes(machine.platform.directions.T, first + offset))
-    rows[:, -1] = (rows[:, -1] - moved) / length
+    rates_about_centroid = ca.mtimes(
+        rows[:, :-1], ca.mtimes(machine.platform.directions.T, first + offset)
+    )
+    rows[:, -1] = (rows[:, -1] - rates_about_centroid) / length
     return rows
 
 
-def _by_points_in_space(machine: Machine, state: State) -> Expression:
-    moved = [matrix[:3, :] for matrix in state.platform.matrices]
-    lower = _root(sum(ca.mtimes(one.T, one) for one in moved) / len(moved))
-    rows = _measured(machine, _jacobian(state), ca.SX(1))
-    found: list[Expression] = []  # X lower^T = rows, by columns
+def _point_jacobian_in_space(machine: Machine, state: State) -> Expression:
+    matrices = [matrix[:3, :] for matrix in state.platform.matrices]
+    lower = _root(sum(ca.mtimes(matrix.T, matrix) for matrix in matrices) / len(matrices))
+    rows = _with_joints_in_metres(machine, _jacobian(state), ca.SX(1))
+    columns: list[Expression] = []  # X lower^T = rows, by columns
     for k in range(rows.shape[1]):
-        known = sum(
-            (lower[k, j] * column for j, column in enumerate(found)), ca.SX(rows.shape[0], 1)
+        eliminated = sum(
+            (lower[k, j] * column for j, column in enumerate(columns)), ca.SX(rows.shape[0], 1)
         )
-        found.append((rows[:, k] - known) / lower[k, k])
-    return ca.horzcat(*found)
+        columns.append((rows[:, k] - eliminated) / lower[k, k])
+    return ca.horzcat(*columns)
 
 
 def _jacobian(state: State) -> Expression:
     """Return J (n, m) against the platform's quasi-velocities."""
-    return against(state.platform, [leg.row / leg.divisor for leg in state.legs])
+    return rows_in_quasi_velocities(state.platform, [leg.row / leg.divisor for leg in state.legs])
 
 
 def _lengths_of(machine: Machine) -> int:
     return int(machine.platform.directions.shape[1])
 
 
-def _measured(machine: Machine, jacobian: Expression, length: Expression) -> Expression:
-    """Return the Jacobian with its joints in metres."""
+def _with_joints_in_metres(
+    machine: Machine, jacobian: Expression, length: Expression
+) -> Expression:
+    """Return the Jacobian with the rate of each joint in m/s."""
     levers = [leg.lever(length) for leg in machine.legs]
     rows = zip(levers, ca.vertsplit(jacobian), strict=True)
     return ca.vertcat(*(lever * row for lever, row in rows))
@@ -115,13 +119,13 @@ def condition(machine: Machine, state: State) -> Expression:
 
 
 def condition_points(machine: Machine, state: State) -> Expression:
-    """Return that of the Jacobian in terms of the platform points' velocities."""
-    return _ratio(by_points(machine, state))
+    """Return the condition number of the Jacobian of the platform points' velocities."""
+    return _ratio(point_jacobian(machine, state))
 
 
 def _ratio(matrix: Expression) -> Expression:
-    values = singular_values(matrix)
-    return largest(values) / smallest(values)
+    sigmas = singular_values(matrix)
+    return largest(sigmas) / smallest(sigmas)
 
 
 def manipulability(machine: Machine, state: State) -> Expression:
@@ -136,7 +140,7 @@ def speed_least(machine: Machine, state: State) -> Expression:
 
 
 def speed_most(machine: Machine, state: State) -> Expression:
-    """Return 1 / sigma_min of them: the best direction."""
+    """Return 1 / sigma_min of J's columns of lengths: the best direction."""
     return 1 / smallest(singular_values(_lengths(machine, homogeneous(machine, state).matrix)))
 
 
@@ -148,71 +152,71 @@ def turning_speed(machine: Machine, state: State) -> Expression:
 
 def force_least(machine: Machine, state: State) -> Expression:
     """Return 1 / sigma_max of (J^-1)'s rows of lengths: |F| = 1, no moment, the worst direction."""
-    across, volume = _inverse(homogeneous(machine, state).matrix)
-    return ca.fabs(volume) / largest(singular_values(_lengths(machine, across.T)))
+    adj, volume = _inverse(homogeneous(machine, state).matrix)
+    return ca.fabs(volume) / largest(singular_values(_lengths(machine, adj.T)))
 
 
 def force_most(machine: Machine, state: State) -> Expression:
-    """Return 1 / sigma_min of them: the best direction."""
-    across, volume = _inverse(homogeneous(machine, state).matrix)
-    return ca.fabs(volume) / smallest(singular_values(_lengths(machine, across.T)))
+    """Return 1 / sigma_min of (J^-1)'s rows of lengths: the best direction."""
+    adj, volume = _inverse(homogeneous(machine, state).matrix)
+    return ca.fabs(volume) / smallest(singular_values(_lengths(machine, adj.T)))
 
 
 def turning_moment(machine: Machine, state: State) -> Expression:
     """Return the moment held at |F| = 1 without a force at P, N m per N, about the worst axis."""
     rows, length = homogeneous(machine, state)
-    across, volume = _inverse(rows)
-    return length * ca.fabs(volume) / largest(singular_values(_turns(machine, across.T)))
+    adj, volume = _inverse(rows)
+    return length * ca.fabs(volume) / largest(singular_values(_turns(machine, adj.T)))
 
 
 def error(machine: Machine, state: State) -> Expression:
-    """Return the norm of (J^-1)'s rows of lengths: errors of the joints add up as squares."""
-    across, volume = _inverse(homogeneous(machine, state).matrix)
-    return ca.norm_fro(_lengths(machine, across.T)) / ca.fabs(volume)
+    """Return the norm of (J^-1)'s rows of lengths: the root sum square of the joints' errors."""
+    adj, volume = _inverse(homogeneous(machine, state).matrix)
+    return ca.norm_fro(_lengths(machine, adj.T)) / ca.fabs(volume)
 
 
 def error_worst(machine: Machine, state: State) -> Expression:
-    """Return the longest sum of their columns with any signs: the joints' worst errors."""
-    across, volume = _inverse(homogeneous(machine, state).matrix)
-    return _conspiring(_lengths(machine, across.T).T) / ca.fabs(volume)
+    """Return the largest norm of a signed sum of these rows' columns: the joints' worst errors."""
+    adj, volume = _inverse(homogeneous(machine, state).matrix)
+    return _worst_signed_sum(_lengths(machine, adj.T).T) / ca.fabs(volume)
 
 
 def turning_error(machine: Machine, state: State) -> Expression:
-    """Return the same of the platform's turning, rad/m: the errors add up as squares."""
+    """Return the platform's angular error, rad/m: the root sum square of the joints' errors."""
     rows, length = homogeneous(machine, state)
-    across, volume = _inverse(rows)
-    return ca.norm_fro(_turns(machine, across.T)) / (length * ca.fabs(volume))
+    adj, volume = _inverse(rows)
+    return ca.norm_fro(_turns(machine, adj.T)) / (length * ca.fabs(volume))
 
 
 def turning_error_worst(machine: Machine, state: State) -> Expression:
-    """Return the same of the platform's turning, rad/m, by the joints' worst errors."""
+    """Return the platform's angular error, rad/m, under the joints' worst errors."""
     rows, length = homogeneous(machine, state)
-    across, volume = _inverse(rows)
-    return _conspiring(_turns(machine, across.T).T) / (length * ca.fabs(volume))
+    adj, volume = _inverse(rows)
+    return _worst_signed_sum(_turns(machine, adj.T).T) / (length * ca.fabs(volume))
 
 
-def _conspiring(columns: Expression) -> Expression:
+def _worst_signed_sum(columns: Expression) -> Expression:
     """Return the greatest |sum of +- columns|: at a corner, as a norm is convex."""
-    first, *rest = ca.horzsplit(columns)
+    first, *others = ca.horzsplit(columns)
     sums = (
-        first + sum(sign * column for sign, column in zip(signs, rest, strict=True))
-        for signs in product((1, -1), repeat=len(rest))
+        first + sum(sign * column for sign, column in zip(signs, others, strict=True))
+        for signs in product((1, -1), repeat=len(others))
     )
     return ca.sqrt(reduce(ca.fmax, (ca.dot(total, total) for total in sums)))
 
 
 def _lengths(machine: Machine, rows: Expression) -> Expression:
     """Return the columns of the pose's lengths."""
-    return _some(machine, rows[:, : _lengths_of(machine)], "only turns")
+    return _require_columns(machine, rows[:, : _lengths_of(machine)], "only turns")
 
 
 def _turns(machine: Machine, rows: Expression) -> Expression:
     """Return the columns of the platform's turns."""
-    return _some(machine, rows[:, _lengths_of(machine) :], "does not turn")
+    return _require_columns(machine, rows[:, _lengths_of(machine) :], "does not turn")
 
 
-def _some(machine: Machine, columns: Expression, lacking: str) -> Expression:
-    """Return the columns, or refuse a platform that has none of them."""
+def _require_columns(machine: Machine, columns: Expression, lacking: str) -> Expression:
+    """Return the columns; raise where the platform has none of them."""
     if columns.shape[1] == 0:
         motion = machine.robot.platform.motion
         raise ModelError(
@@ -223,9 +227,9 @@ def _some(machine: Machine, columns: Expression, lacking: str) -> Expression:
 
 
 def _inverse(rows: Expression) -> tuple[Expression, Expression]:
-    """Return the adjugate and the determinant, whose quotient is the inverse."""
-    across = adjugate(rows)
-    return across, ca.mtimes(rows[0, :], across[:, 0])
+    """Return the adjugate (m, m) and the determinant, whose quotient is the inverse."""
+    adj = adjugate(rows)
+    return adj, ca.mtimes(rows[0, :], adj[:, 0])
 
 
 def pressure_angle(machine: Machine, state: State) -> Expression:
@@ -239,11 +243,11 @@ def pressure_angle(machine: Machine, state: State) -> Expression:
         if not leg.pushes:
             continue
         place = leg.chain.index(leg.driven)
-        joint, after = leg.chain[place : place + 2]
-        way = joint.axis
+        joint, next_joint = leg.chain[place : place + 2]
+        direction = joint.axis
         if joint.kind == "R":
-            way = ca.cross(joint.axis, after.point - joint.point)
-        angles.append(_between(leg.row[:3].T, way))
+            direction = ca.cross(joint.axis, next_joint.point - joint.point)
+        angles.append(_angle_between_lines(leg.row[:3].T, direction))
     return reduce(ca.fmax, angles)
 
 
@@ -252,28 +256,28 @@ def output_pressure_angle(machine: Machine, state: State) -> Expression:
 
     It is the motion while the other joints are held: that of a column of J^-1.
     """
-    across, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
+    adj, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
     for i, (leg, matrix) in enumerate(zip(state.legs, state.platform.matrices, strict=True)):
         if leg.pushes:
-            angles.append(_between(leg.row[:3].T, ca.mtimes(matrix[:3, :], across[:, i])))
+            angles.append(_angle_between_lines(leg.row[:3].T, ca.mtimes(matrix[:3, :], adj[:, i])))
     return reduce(ca.fmax, angles)
 
 
-def _between(u: Expression, v: Expression) -> Expression:
+def _angle_between_lines(u: Expression, v: Expression) -> Expression:
     """Return the angle between two lines, in [0, pi/2]; pi/2 where one has no direction."""
     cross = ca.cross(u, v)
-    along, apart = ca.fabs(ca.dot(u, v)), ca.sqrt(ca.dot(cross, cross))
-    return ca.atan2(apart + (along == 0), along)
+    dot_size, cross_size = ca.fabs(ca.dot(u, v)), ca.sqrt(ca.dot(cross, cross))
+    return ca.atan2(cross_size + (dot_size == 0), dot_size)
 
 
 def kappa(machine: Machine, state: State, mass: Expression) -> Expression:
-    """Return the condition number of the mass matrix, turning measured by L as in the Jacobian."""
-    counts = ca.SX.ones(machine.freedom)
+    """Return the condition number of the mass matrix, rotations times L as in the Jacobian."""
+    units = ca.SX.ones(machine.freedom)
     if machine.platform.angles():
-        counts[_lengths_of(machine) :] = homogeneous(machine, state).length
+        units[_lengths_of(machine) :] = homogeneous(machine, state).length
         mass = state.platform.quasi_forces(state.platform.quasi_forces(mass).T)
-    values = singular_values(_root(mass / ca.mtimes(counts, counts.T)))
-    ratio = largest(values) / smallest(values)
+    sigmas = singular_values(_root(mass / ca.mtimes(units, units.T)))
+    ratio = largest(sigmas) / smallest(sigmas)
     return ratio * ratio
 
 
@@ -284,12 +288,12 @@ def _root(matrix: Expression) -> Expression:
     for j in range(n):
         lower[j, j] = ca.sqrt(matrix[j, j] - sum(lower[j, k] ** 2 for k in range(j)))
         for i in range(j + 1, n):
-            rest = sum(lower[i, k] * lower[j, k] for k in range(j))
-            lower[i, j] = (matrix[i, j] - rest) / lower[j, j]
+            partial_sum = sum(lower[i, k] * lower[j, k] for k in range(j))
+            lower[i, j] = (matrix[i, j] - partial_sum) / lower[j, j]
     return lower
 
 
-OF_GEOMETRY: dict[str, Callable[[Machine, State], Expression]] = {
+GEOMETRIC_INDICES: dict[str, Callable[[Machine, State], Expression]] = {
     "condition": condition,
     "condition_points": condition_points,
     "manipulability": manipulability,

@@ -14,7 +14,7 @@ from pteron.equations.machine import Machine, State
 from pteron.legs.leg import Joint, Passive, Reach
 
 FAR = 1e3
-"""The margin where there is no limit, m: finite, as controllers and optimisers need it."""
+"""The margin without a limit, m: finite, as controllers and optimisers need it."""
 
 
 def inverse_position(machine: Machine, pose: Expression) -> Expression:
@@ -23,73 +23,78 @@ def inverse_position(machine: Machine, pose: Expression) -> Expression:
 
 
 def reach(machine: Machine, pose: Expression) -> list[Reach]:
-    """Return whether each leg reaches a pose, its margin to the edge, and how bent it is."""
-    rest = ca.SX.zeros(machine.freedom)
-    points = machine.platform.motion(pose, rest, rest).points
+    """Return each leg's discriminant of reach, margin of reach, m, and type-I measure."""
+    zero_rates = ca.SX.zeros(machine.freedom)
+    points = machine.platform.motion(pose, zero_rates, zero_rates).points
     return [leg.reach(c.position) for leg, c in zip(machine.legs, points, strict=True)]
 
 
-def beyond_reach(machine: Machine, pose: Expression) -> Expression:
-    """Return, for every leg (n, 1), NaN where it does not reach the pose, 0 where it does."""
-    found = reach(machine, pose)
-    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))  # Remark 2
+def reach_validity(machine: Machine, pose: Expression) -> Expression:
+    """Return the validity of each leg (n, 1): 0 where it reaches the pose, NaN where not."""
+    reaches = reach(machine, pose)
+    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in reaches))  # Remark 2
 
 
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
     """Return the passive joints that have limits: the platform's angles first, then every leg's."""
     state, platform = machine.state(pose), machine.robot.platform
-    still, turned = ca.horzcat(*machine.platform.frame), state.platform.axes
+    base_axes, platform_axes = ca.horzcat(*machine.platform.frame), state.platform.axes
     radius = max(norm(leg.platform_point) for leg in machine.robot.legs) or 1.0
     angles = [
         Passive(name, "rad", pose[platform.coordinates.index(name)], *limits, radius)
         for name, limits in platform.angle_limits.items()
     ]
     pairs = zip(machine.robot.legs, state.legs, strict=True)
-    return [angles, *(leg.passive(motion, still, turned) for leg, motion in pairs)]
+    return [angles, *(leg.passive(motion, base_axes, platform_axes) for leg, motion in pairs)]
 
 
 def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
-    """Return how far the passive joints of every leg (n, 1) are from their limits, the least.
+    """Return each leg's least distance (n, 1) of its passive joints from their limits, twice.
 
-    First as shares of half their ranges, then in metres that the leg moves meanwhile; negative
-    beyond, 1 and `FAR` for a leg without such limits. The platform's angles count for every leg.
+    First relative to half the joint's range, then in metres of the leg's motion; negative beyond a
+    limit, 1 and `FAR` for a leg without such limits. The platform's angles count for every leg.
     """
     shares, metres = [], []
     angles, *legs = passive_joints(machine, pose)
     for joints in legs:
         share, way = ca.SX(1), ca.SX(FAR)
         for joint in (*angles, *joints):
-            room = ca.fmin(joint.value - joint.least, joint.most - joint.value)
-            share = ca.fmin(share, room / (0.5 * (joint.most - joint.least)))
-            way = ca.fmin(way, room * joint.lever)
+            distance = ca.fmin(joint.value - joint.least, joint.most - joint.value)
+            share = ca.fmin(share, distance / (0.5 * (joint.most - joint.least)))
+            way = ca.fmin(way, distance * joint.lever)
         shares.append(share)
         metres.append(way)
     return ca.vertcat(*shares), ca.vertcat(*metres)
 
 
-def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
-    """Return whether a pose serves, and the metres to the nearest end of what does.
+def pose_status(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
+    """Return the status of a pose, and its margin, m: the distance to the workspace's boundary.
 
-    First 0 where it does, else the leg, from 1, that misses it by most, or -1 where all reach it
-    but a joint's limit forbids it. Then the least of the legs' margins and, where all reach it, of
-    the ways that they may move until a joint meets its limit, at most `FAR`; negative where the
-    pose does not serve.
+    The status is 0 in the workspace, else the leg, from 1, that misses the pose by most, or -1
+    where all legs reach it but a joint exceeds its limit. The margin is the least of the legs'
+    margins of reach and, where all reach, of the travel left to each joint's limit, at most `FAR`;
+    it is negative outside.
     """
-    found = reach(machine, pose)
+    reaches = reach(machine, pose)
     joints = ca.vertsplit(inverse_position(machine, pose))
     passive = ca.vertsplit(passive_margins(machine, pose)[1])
-    least, worst, room = found[0].margin, ca.SX(1), ca.SX(FAR)
-    rows = zip(machine.robot.legs, found, joints, passive, strict=True)
+    least, worst, joint_room = reaches[0].margin, ca.SX(1), ca.SX(FAR)
+    rows = zip(machine.robot.legs, reaches, joints, passive, strict=True)
     for i, (leg, at, joint, way) in enumerate(rows, start=1):
         worst = ca.if_else(at.margin < least, i, worst)
         least = ca.fmin(least, at.margin)
-        room = ca.fmin(room, way)
+        joint_room = ca.fmin(joint_room, way)
         if leg.limits is not None:
-            # No way leads out of an angle's limits.
-            own = ca.fmin(joint - leg.limits[0], leg.limits[1] - joint) * leg.lever
-            room = ca.fmin(room, ca.if_else(own < 0, own, FAR) if leg.follows_angle else own)
-    status, nearest = ca.if_else(room < 0, -1, 0), ca.fmin(least, room)
-    for at in found:
+            # The margin of an angle's limits counts only where it is exceeded.
+            joint_margin = ca.fmin(joint - leg.limits[0], leg.limits[1] - joint) * leg.lever
+            joint_room = ca.fmin(
+                joint_room,
+                ca.if_else(joint_margin < 0, joint_margin, FAR)
+                if leg.follows_angle
+                else joint_margin,
+            )
+    status, nearest = ca.if_else(joint_room < 0, -1, 0), ca.fmin(least, joint_room)
+    for at in reaches:
         status = ca.if_else(at.discriminant < 0, worst, status)
         nearest = ca.if_else(at.discriminant < 0, least, nearest)
     return status, nearest
@@ -104,7 +109,7 @@ def direct_position(machine: Machine, joints: Expression, *, reached: bool = Tru
     if not reached:
         return poses
     columns = ca.horzsplit(poses)
-    return ca.horzcat(*(pose + ca.sum1(beyond_reach(machine, pose)) for pose in columns))
+    return ca.horzcat(*(pose + ca.sum1(reach_validity(machine, pose)) for pose in columns))
 
 
 def jacobian(state: State) -> Expression:
@@ -115,7 +120,7 @@ def jacobian(state: State) -> Expression:
 
 
 def twist_jacobian(state: State) -> Expression:
-    """Return the legs' rows (n, 6) against the twist of P: q' = rows (v, omega)."""
+    """Return the rows (n, 6) that map the twist of P to joint rates: q' = rows (v, omega)."""
     platform = state.platform
     if not platform.point_twists:  # x' is the twist in orthonormal axes
         return ca.mtimes(jacobian(state), platform.matrix.T)
@@ -133,7 +138,7 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
 
 
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
-    """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg has not."""
+    """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg lacks."""
     n = len(state.legs)
     m = state.platform.matrix.shape[1]
     upper, lower = (
@@ -144,7 +149,7 @@ def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
 
 
 def link_vectors(state: State) -> tuple[Expression, Expression]:
-    """Return l_u and l_l of every leg, each (n, 3); NaN where it has none."""
+    """Return l_u and l_l of every leg, each (n, 3), m; NaN where a leg lacks one."""
 
     def rows(k: int) -> Expression:
         links = (leg.links[k] for leg in state.legs)
@@ -171,7 +176,7 @@ def driven_motion(state: State, order: int) -> Expression:
 
 
 def passive_motion(state: State, order: int) -> Expression:
-    """Return rates, or accelerations, (n, j) of the passive joints; NaN for one a leg has not."""
+    """Return rates, or accelerations, (n, j) of the passive joints; NaN where a leg has fewer."""
     passive = [[joint for joint in leg.chain if not joint.driven] for leg in state.legs]
     rows = [[(joint.rate, joint.acceleration)[order] for joint in joints] for joints in passive]
     longest = max(map(len, rows))
@@ -179,15 +184,18 @@ def passive_motion(state: State, order: int) -> Expression:
 
 
 def chain_points(state: State) -> list[Expression]:
-    """Return a point (j, 3) on every leg's joint axes, NaN for one it has not."""
+    """Return a point (j, 3) on every leg's joint axes, m; NaN where a leg has fewer joints."""
     return [points.T for points in _chains(state, lambda j: j.point if j.seat is None else j.seat)]
 
 
 def _chains(state: State, column: Callable[[Joint], Expression]) -> list[Expression]:
-    """Return a column (k, 1) for every joint of every leg, (k, j); NaN for one it has not."""
+    """Return a column (k, 1) for every joint of every leg, (k, j); NaN where a leg has fewer."""
     longest = max(len(leg.chain) for leg in state.legs)
-    found = [ca.horzcat(*map(column, leg.chain)) for leg in state.legs]
-    return [ca.horzcat(one, ca.SX.nan(one.shape[0], longest - one.shape[1])) for one in found]
+    chains = [ca.horzcat(*map(column, leg.chain)) for leg in state.legs]
+    return [
+        ca.horzcat(columns, ca.SX.nan(columns.shape[0], longest - columns.shape[1]))
+        for columns in chains
+    ]
 
 
 def platform_rates(
@@ -206,7 +214,7 @@ def platform_rates(
 def joint_screws(state: State) -> list[Expression]:
     """Return the unit screws of every leg's joints about P, from the base to the platform.
 
-    Each is (6, j), rows omega, then v; NaN for a joint that a leg has not. Where d is parallel to
+    Each is (6, j), rows omega, then v; NaN where a leg has fewer joints. Where d is parallel to
     k, R4 of a P-R-R-R leg coincides with R3.
     """
     p = state.platform.body.position

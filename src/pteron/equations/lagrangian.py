@@ -22,12 +22,12 @@ def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> E
     legs, inertia = machine.moments(parameters)
     state = machine.state(pose)
     platform, none = state.platform, ca.SX(1, 1)
-    riding = []
+    point_masses = []
     for rides, bodies in zip((leg.rides for leg in machine.legs), legs, strict=True):
-        riding.append(sum((bodies[k].m for k in rides), none))
+        point_masses.append(sum((bodies[k].m for k in rides), none))
         bodies |= {k: bodies[k]._replace(m=none) for k in rides}
-    carried = machine.platform.carrying(inertia, riding)
-    total = machine.platform.mass_matrix(platform, carried)
+    moments = machine.platform.carrying(inertia, point_masses)
+    total = machine.platform.mass_matrix(platform, moments)
     for leg, bodies, matrix in zip(state.legs, legs, platform.matrices, strict=True):
         at_c = sum(motion.mass_matrix(body, bodies[k]) for k, body in leg.bodies.items())
         total = total + ca.mtimes(matrix.T, ca.mtimes(at_c, matrix))
@@ -74,12 +74,12 @@ def forward_dynamics(
     """Return x'' with M x'' = J^T F + wrench - h."""
     state = machine.state(pose, velocity)
     bias = generalized_forces(machine, state, parameters)
-    load = ca.mtimes(jacobian(state).T, forces) + applied(machine, state, wrench) - bias
+    load = ca.mtimes(jacobian(state).T, forces) + generalized_wrench(machine, state, wrench) - bias
     return solve_positive_definite(mass_matrix(machine, pose, parameters), load)
 
 
-def applied(machine: Machine, state: State, wrench: Expression) -> Expression:
-    """Return the forces (m, 1) along the pose of a wrench that acts on the platform."""
+def generalized_wrench(machine: Machine, state: State, wrench: Expression) -> Expression:
+    """Return the generalized forces (m, 1), along the pose, of a wrench on the platform."""
     return state.platform.pose_forces(machine.platform.applied(state.platform, wrench))
 
 
@@ -88,11 +88,11 @@ def solve_positive_definite(matrix: Expression, right: Expression) -> Expression
 
     CasADi's own `solve` on SX expressions loses two digits on these systems.
     """
-    lower, pivots = factors(matrix)
-    return backward(lower, forward(lower, right) / pivots)
+    lower, pivots = ldl_factors(matrix)
+    return substitute_backward(lower, substitute_forward(lower, right) / pivots)
 
 
-def factors(matrix: Expression) -> tuple[Expression, Expression]:
+def ldl_factors(matrix: Expression) -> tuple[Expression, Expression]:
     """Return L and the diagonal (n, 1) of D, of L D L^T = a positive definite matrix."""
     n = matrix.shape[0]
     lower = ca.SX.eye(n)
@@ -100,12 +100,12 @@ def factors(matrix: Expression) -> tuple[Expression, Expression]:
     for j in range(n):
         pivots.append(matrix[j, j] - sum(lower[j, k] ** 2 * pivots[k] for k in range(j)))
         for i in range(j + 1, n):
-            rest = sum(lower[i, k] * lower[j, k] * pivots[k] for k in range(j))
-            lower[i, j] = (matrix[i, j] - rest) / pivots[j]
+            partial_sum = sum(lower[i, k] * lower[j, k] * pivots[k] for k in range(j))
+            lower[i, j] = (matrix[i, j] - partial_sum) / pivots[j]
     return lower, ca.vertcat(*pivots)
 
 
-def forward(lower: Expression, right: Expression) -> Expression:
+def substitute_forward(lower: Expression, right: Expression) -> Expression:
     """Return L^-1 times a matrix."""
     rows: list[Expression] = []
     for i in range(lower.shape[0]):
@@ -113,10 +113,10 @@ def forward(lower: Expression, right: Expression) -> Expression:
     return ca.vertcat(*rows)
 
 
-def backward(lower: Expression, right: Expression) -> Expression:
+def substitute_backward(lower: Expression, right: Expression) -> Expression:
     """Return L^-T times a column."""
     n = lower.shape[0]
-    found = [ca.SX(0)] * n
+    solution = [ca.SX(0)] * n
     for i in reversed(range(n)):
-        found[i] = right[i] - sum(lower[k, i] * found[k] for k in range(i + 1, n))
-    return ca.vertcat(*found)
+        solution[i] = right[i] - sum(lower[k, i] * solution[k] for k in range(i + 1, n))
+    return ca.vertcat(*solution)

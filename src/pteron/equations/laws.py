@@ -1,7 +1,7 @@
 """Control laws: the drives' forces at one sample, and the memory for the next.
 
-A law takes a `Sample` (`equations.control`): the wanted motion, the measured joints, the errors
-e = q_d - q and e' of the joints, and the wanted state at the middle of the sampling period.
+A law takes a `Sample` (`equations.control`): the desired motion, the measured joints, the errors
+e = q_d - q and e' of the joints, and the desired state at the middle of the sampling period.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ Answer = tuple[Expression, dict[str, Expression]]
 
 def pd_gravity(s: Sample) -> Answer:
     """Return F = K_p e + K_d e' + J^-T g + f_0: gravity and offsets at the measured pose."""
-    found = s.found(s.joints)
-    held = inverse_dynamics(s.machine, s.machine.state(found), s.parameters)
-    return s.feedback + held + s.drives.offset, {"measured": found}
+    pose = s.find_pose(s.joints)
+    gravity_forces = inverse_dynamics(s.machine, s.machine.state(pose), s.parameters)
+    return s.feedback + gravity_forces + s.drives.offset, {"measured": pose}
 
 
 def feed_forward_pd(s: Sample) -> Answer:
-    """Return F = K_p e + K_d e' + F_d, F_d the drive forces of the wanted motion."""
+    """Return F = K_p e + K_d e' + F_d, F_d the drive forces of the desired motion."""
     needed = inverse_dynamics(s.machine, s.middle, s.parameters)
     needed += drive_forces(s.drives, *joint_motion(s.middle), smooth=True)
-    return s.feedback + needed, {"acceleration": s.wanted.acceleration}
+    return s.feedback + needed, {"acceleration": s.desired.acceleration}
 
 
 def computed_torque(s: Sample) -> Answer:
     """Return the drive forces for q'' = q''_d + K_p e + K_d e' in the measured state.
 
-    Friction is that of the wanted rates: where a joint rests, measured ones have no steady sign.
+    Friction is that of the desired rates: the measured rate of a resting joint changes its sign.
     """
-    found, (wanted, growth) = s.middle_pose, joint_motion(s.middle)
-    push = growth + s.feedback
-    motion = platform_rates(s.machine, found, s.middle_rates, push)
-    needed = inverse_dynamics(s.machine, s.machine.state(found, *motion), s.parameters)
-    needed += drive_forces(s.drives, wanted, push, smooth=True)
-    return needed, {"measured": found, "acceleration": s.wanted.acceleration}
+    pose, (desired_rates, desired_accelerations) = s.middle_pose, joint_motion(s.middle)
+    accelerations = desired_accelerations + s.feedback
+    motion = platform_rates(s.machine, pose, s.middle_rates, accelerations)
+    needed = inverse_dynamics(s.machine, s.machine.state(pose, *motion), s.parameters)
+    needed += drive_forces(s.drives, desired_rates, accelerations, smooth=True)
+    return needed, {"measured": pose, "acceleration": s.desired.acceleration}
 
 
 def adaptive(s: Sample) -> Answer:
@@ -65,34 +65,39 @@ def adaptive(s: Sample) -> Answer:
     J.-J. E. Slotine, W. Li, "On the adaptive control of robot manipulators", The International
     Journal of Robotics Research 6 (1987) 49-59; their s is -z.
     """
-    return _adapted(s, estimates(s.gains, s.memory["learnt"]), s.drives)
+    return _adaptive_law(s, estimates(s.gains, s.memory["learnt"]), s.drives)
 
 
 def adaptive_drives(s: Sample) -> Answer:
     """Return forces and estimates as `adaptive`, which include motors' inertia, friction, offsets.
 
-    Dry friction and viscous friction grow with the rate: taken at q'_r they take energy from z.
+    Dry and viscous friction are monotonic in the rate: evaluated at q'_r they dissipate z.
     """
     estimate = estimates(s.gains, s.memory["learnt"])
     drive = estimate[s.selection.shape[1] :]
-    own = Drives(*ca.vertsplit(drive, s.machine.freedom), *s.drives[len(ADAPTED) :])
-    return _adapted(s, estimate, own)
+    estimated_drives = Drives(*ca.vertsplit(drive, s.machine.freedom), *s.drives[len(ADAPTED) :])
+    return _adaptive_law(s, estimate, estimated_drives)
 
 
-def _adapted(s: Sample, estimate: Expression, drives: Drives) -> Answer:
-    slope, found, learnt = s.gains["slope"], s.middle_pose, s.memory["learnt"]
+def _adaptive_law(s: Sample, estimate: Expression, drives: Drives) -> Answer:
+    slope, pose, learnt = s.gains["slope"], s.middle_pose, s.memory["learnt"]
     z = s.error_rate + slope * s.error
-    rates, growth = joint_motion(s.middle)
-    aim, push = rates + slope * s.error, growth + slope * s.error_rate
+    rates, accelerations = joint_motion(s.middle)
+    reference_rates, reference_accelerations = (
+        rates + slope * s.error,
+        accelerations + slope * s.error_rate,
+    )
     parameters = ca.mtimes(s.selection, estimate[: s.selection.shape[1]])
-    needed = mixed_forces(s.machine, found, s.middle_rates, aim, push, parameters)
-    needed += drive_forces(drives, aim, push, smooth=True)
-    moved = learnt + s.gains["period"] * ca.jtimes(needed, learnt, z, True)
+    needed = mixed_forces(
+        s.machine, pose, s.middle_rates, reference_rates, reference_accelerations, parameters
+    )
+    needed += drive_forces(drives, reference_rates, reference_accelerations, smooth=True)
+    updated = learnt + s.gains["period"] * ca.jtimes(needed, learnt, z, True)
     room = s.gains["room"]
     return needed + s.gains["derivative"] * z, {
-        "measured": found,
-        "acceleration": s.wanted.acceleration,
-        "learnt": moved * (room / ca.fmax(ca.norm_2(moved), room)),
+        "measured": pose,
+        "acceleration": s.desired.acceleration,
+        "learnt": updated * (room / ca.fmax(ca.norm_2(updated), room)),
     }
 
 

@@ -54,20 +54,22 @@ class Machine:
 
     @classmethod
     @lru_cache(maxsize=64)
-    def of(cls, robot: Manipulator) -> Machine:
-        """Return one machine, in numbers."""
+    def numeric(cls, robot: Manipulator) -> Machine:
+        """Return the equations of one machine, its dimensions as numbers."""
         legs = tuple(leg.equations() for leg in robot.legs)
         frame = [ca.SX(list(axis)) for axis in robot.platform.frame]
         points, fixed = (
             [ca.SX(list(getattr(leg, name))) for leg in robot.legs]
             for name in ("platform_point", "fixed_offset")
         )
-        more = {name: ca.SX(list(v)) for name, v in robot.platform.quantities.items()}
-        return cls._made(robot, legs, frame, points, fixed, more, ca.SX(list(robot.gravity)))
+        quantities = {name: ca.SX(list(v)) for name, v in robot.platform.quantities.items()}
+        return cls._assemble(
+            robot, legs, frame, points, fixed, quantities, ca.SX(list(robot.gravity))
+        )
 
     @classmethod
-    def symbols(cls, robot: Manipulator) -> tuple[Machine, Expression]:
-        """Return the machines of a robot's topology in symbols, and the symbols as one vector.
+    def symbolic(cls, robot: Manipulator) -> tuple[Machine, Expression]:
+        """Return the equations of a topology, its dimensions as symbols, and these as a vector.
 
         The vector holds the quantities of each leg, its platform point and fixed offset; then x0,
         y0, k, the platform's quantities and gravity: the order of `numbers`.
@@ -80,39 +82,43 @@ class Machine:
             legs.append(leg.equations(parts))
             vectors += [*parts.values(), points[-1], fixed[-1]]
         frame = [ca.SX.sym(name, 3) for name in ("x0", "y0", "k")]
-        more = {n: ca.SX.sym(n, len(v)) for n, v in robot.platform.quantities.items()}
+        quantities = {n: ca.SX.sym(n, len(v)) for n, v in robot.platform.quantities.items()}
         gravity = ca.SX.sym("gravity", 3)
-        machine = cls._made(robot, tuple(legs), frame, points, fixed, more, gravity)
-        return machine, ca.vertcat(*vectors, *frame, *more.values(), gravity)
+        machine = cls._assemble(robot, tuple(legs), frame, points, fixed, quantities, gravity)
+        return machine, ca.vertcat(*vectors, *frame, *quantities.values(), gravity)
 
     @classmethod
-    def _made(
+    def _assemble(
         cls,
         robot: Manipulator,
         legs: tuple[LegEquations, ...],
         frame: list[Expression],
         points: list[Expression],
         fixed: list[Expression],
-        more: dict[str, Any],
+        quantities: dict[str, Any],
         gravity: Expression,
     ) -> Machine:
-        more = {**more, "planes": [leg.holds for leg in legs]}
-        platform = robot.platform.kind(frame, points, fixed, more)
+        quantities = {**quantities, "planes": [leg.holds for leg in legs]}
+        platform = robot.platform.kind(frame, points, fixed, quantities)
         closure = kind_for([type(leg) for leg in legs], type(platform))
-        assert closure is not None  # the manipulator has asked
+        assert closure is not None  # the manipulator has checked it
         return cls(robot, legs, platform, closure(legs, platform), gravity)
 
-    def in_platform_axes(self, pose: Expression) -> tuple[Machine, Expression] | None:
-        """Return the machine with all vectors along the platform's axes, and these axes (3, 3).
+    def move_to_platform_frame(self, pose: Expression) -> tuple[Machine, Expression] | None:
+        """Return the machine with all vectors in the platform's axes, and these axes (3, 3).
 
-        Forces at the joints are the same; the platform's points are constant, which saves
-        operations. None where it saves none.
+        Joint forces are the same; the platform's points are constant, which saves operations. None
+        where it saves none.
         """
-        seen = self.platform.in_own_axes(pose)
-        if seen is None:
+        platform_in_axes = self.platform.in_own_axes(pose)
+        if platform_in_axes is None:
             return None
-        platform, axes = seen
-        legs = tuple(moved for leg in self.legs if (moved := leg.along(axes, pose[:3])) is not None)
+        platform, axes = platform_in_axes
+        legs = tuple(
+            leg_in_axes
+            for leg in self.legs
+            if (leg_in_axes := leg.along(axes, pose[:3])) is not None
+        )
         if len(legs) < len(self.legs):
             return None
         closure, gravity = type(self.closure)(legs, platform), ca.mtimes(axes.T, self.gravity)
@@ -124,19 +130,19 @@ class Machine:
         velocity: Expression | None = None,
         acceleration: Expression | None = None,
     ) -> State:
-        """Return the machine in motion, or at rest in a pose."""
-        rest = ca.SX.zeros(self.freedom)
+        """Return the state of platform and legs in motion, or at rest in a pose."""
+        zero_rates = ca.SX.zeros(self.freedom)
         platform = self.platform.motion(
             pose,
-            rest if velocity is None else velocity,
-            rest if acceleration is None else acceleration,
+            zero_rates if velocity is None else velocity,
+            zero_rates if acceleration is None else acceleration,
         )
-        trios = zip(self.legs, platform.points, self.platform.fixed, strict=True)
-        legs = tuple(leg.motion(c, platform.rotation_at(c, fixed)) for leg, c, fixed in trios)
+        legs_points = zip(self.legs, platform.points, self.platform.fixed, strict=True)
+        legs = tuple(leg.motion(c, platform.rotation_at(c, fixed)) for leg, c, fixed in legs_points)
         return State(platform, legs)
 
     def moments(self, parameters: Expression) -> tuple[list[dict[str, Moments]], Moments]:
-        """Return the legs' inertia, by body, and the platform's from P (N, K)."""
+        """Return the moments of mass of the legs' bodies and of the platform, from P (N, K)."""
         blocks: dict[tuple[str, tuple[int, ...]], list[Expression]] = {}
         for p, row in zip(self.parameters, ca.vertsplit(parameters), strict=True):
             blocks.setdefault((p.body, p.legs), []).append(row)
@@ -148,27 +154,29 @@ class Machine:
 
 
 def closure_of(robot: Manipulator) -> Closure:
-    """Return the closure of one machine, in numbers."""
-    return Machine.of(robot).closure
+    """Return the closure of one machine, its dimensions as numbers."""
+    return Machine.numeric(robot).closure
 
 
 def numbers(robot: Manipulator) -> list[float]:
-    """Return the numbers of a machine for the vector of `Machine.symbols`."""
-    values: list[float] = []
+    """Return the geometry (G,) of a machine, in the order of the vector of `Machine.symbolic`."""
+    geometry: list[float] = []
     for leg in robot.legs:
         for quantity in leg.quantities:
-            values += map(float, quantity.value)
-        values += (*leg.platform_point, *leg.fixed_offset)
+            geometry += map(float, quantity.value)
+        geometry += (*leg.platform_point, *leg.fixed_offset)
     for vector in (*robot.platform.frame, *robot.platform.quantities.values(), robot.gravity):
-        values += vector
-    return values
+        geometry += vector
+    return geometry
 
 
 def number_places(robot: Manipulator) -> list[dict[str, int]]:
-    """Return the first place of each quantity in the vector of `numbers`: by leg, then platform."""
+    """Return the first index of each quantity in the vector of `numbers`: by leg, then platform."""
     sizes = [{q.name: len(q.value) for q in leg.quantities} for leg in robot.legs]
-    owned = [one | {"platform_point": 3, "fixed_offset": 3} for one in sizes]
+    owned = [owner_sizes | {"platform_point": 3, "fixed_offset": 3} for owner_sizes in sizes]
     quantities = robot.platform.quantities.items()
-    owned.append({"frame": 9} | {name: len(value) for name, value in quantities})
-    starts = accumulate(chain.from_iterable(one.values() for one in owned), initial=0)
-    return [{name: next(starts) for name in one} for one in owned]
+    owned.append({"frame": 9} | {name: len(vector) for name, vector in quantities})
+    starts = accumulate(
+        chain.from_iterable(owner_sizes.values() for owner_sizes in owned), initial=0
+    )
+    return [{name: next(starts) for name in owner_sizes} for owner_sizes in owned]

@@ -21,21 +21,24 @@ def mixed_forces(
     machine: Machine,
     pose: Expression,
     rates: Expression,
-    aim: Expression,
-    push: Expression,
+    reference_rates: Expression,
+    reference_accelerations: Expression,
     parameters: Expression,
 ) -> Expression:
     """Return F (n, K) with J^T F = M a + C(x, v) w + g, for the columns of parameters (N, K).
 
-    J v = `rates`, J w = `aim`, and a is such that the joints' acceleration J a + J'(x, v) w is
-    `push`; these are (n, 1) each. With `aim` the rates themselves it is the inverse dynamics.
+    J v = `rates`, J w = `reference_rates`, and a is such that the joints' acceleration
+    J a + J'(x, v) w is `reference_accelerations`; these are (n, 1) each. Where the reference rates
+    are the rates it is the inverse dynamics.
     """
     at_rest = machine.state(pose)
-    both = machine.closure.rates(ca.horzcat(rates, aim), at_rest.platform, at_rest.legs)
+    both = machine.closure.rates(ca.horzcat(rates, reference_rates), at_rest.platform, at_rest.legs)
     mean, half = 0.5 * (both[:, 0] + both[:, 1]), 0.5 * (both[:, 0] - both[:, 1])
     drifts = (joint_motion(machine.state(pose, velocity))[1] for velocity in (mean, half))
     drift = next(drifts) - next(drifts)
-    acceleration = machine.closure.rates(push - drift, at_rest.platform, at_rest.legs)
+    acceleration = machine.closure.rates(
+        reference_accelerations - drift, at_rest.platform, at_rest.legs
+    )
     weightless = replace(machine, gravity=ca.SX.zeros(3))
     return inverse_dynamics(
         machine, machine.state(pose, mean, acceleration), parameters

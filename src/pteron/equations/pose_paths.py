@@ -12,7 +12,7 @@ coincide in pairs, three about a point P that stays, y = 0, in 8, and three sphe
 of the same three points in 16, complex poses among them, for all machines but special ones. Along a
 straight path between two machines, from one in general complex numbers whose poses are known, poses
 neither meet nor vanish (Sommese and Wampler, The numerical solution of systems of polynomials,
-2005, chapter 7). `stepped` makes a step along it.
+2005, chapter 7). `advance_path` makes a step along it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from pteron.bodies.motion import Expression
 
 
 class Closed(NamedTuple):
-    """A kind of closures: how many spheres and planes, and whether P moves."""
+    """A kind of closures: the numbers of spheres and planes, and whether P moves."""
 
     spheres: int
     planes: int
@@ -52,8 +52,8 @@ class Closed(NamedTuple):
         return 8 if self.moves else 4
 
     @property
-    def on_path(self) -> int:
-        """The length of the vector of an `OnPath`: four complex z and three numbers."""
+    def path_state_size(self) -> int:
+        """The length of the vector of a `PathState`: four complex z and three numbers."""
         return 8 * self.size + 3
 
 
@@ -75,11 +75,11 @@ class Number(NamedTuple):
         )
 
     def times(self, factor: Expression | float) -> Number:
-        """Return its product with a real number."""
+        """Return the product with a real number."""
         return Number(factor * self.re, factor * self.im)
 
     def inverse(self) -> Number:
-        """Return 1 over it."""
+        """Return the reciprocal."""
         square = self.re * self.re + self.im * self.im
         return Number(self.re / square, -self.im / square)
 
@@ -95,111 +95,117 @@ def numbers(re: Expression, im: Expression | None = None) -> list[Number]:
 
 
 _FIRST = 0.02
-"""Greatest first step of Newton's, as a share of |z|, of a guess that is near enough."""
+"""Tolerance of Newton's first step, relative to |z|: the prediction is accepted."""
 
 _SECOND = 4e-4
-"""Greatest second one: what it leaves is its square or so."""
+"""Tolerance of Newton's second step, whose square is about the remaining error."""
 
 _AIM = 0.004
-"""The first step at which the path's next step is not made longer: its fourth power counts."""
+"""Newton's first step at which the path's step length stays: the error is of fourth order in it."""
 
 _SHORTER, _LONGER = 0.3, 2.5
 """Least and greatest factor from one step of the path to the next."""
 
 
-class OnPath(NamedTuple):
-    """Where a path is: its pose z, |z| = 1, with dz/dt, and the pose before."""
+class PathState(NamedTuple):
+    """State of a path tracker: pose z, |z| = 1, dz/dt, and the previous pose."""
 
     z: list[Number]
     rate: list[Number]
     before: list[Number]
     rate_before: list[Number]
-    gone: Expression
-    """t from the pose before."""
+    interval: Expression
+    """t since the previous pose."""
     t: Expression
     step: Expression
     """The most that t may grow by."""
 
     @classmethod
-    def of(cls, values: Expression, closed: Closed) -> OnPath:
-        """Return what a vector holds: real and imaginary parts of each in turn."""
+    def from_vector(cls, vector: Expression, closed: Closed) -> PathState:
+        """Return the state from a vector: real and imaginary parts of each in turn."""
         d = closed.size
         parts = [
-            numbers(values[2 * d * k : 2 * d * k + d], values[2 * d * k + d : 2 * d * (k + 1)])
+            numbers(vector[2 * d * k : 2 * d * k + d], vector[2 * d * k + d : 2 * d * (k + 1)])
             for k in range(4)
         ]
-        return cls(*parts, *ca.vertsplit(values[8 * d :]))
+        return cls(*parts, *ca.vertsplit(vector[8 * d :]))
 
     def vector(self) -> Expression:
-        """Return it as one vector."""
-        parts = [part for of in self[:4] for part in ([v.re for v in of], [v.im for v in of])]
-        return ca.vertcat(*(value for part in parts for value in part), *self[4:])
+        """Return the state as one vector, see `from_vector`."""
+        parts = [
+            part
+            for component_numbers in self[:4]
+            for part in ([v.re for v in component_numbers], [v.im for v in component_numbers])
+        ]
+        return ca.vertcat(*(component for part in parts for component in part), *self[4:])
 
 
-def stepped(
-    closed: Closed, start: Sequence[Number], target: Sequence[Number], at: OnPath
-) -> tuple[OnPath, Expression]:
-    """Return where a path is after a step, and the last of Newton's steps onto it.
+def advance_path(
+    closed: Closed, start: Sequence[Number], target: Sequence[Number], at: PathState
+) -> tuple[PathState, Expression]:
+    """Return a path's state after a predictor-corrector step, and the size of the last correction.
 
     `start` and `target` are the machines at t = 0 and 1: for each equation a or n, b and r^2 or h,
-    seven numbers. Where the cubic through the last two poses and their rates leads too far astray
-    the path stays where it is, to take a shorter step.
+    seven numbers. Where the cubic through the last two poses and their rates predicts too badly the
+    step is rejected: the state stays, with a shorter step.
     """
     slope = [there - here for here, there in zip(start, target, strict=True)]
     t = ca.if_else(at.step < 1 - at.t, at.t + at.step, 1)
-    gone = t - at.t
+    interval = t - at.t
     now = [here + rate.times(t) for here, rate in zip(start, slope, strict=True)]
     patch = [Number(v.re, -v.im) for v in at.z]
-    guess = _guessed(at, patch, gone)
+    guess = _predict_pose(at, patch, interval)
     first, _ = _newton(closed, now, None, guess, patch)
-    better = [a + b for a, b in zip(guess, first, strict=True)]
-    second, rate = _newton(closed, now, slope, better, patch)
-    size = ca.sqrt(_square(better))
-    astray, left = ca.sqrt(_square(first)) / size, ca.sqrt(_square(second)) / size
+    corrected = [a + b for a, b in zip(guess, first, strict=True)]
+    second, rate = _newton(closed, now, slope, corrected, patch)
+    size = ca.sqrt(_square(corrected))
+    prediction_error, correction = ca.sqrt(_square(first)) / size, ca.sqrt(_square(second)) / size
     # Products of truths: gcc vectorises no loop in which `and` joins them, six times as slow.
-    good = (astray < _FIRST) * (left < _SECOND)
-    found = [(a + b).times(1 / size) for a, b in zip(better, second, strict=True)]
-    scale = 1 / ca.sqrt(_square(found))
-    found = [v.times(scale) for v in found]
+    is_accepted = (prediction_error < _FIRST) * (correction < _SECOND)
+    pose = [(a + b).times(1 / size) for a, b in zip(corrected, second, strict=True)]
+    scale = 1 / ca.sqrt(_square(pose))
+    pose = [v.times(scale) for v in pose]
     rate = [v.times(scale / size) for v in rate]
-    along = _dot([Number(v.re, -v.im) for v in found], rate)
-    rate = [v - along * u for v, u in zip(rate, found, strict=True)]
-    factor = 0.9 * ca.sqrt(ca.sqrt(_AIM / (astray + 1e-12)))
-    factor = ca.fmin(ca.fmax(factor, _SHORTER), ca.if_else(good, _LONGER, 0.5))
-    factor = ca.if_else(astray < 1e6, factor, _SHORTER)
-    after = OnPath(
-        _chosen(good, found, at.z),
-        _chosen(good, rate, at.rate),
-        _chosen(good, at.z, at.before),
-        _chosen(good, at.rate, at.rate_before),
-        ca.if_else(good * (gone > 0), gone, at.gone),
-        ca.if_else(good, t, at.t),
-        ca.if_else(gone > 0, gone, at.step) * factor,
+    rate_along_pose = _dot([Number(v.re, -v.im) for v in pose], rate)
+    rate = [v - rate_along_pose * u for v, u in zip(rate, pose, strict=True)]
+    factor = 0.9 * ca.sqrt(ca.sqrt(_AIM / (prediction_error + 1e-12)))
+    factor = ca.fmin(ca.fmax(factor, _SHORTER), ca.if_else(is_accepted, _LONGER, 0.5))
+    factor = ca.if_else(prediction_error < 1e6, factor, _SHORTER)
+    after = PathState(
+        _select(is_accepted, pose, at.z),
+        _select(is_accepted, rate, at.rate),
+        _select(is_accepted, at.z, at.before),
+        _select(is_accepted, at.rate, at.rate_before),
+        ca.if_else(is_accepted * (interval > 0), interval, at.interval),
+        ca.if_else(is_accepted, t, at.t),
+        ca.if_else(interval > 0, interval, at.step) * factor,
     )
-    return after, left
+    return after, correction
 
 
-def _guessed(at: OnPath, patch: Sequence[Number], gone: Expression) -> list[Number]:
+def _predict_pose(at: PathState, patch: Sequence[Number], interval: Expression) -> list[Number]:
     """Return the cubic through the last two poses and their rates, in the patch of the last."""
     scale = _dot(patch, at.before).inverse()
-    before = [v * scale for v in at.before]
+    previous = [v * scale for v in at.before]
     rates = [v * scale for v in at.rate_before]
-    along = _dot(patch, rates)
-    back = 1 / at.gone
+    rate_along_patch = _dot(patch, rates)
+    inverse_interval = 1 / at.interval
     guess = []
-    for z, v, p, rate in zip(at.z, at.rate, before, rates, strict=True):
-        chord = ((p - z).times(back) + v).times(back)
-        bend = (rate - along * p - v).times(back)
-        third = (bend + chord.times(2)).times(back)
-        second = chord + third.times(at.gone)
-        guess.append(z + (v + (second + third.times(gone)).times(gone)).times(gone))
+    for z, v, p, rate in zip(at.z, at.rate, previous, rates, strict=True):
+        chord = ((p - z).times(inverse_interval) + v).times(inverse_interval)
+        bend = (rate - rate_along_patch * p - v).times(inverse_interval)
+        third = (bend + chord.times(2)).times(inverse_interval)
+        second = chord + third.times(at.interval)
+        guess.append(z + (v + (second + third.times(interval)).times(interval)).times(interval))
     return guess
 
 
-def _chosen(good: Expression, one: list[Number], other: list[Number]) -> list[Number]:
+def _select(
+    is_accepted: Expression, accepted: list[Number], rejected: list[Number]
+) -> list[Number]:
     return [
-        Number(ca.if_else(good, a.re, b.re), ca.if_else(good, a.im, b.im))
-        for a, b in zip(one, other, strict=True)
+        Number(ca.if_else(is_accepted, a.re, b.re), ca.if_else(is_accepted, a.im, b.im))
+        for a, b in zip(accepted, rejected, strict=True)
     ]
 
 
@@ -213,13 +219,13 @@ def _square(v: Sequence[Number]) -> Expression:
 def rows(
     closed: Closed, machine: Sequence[Number], z: Sequence[Number]
 ) -> tuple[Expression, Expression]:
-    """Return the closures' derivatives (k, size) by a real z, and what it misses them by (k, 1).
+    """Return the closures' Jacobian (k, size) at a real z, and their residuals (k, 1).
 
-    x.y = 0 is the first of them where P moves.
+    x.y = 0 is the first closure where P moves.
     """
-    found = _closures(closed, machine, None, z)
-    slopes = ca.vertcat(*(ca.horzcat(*(v.re for v in row[:-1])) for row in found))
-    return slopes, -ca.vertcat(*(row[-1].re for row in found))
+    closures = _closures(closed, machine, None, z)
+    slopes = ca.vertcat(*(ca.horzcat(*(v.re for v in row[:-1])) for row in closures))
+    return slopes, -ca.vertcat(*(row[-1].re for row in closures))
 
 
 def _newton(
@@ -229,11 +235,11 @@ def _newton(
     z: Sequence[Number],
     patch: Sequence[Number],
 ) -> tuple[list[Number], list[Number]]:
-    """Return Newton's step and, of a slope of the machine, dz/dt."""
-    one, none = Number(ca.SX(1), ca.SX(0)), Number(ca.SX(0), ca.SX(0))
-    found = [[*patch, one - _dot(patch, z), *([none] if slope else [])]]
-    solved = _eliminated(found + _closures(closed, now, slope, z), closed.size)
-    return solved[0], solved[1] if slope else []
+    """Return Newton's step and, given the machine's slope, dz/dt."""
+    unit, none = Number(ca.SX(1), ca.SX(0)), Number(ca.SX(0), ca.SX(0))
+    system = [[*patch, unit - _dot(patch, z), *([none] if slope else [])]]
+    solutions = _solve_by_elimination(system + _closures(closed, now, slope, z), closed.size)
+    return solutions[0], solutions[1] if slope else []
 
 
 def _closures(
@@ -242,46 +248,46 @@ def _closures(
     slope: Sequence[Number] | None,
     z: Sequence[Number],
 ) -> list[list[Number]]:
-    """Return a row for each closure: its derivatives by z, minus its value, minus that by t."""
+    """Return a row for each closure: its derivatives by z, its negated value and t derivative."""
     x, y = z[:4], z[4:]
     square, none = _dot(x, x), Number(ca.SX(0), ca.SX(0))
-    found = []
+    closures = []
     if closed.moves:
-        found.append([*y, *x, none - _dot(x, y), *([none] if slope else [])])
+        closures.append([*y, *x, none - _dot(x, y), *([none] if slope else [])])
     for k in range(closed.equations):
         a, b, r = now[7 * k : 7 * k + 3], now[7 * k + 3 : 7 * k + 6], now[7 * k + 6]
-        arm = _by_vector(x, b)
+        arm = _times_vector(x, b)
         if y:
             arm = _plus(arm, [v.times(2) for v in y])
-        turned = _vector_by(a, x)
+        a_x = _vector_times(a, x)
         sphere = k < closed.spheres
         if sphere:
-            e = _minus(arm, turned)
-            along = _minus(_minus(_vector_by(a, e), _by_vector(e, b)), [r * v for v in x])
-            across = [v.times(2) for v in e]
+            e = _minus(arm, a_x)
+            by_x = _minus(_minus(_vector_times(a, e), _times_vector(e, b)), [r * v for v in x])
+            by_y = [v.times(2) for v in e]
             miss = (_dot(e, e) - r * square).times(0.5)
         else:
-            back = _plus(_vector_by(a, arm), _by_vector(turned, b))
-            along = [v.times(-1) - (r * u).times(2) for v, u in zip(back, x, strict=True)]
-            across = [v.times(2) for v in turned]
-            miss = _dot(turned, arm) - r * square
-        row = [*along, *(across if y else []), none - miss]
+            back = _plus(_vector_times(a, arm), _times_vector(a_x, b))
+            by_x = [v.times(-1) - (r * u).times(2) for v, u in zip(back, x, strict=True)]
+            by_y = [v.times(2) for v in a_x]
+            miss = _dot(a_x, arm) - r * square
+        row = [*by_x, *(by_y if y else []), none - miss]
         if slope:
             da, db, dr = slope[7 * k : 7 * k + 3], slope[7 * k + 3 : 7 * k + 6], slope[7 * k + 6]
             if sphere:
-                de = _minus(_by_vector(x, db), _vector_by(da, x))
+                de = _minus(_times_vector(x, db), _vector_times(da, x))
                 row.append((dr * square).times(0.5) - _dot(e, de))
             else:
-                moved = _dot(_vector_by(da, x), arm) + _dot(turned, _by_vector(x, db))
-                row.append(dr * square - moved)
-        found.append(row)
-    return found
+                rate = _dot(_vector_times(da, x), arm) + _dot(a_x, _times_vector(x, db))
+                row.append(dr * square - rate)
+        closures.append(row)
+    return closures
 
 
-def _eliminated(rows: list[list[Number]], size: int) -> list[list[Number]]:
-    """Return the solutions, for each column beyond the first ones, by Gauss without a pivot.
+def _solve_by_elimination(rows: list[list[Number]], size: int) -> list[list[Number]]:
+    """Return the solutions, one a right-hand column, by Gaussian elimination without pivoting.
 
-    The frames are turned at random, so that none vanishes.
+    The frames are rotated at random, so that no pivot vanishes.
     """
     rows = [list(row) for row in rows]
     inverses = []
@@ -291,34 +297,34 @@ def _eliminated(rows: list[list[Number]], size: int) -> list[list[Number]]:
             factor = row[k] * inverses[k]
             for j in range(k + 1, len(row)):
                 row[j] = row[j] - factor * rows[k][j]
-    found = []
+    solutions = []
     for column in range(size, len(rows[0])):
         solution: list[Number] = []
         for k in reversed(range(size)):
-            value = rows[k][column]
+            remainder = rows[k][column]
             for j, known in zip(range(size - 1, k, -1), solution, strict=True):
-                value = value - rows[k][j] * known
-            solution.append(value * inverses[k])
-        found.append(solution[::-1])
-    return found
+                remainder = remainder - rows[k][j] * known
+            solution.append(remainder * inverses[k])
+        solutions.append(solution[::-1])
+    return solutions
 
 
-def _plus(one: Quaternion, other: Quaternion) -> list[Number]:
-    return [a + b for a, b in zip(one, other, strict=True)]
+def _plus(p: Quaternion, q: Quaternion) -> list[Number]:
+    return [a + b for a, b in zip(p, q, strict=True)]
 
 
-def _minus(one: Quaternion, other: Quaternion) -> list[Number]:
-    return [a - b for a, b in zip(one, other, strict=True)]
+def _minus(p: Quaternion, q: Quaternion) -> list[Number]:
+    return [a - b for a, b in zip(p, q, strict=True)]
 
 
-def _dot(one: Sequence[Number], other: Sequence[Number]) -> Number:
-    first, *more = (a * b for a, b in zip(one, other, strict=True))
-    for term in more:
+def _dot(u: Sequence[Number], v: Sequence[Number]) -> Number:
+    first, *products = (a * b for a, b in zip(u, v, strict=True))
+    for term in products:
         first = first + term
     return first
 
 
-def _vector_by(v: Sequence[Number], x: Quaternion) -> list[Number]:
+def _vector_times(v: Sequence[Number], x: Quaternion) -> list[Number]:
     """Return v x."""
     (a, b, c), (w, i, j, k) = v, x
     return [
@@ -329,7 +335,7 @@ def _vector_by(v: Sequence[Number], x: Quaternion) -> list[Number]:
     ]
 
 
-def _by_vector(x: Quaternion, v: Sequence[Number]) -> list[Number]:
+def _times_vector(x: Quaternion, v: Sequence[Number]) -> list[Number]:
     """Return x v."""
     (a, b, c), (w, i, j, k) = v, x
     return [

@@ -1,10 +1,10 @@
 """Equations A w = b of the forces in the legs' joints, by Newton and Euler, body by body.
 
 A leg is cut at its platform point c. The unknowns w are the force f and the moment m, about c, that
-each leg exerts on the platform. Each joint of the leg transmits these and what the bodies beyond it
-need. A passive joint transmits nothing along its own freedom, and the platform is in equilibrium:
-these are the equations. Where A has fewer independent rows than unknowns the machine is
-overconstrained, and only a norm, or the links' elasticity, decides the rest.
+each leg exerts on the platform. Each joint of the leg transmits these and the inertia and gravity
+forces of the bodies beyond it. A passive joint transmits nothing along its own freedom, and the
+platform is in equilibrium: these are the equations. Where A has fewer independent rows than
+unknowns the machine is overconstrained, and only a norm, or the links' elasticity, decides.
 """
 
 from __future__ import annotations
@@ -22,37 +22,37 @@ from pteron.legs.leg import LegMotion
 
 
 class Wrench(NamedTuple):
-    """A force and a moment, linear in a leg's unknowns w = (f, m): rows (3, 6) and the rest."""
+    """A force and a moment, affine in a leg's unknowns w = (f, m): rows (3, 6) and constants."""
 
     force_rows: Expression
     force: Expression
     moment_rows: Expression
     moment: Expression
-    """About the point that it is passed on at."""
+    """About the point at which it is transmitted."""
 
 
 class LegForces(NamedTuple):
-    """The wrenches that the joints of a leg pass on, from the base to the platform."""
+    """The wrenches that the joints of a leg transmit, from the base to the platform."""
 
     points: tuple[Expression, ...]
-    """The points at which they are passed on, (3, 1)."""
+    """The points at which they are transmitted, (3, 1)."""
     wrenches: tuple[Wrench, ...]
 
 
 class Equilibrium(NamedTuple):
-    """The equations of w = (f_1, m_1, f_2, ...), (6 n, 1), and what the joints pass on."""
+    """The equations of w = (f_1, m_1, f_2, ...), (6 n, 1), and the joints' wrenches."""
 
     rows: Expression
-    """A: the platform's motions first, (m, 6 n), then what the legs' joints do not pass on."""
+    """A: the platform's equilibrium first, (m, 6 n), then the legs' passive joints."""
     right: Expression
-    """b, where nothing but motion and gravity acts on the platform."""
+    """b without an external wrench on the platform."""
     presumed_rows: Expression
     """Equations of a platform that its legs hold as its motion presumes: the forces on it, the
     moments about P, and those on its bars; none of a platform on a joint with the base."""
     presumed_right: Expression
     legs: tuple[LegForces, ...]
     loads: Expression
-    """(m, k): what a wrench on the platform takes of b."""
+    """(m, k): b changes by -loads times a wrench on the platform."""
     driven_rows: Expression
     """(n, 6 n) and (n, 1): the actuator forces are driven_rows w + driven."""
     driven: Expression
@@ -60,50 +60,57 @@ class Equilibrium(NamedTuple):
 
 def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equilibrium:
     """Return the equations of the internal forces of a state."""
-    inertia, own = machine.moments(parameters)
+    inertia, platform_inertia = machine.moments(parameters)
     platform, count = state.platform, len(machine.legs)
-    sums, works, legs, driven = [], [], [], []
-    released: list[_Row] = []
+    sums, pose_rows, legs, driven = [], [], [], []
+    passive_rows: list[_Row] = []
     bars: dict[Vector, list[_Row]] = {}
     parts = zip(machine.robot.legs, state.legs, platform.points, inertia, strict=True)
     for i, (leg, motion, point, bodies) in enumerate(parts):
         c = point.position
-        found = _leg_forces(machine, leg, motion, c, bodies)
-        legs.append(found)
+        leg_forces = _leg_forces(machine, leg, motion, c, bodies)
+        legs.append(leg_forces)
         arm = ca.skew(c - platform.body.position)
         sums.append(ca.blockcat([[ca.SX.eye(3), ca.SX(3, 3)], [arm, ca.SX.eye(3)]]))
-        moved, barred = platform.matrices[i].T, any(leg.fixed_offset)
+        motion_rows, barred = platform.matrices[i].T, any(leg.fixed_offset)
         if barred and motion.pushes:  # the bar that it holds does not turn
-            moved = ca.horzcat(moved[:, :3], ca.SX(machine.freedom, 3))
-        works.append(moved)
+            motion_rows = ca.horzcat(motion_rows[:, :3], ca.SX(machine.freedom, 3))
+        pose_rows.append(motion_rows)
         hinges = len(platform.rotation.turns)
-        released += [_among(row, i, count) for row in _released(leg, motion, found, hinges)]
+        passive_rows += [
+            _embed_row(row, i, count)
+            for row in _passive_joint_rows(leg, motion, leg_forces, hinges)
+        ]
         for k in range(len(motion.chain) - hinges, len(motion.chain)) if motion.pushes else ():
-            hinge = _among(_along(motion, found, k), i, count)
+            hinge = _embed_row(_freedom_component(motion, leg_forces, k), i, count)
             if barred:  # at one platform point it is one bar, on one hinge
                 bars.setdefault(leg.platform_point, []).append(hinge)
             else:
-                released.append(hinge)
-        driven.append(_among(_actuated(motion, found), i, count))
+                passive_rows.append(hinge)
+        driven.append(_embed_row(_actuator_row(motion, leg_forces), i, count))
     shared = [tuple(sum(parts) for parts in zip(*bar, strict=True)) for bar in bars.values()]
-    needs = machine.platform.needs(platform, machine.gravity, own)
-    whole = machine.platform.needed_wrench(platform, machine.gravity, own)
-    held = [(ca.horzcat(*sums), ca.vertcat(*whole))] if machine.platform.on_legs_alone else []
-    held += [(row, -rest) for row, rest in shared]
-    wanted = (ca.vertcat(*part) for part in zip(*driven, strict=True))
+    needs = machine.platform.needs(platform, machine.gravity, platform_inertia)
+    platform_wrench = machine.platform.needed_wrench(platform, machine.gravity, platform_inertia)
+    presumed = (
+        [(ca.horzcat(*sums), ca.vertcat(*platform_wrench))]
+        if machine.platform.on_legs_alone
+        else []
+    )
+    presumed += [(row, -constant) for row, constant in shared]
+    driven_parts = (ca.vertcat(*part) for part in zip(*driven, strict=True))
     return Equilibrium(
-        ca.vertcat(ca.horzcat(*works), *(row for row, _ in released)),
-        ca.vertcat(needs, *(-rest for _, rest in released)),
-        ca.vertcat(ca.SX(0, 6 * count), *(row for row, _ in held)),
-        ca.vertcat(ca.SX(0, 1), *(rest for _, rest in held)),
+        ca.vertcat(ca.horzcat(*pose_rows), *(row for row, _ in passive_rows)),
+        ca.vertcat(needs, *(-constant for _, constant in passive_rows)),
+        ca.vertcat(ca.SX(0, 6 * count), *(row for row, _ in presumed)),
+        ca.vertcat(ca.SX(0, 1), *(constant for _, constant in presumed)),
         tuple(legs),
         machine.platform.applied(platform, ca.SX.eye(machine.wrench_size)),
-        *wanted,
+        *driven_parts,
     )
 
 
 class Beams(NamedTuple):
-    """The links of the legs as beams, and what rods carry: NaN where a leg has none."""
+    """The links of the legs as beams, and the couples of rods; NaN where a leg has none."""
 
     starts: list[Expression]
     """(2, 3) a leg: where its upper and its lower link begin."""
@@ -117,7 +124,7 @@ class Beams(NamedTuple):
 
 def beams(machine: Machine, state: State) -> Beams:
     """Return the links of a state's legs."""
-    found = Beams([], [], [], [])
+    links = Beams([], [], [], [])
     for leg, motion in zip(machine.robot.legs, state.legs, strict=True):
         rows = []
         for letter, way in zip(LEG_BODIES[1:], motion.links, strict=True):
@@ -126,11 +133,11 @@ def beams(machine: Machine, state: State) -> Beams:
                 continue
             joint = next(j for j in reversed(motion.chain) if j.body == letter)
             rows.append(ca.horzcat(joint.point, way, joint.axis))
-        for k, part in enumerate(found[:3]):
+        for k, part in enumerate(links[:3]):
             part.append(ca.horzcat(*(row[:, k] for row in rows)).T)
         couple = leg.rod_couple(motion)
-        found.couples.append(ca.SX.nan(3, 1) if couple is None else couple)
-    return found
+        links.couples.append(ca.SX.nan(3, 1) if couple is None else couple)
+    return links
 
 
 def _leg_forces(
@@ -140,15 +147,18 @@ def _leg_forces(
     c: Expression,
     inertia: dict[str, Moments],
 ) -> LegForces:
-    """Return what the joints of a leg pass on, towards the platform."""
+    """Return the wrenches that the joints of a leg transmit towards the platform."""
     eye, points, wrenches = ca.SX.eye(3), [], []
-    force, moment = ca.SX(3, 1), ca.SX(3, 1)  # what the bodies beyond need, about c
+    force, moment = ca.SX(3, 1), ca.SX(3, 1)  # of the bodies beyond the joint, about c
     for k, joint in reversed(list(enumerate(motion.chain))):
         if joint.body:
             body = motion.bodies[joint.body]
-            needed, about = needed_wrench(body, inertia[joint.body], machine.gravity)
-            force, moment = force + needed, moment + about + ca.cross(body.position - c, needed)
-        # A slider passes on a moment where it is.
+            force_needed, moment_needed = needed_wrench(body, inertia[joint.body], machine.gravity)
+            force, moment = (
+                force + force_needed,
+                moment + moment_needed + ca.cross(body.position - c, force_needed),
+            )
+        # A slider transmits a moment at its carriage.
         point = motion.chain[k + 1].point if joint.kind == "P" else joint.point
         if joint.seat is not None:
             point = joint.seat
@@ -160,50 +170,56 @@ def _leg_forces(
 
 
 _Row = tuple[Expression, Expression]
-"""(1, 6), or (1, 6 n), and the rest of it: row w + rest."""
+"""An affine form: row (1, 6) or (1, 6 n), and constant; row w + constant."""
 
 
-def _among(row: _Row, i: int, count: int) -> _Row:
-    """Return a row of a leg's unknowns as one of all."""
-    none = [ca.SX(1, 6)] * count
-    return ca.horzcat(*none[:i], row[0], *none[i + 1 :]), row[1]
+def _embed_row(row: _Row, i: int, count: int) -> _Row:
+    """Return a row (1, 6) of leg i's unknowns as a row (1, 6 n) of all legs' unknowns."""
+    blocks = [ca.SX(1, 6)] * count
+    return ca.horzcat(*blocks[:i], row[0], *blocks[i + 1 :]), row[1]
 
 
-def _along(motion: LegMotion, found: LegForces, k: int) -> _Row:
-    """Return what a joint passes on along its own freedom."""
-    joint, at = motion.chain[k], found.wrenches[k]
+def _freedom_component(motion: LegMotion, leg_forces: LegForces, k: int) -> _Row:
+    """Return the force, or moment, that a joint transmits along its own freedom."""
+    joint, wrench = motion.chain[k], leg_forces.wrenches[k]
     axis = joint.axis.T
     if joint.kind == "P":
-        return ca.mtimes(axis, at.force_rows), ca.mtimes(axis, at.force)
-    return ca.mtimes(axis, at.moment_rows), ca.mtimes(axis, at.moment)
+        return ca.mtimes(axis, wrench.force_rows), ca.mtimes(axis, wrench.force)
+    return ca.mtimes(axis, wrench.moment_rows), ca.mtimes(axis, wrench.moment)
 
 
-def _actuated(motion: LegMotion, found: LegForces) -> _Row:
-    """Return the actuator force: what the driven joint passes on, over the ratio of its gear."""
-    row, rest = _along(motion, found, motion.chain.index(motion.driven))
-    return row / motion.driven.gear, rest / motion.driven.gear
+def _actuator_row(motion: LegMotion, leg_forces: LegForces) -> _Row:
+    """Return the actuator force: that along the driven joint's freedom, over its gear ratio."""
+    row, constant = _freedom_component(motion, leg_forces, motion.chain.index(motion.driven))
+    return row / motion.driven.gear, constant / motion.driven.gear
 
 
-def _released(leg: LegKind, motion: LegMotion, found: LegForces, hinges: int) -> list[_Row]:
-    """Return what the passive joints of a leg pass on along their freedoms: nothing.
+def _passive_joint_rows(
+    leg: LegKind, motion: LegMotion, leg_forces: LegForces, hinges: int
+) -> list[_Row]:
+    """Return the forms that vanish: the forces along the freedoms of a leg's passive joints.
 
-    The last ones are left out: hinges on the platform's axes, which legs may share, or what is
+    The last joints are excluded: hinges on the platform's axes, which legs may share, and joints
     geared to the driven joint.
     """
     couple = leg.rod_couple(motion)
     if couple is None:
         passive = [k for k, joint in enumerate(motion.chain) if not joint.driven]
-        return [_along(motion, found, k) for k in passive if k < len(motion.chain) - hinges]
-    # Rods: what is no force along them is their couple, the same at both of their ends.
+        return [
+            _freedom_component(motion, leg_forces, k)
+            for k in passive
+            if k < len(motion.chain) - hinges
+        ]
+    # Rods transmit a force along them and a couple, the same at both of their ends.
     length = ca.norm_2(motion.links[1])
     n, couple = motion.links[1] / length, couple / length
     first, second = [k for k, joint in enumerate(motion.chain) if not joint.driven][:2]
-    across, tip = motion.chain[second].axis, found.wrenches[first]
+    hinge_axis, tip = motion.chain[second].axis, leg_forces.wrenches[first]
     blocked = ca.horzsplit(ca.SX.eye(3))
     if not couple.is_zero():
         blocked = [n, ca.cross(n, couple)]
     at_c = ca.horzcat(ca.SX(3, 3), ca.SX.eye(3))
-    ends = (across, ca.cross(n, across))
+    ends = (hinge_axis, ca.cross(n, hinge_axis))
     return [
         *((ca.mtimes(v.T, at_c), ca.SX(0)) for v in blocked),
         *((ca.mtimes(v.T, tip.moment_rows - at_c), ca.mtimes(v.T, tip.moment)) for v in ends),

@@ -21,31 +21,31 @@ _TINY = 1e-30
 def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expression]:
     """Return the distance, m, under translation alone, and the angle, rad, of a turn alone.
 
-    They are at most `FAR` and pi; a platform that does not turn has no angle. One that tilts turns
-    about whichever axis brings it there soonest, of those about which its angles turn it.
+    They are at most `FAR` and pi; a platform that does not turn has no angle. For a platform that
+    tilts the angle is the least over all rotation axes that its angles span.
     """
     state = machine.state(pose)
     measure = machine.closure.measure(state.platform, state.legs)
     slope = ca.gradient(measure, pose)
     lengths = machine.platform.directions.shape[1]
-    along, about = slope[:lengths], slope[lengths:]
-    found = {"metres": _first_order(measure, ca.dot(along, along), FAR)}
+    translation_slope, rotation_slope = slope[:lengths], slope[lengths:]
+    distances = {"metres": _first_order(measure, ca.dot(translation_slope, translation_slope), FAR)}
     if machine.closure.orientation is not None:
         a, b = machine.closure.orientation
         c, s = ca.cos(pose[-1]), ca.sin(pose[-1])
-        found["radians"] = ca.atan2(ca.fabs(a * c + b * s), ca.fabs(b * c - a * s))
-    elif about.numel():
-        square = ca.dot(about, about)
-        if about.numel() > 1:  # |omega|^2 is a form of the angles' rates
+        distances["radians"] = ca.atan2(ca.fabs(a * c + b * s), ca.fabs(b * c - a * s))
+    elif rotation_slope.numel():
+        square = ca.dot(rotation_slope, rotation_slope)
+        if rotation_slope.numel() > 1:  # |omega|^2 is a form of the angles' rates
             turning = state.platform.twist_rows[3:, lengths:]
             form = ca.mtimes(turning.T, turning)
-            square = ca.dot(about, ca.mtimes(ca.inv_minor(form), about))
-        found["radians"] = _first_order(measure, square, math.pi)
-    return found
+            square = ca.dot(rotation_slope, ca.mtimes(ca.inv_minor(form), rotation_slope))
+        distances["radians"] = _first_order(measure, square, math.pi)
+    return distances
 
 
 def _first_order(measure: Expression, square: Expression, most: float) -> Expression:
-    """Return |mu| over its slope, whose square is given: at most `most`."""
+    """Return min(|mu| / slope, most), from the square of the slope."""
     size = ca.fabs(measure)
-    # `fmin` of the quotient would take `most` for a quotient that is not a number.
+    # `fmin` of the quotient would return `most` for a quotient that is NaN.
     return size / ca.fmax(ca.sqrt(square + _TINY), size / most)

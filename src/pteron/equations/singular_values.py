@@ -26,7 +26,7 @@ _TINY = 1e-300
 
 
 def singular_values(matrix: Expression) -> list[Expression]:
-    """Return the min(k, n) singular values of a matrix (k, n), in no order.
+    """Return the min(k, n) singular values of a matrix (k, n), unsorted.
 
     A matrix with more columns than rows is transposed first.
     """
@@ -35,28 +35,32 @@ def singular_values(matrix: Expression) -> list[Expression]:
     columns = ca.horzsplit(ca.densify(matrix))
     for _ in range(_SWEEPS[len(columns)]):
         for i, j in combinations(range(len(columns)), 2):
-            columns[i], columns[j] = _perpendicular(columns[i], columns[j])
+            columns[i], columns[j] = _orthogonalise(columns[i], columns[j])
     return [ca.sqrt(ca.dot(column, column)) for column in columns]
 
 
-def _perpendicular(u: Expression, v: Expression) -> tuple[Expression, Expression]:
-    """Return two columns made perpendicular by a rotation of 45 degrees at most.
+def _orthogonalise(u: Expression, v: Expression) -> tuple[Expression, Expression]:
+    """Return two columns rotated, by 45 degrees at most, to be orthogonal (a Jacobi rotation).
 
     Its angle is the smaller solution of tan(2 angle) = 2 u.v / (u.u - v.v).
     """
-    apart, across = ca.dot(u, u) - ca.dot(v, v), 2 * ca.dot(u, v)
-    whole = ca.fabs(apart) + ca.sqrt(apart * apart + across * across) + _TINY
-    tangent = across / whole * (1 - 2 * (apart < 0))
+    square_difference, twice_product = ca.dot(u, u) - ca.dot(v, v), 2 * ca.dot(u, v)
+    denominator = (
+        ca.fabs(square_difference)
+        + ca.sqrt(square_difference * square_difference + twice_product * twice_product)
+        + _TINY
+    )
+    tangent = twice_product / denominator * (1 - 2 * (square_difference < 0))
     cosine = 1 / ca.sqrt(1 + tangent * tangent)
     sine = tangent * cosine
     return cosine * u + sine * v, cosine * v - sine * u
 
 
-def largest(values: list[Expression]) -> Expression:
-    """Return the largest of some values."""
-    return reduce(ca.fmax, values)
+def largest(sigmas: list[Expression]) -> Expression:
+    """Return the largest of singular values."""
+    return reduce(ca.fmax, sigmas)
 
 
-def smallest(values: list[Expression]) -> Expression:
-    """Return the smallest of some values."""
-    return reduce(ca.fmin, values)
+def smallest(sigmas: list[Expression]) -> Expression:
+    """Return the smallest of singular values."""
+    return reduce(ca.fmin, sigmas)

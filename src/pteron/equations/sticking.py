@@ -1,7 +1,7 @@
-"""The motion of a machine whose joints stick: dry friction as a set of forces, all joints together.
+"""Stick-slip motion: dry friction as a set-valued force, solved for all joints together.
 
-A joint that slides has a friction of known size and sign. One that sticks has whatever friction its
-rest asks for, within plus and minus the breakaway force. Which joints stick is an input here, the
+A joint that slides has a friction of known size and sign. One that sticks has the friction that
+keeps it at rest, within plus and minus the breakaway force. Which joints stick is an input, the
 `side` of each: +1 or -1 where it slides that way, 0 where it sticks. With the joint rates after a
 time h as unknowns, and A the mass matrix in joint coordinates, the right sides are those of the
 least of (u - u*)^T A (u - u*) / 2 + h sum f_i |u_i|, u* being the rates without dry friction: there
@@ -20,26 +20,26 @@ from pteron.bodies.motion import Expression
 from pteron.equations.drives import Drives, dry_friction, joint_motion
 from pteron.equations.kinematics import jacobian
 from pteron.equations.lagrangian import (
-    applied,
-    backward,
-    factors,
-    forward,
+    generalized_wrench,
+    ldl_factors,
     mass_matrix,
     solve_positive_definite,
+    substitute_backward,
+    substitute_forward,
 )
 from pteron.equations.machine import Machine
 from pteron.equations.transmissions import (
     Actuators,
     DriveKind,
     bristles,
+    limited_motor_force,
     motor_force,
-    transmitted,
-    wanted_force,
+    transmission_force,
 )
 from pteron.equations.virtual_work import generalized_forces
 
 STUCK = {f"stuck_{name}": name for name in ("acceleration", "growth", "friction", "motor_growth")}
-"""The names of what joints that stick change: with what holds them, and without."""
+"""Outputs that sticking joints change, by the name of the one without the holding friction."""
 
 
 class Sides(NamedTuple):
@@ -69,7 +69,27 @@ class Motors(NamedTuple):
     """Greatest rate, 1/s, at which these follow."""
 
 
-def moved(
+class _DriveOutputs(NamedTuple):
+    """What each drive does at its motor and its joint, a list of n scalars each."""
+
+    motor_forces: list[Expression]
+    """With ripple and cogging, less LuGre's friction."""
+    transmission_forces: list[Expression]
+    """Of transmissions that bend, on their joints; 0 of a rigid one."""
+    current_rates: list[Expression]
+    bristle_rates: list[Expression]
+
+    def state_rates(self, kind: DriveKind, motor_growth: Expression) -> dict[str, Expression]:
+        """Return the rates of the drives' own states, except the motors' positions, by name."""
+        rates = {
+            "motor_growth": motor_growth,
+            "change": ca.vertcat(*self.current_rates),
+            "yield": ca.vertcat(*self.bristle_rates),
+        }
+        return {name: rates[name] for _, name in kind.extra_states if name in rates}
+
+
+def stick_slip_rates(
     machine: Machine,
     pose: Expression,
     velocity: Expression,
@@ -80,21 +100,21 @@ def moved(
     motors: Motors,
     sides: Sides | None,
 ) -> dict[str, Expression]:
-    """Return what happens to a machine in a state, under what its drives are asked for.
+    """Return the accelerations and the drives' rates of a state, under commanded drive forces.
 
-    (M + J^T D J) x'' = J^T (F + tau - b q' - F_0 - D J' x') + wrench - h; tau is dry friction.
-    Without `sides` there is none. Where a transmission bends, friction and D are the motor's, and
-    the joint has what the transmission passes to it.
+    (M + J^T D J) x'' = J^T (F + tau - b q' - F_0 - D J' x') + wrench - h; tau is dry friction,
+    zero without `sides`. Where a transmission bends, friction and D are the motor's, and the
+    transmission's force acts on the joint.
 
     Returns
     -------
     dict
         `acceleration` x'' (m, 1); `rates` (n, 1) of what friction acts on, joints or motors, with
         their `growth`; `friction`, and the `breakaway` that it cannot exceed; `motor_growth`,
-        `change` and `yield`, the rates of `motor_rate`, `current` and `bristle`. These are as if
-        joints that stick had no friction, which is all where none does; with `stuck_` before their
-        names, `acceleration`, `growth`, `friction` and `motor_growth` are those with the friction
-        that holds them.
+        `change` and `yield`, the rates of `motor_rate`, `current` and `bristle`. These hold with
+        sliding friction alone. If `sides` are given, `acceleration`, `growth`, `friction` and
+        `motor_growth` with `stuck_` before their names include the friction that holds the joints
+        that stick.
     """
     state = machine.state(pose, velocity)
     rows = jacobian(state)
@@ -105,63 +125,85 @@ def moved(
     rates = ca.vertcat(
         *(motors.motor_rate[i] if kind.elastic[i] else joint_rates[i] for i in range(n))
     )
-    given, change, passed, yields = [], [], [], []
-    most = dry_friction(drives, rates)
+    sliding = dry_friction(drives, rates)
     coordinates = [leg.coordinate for leg in state.legs]
-    for i in range(n):
-        numbers = kind, motors.numbers, i
-        force = wanted_force(*numbers, forces[i], rates[i])
-        if kind.lag[i]:
-            change.append((force - motors.current[i]) * motors.numbers("lag", i))
-            force = motors.current[i]
-        else:
-            change.append(ca.SX(0))
-        motor = motors.motor[i] if kind.elastic[i] else coordinates[i]
-        rubs, growth = ca.SX(0), ca.SX(0)
-        if kind.lugre[i]:
-            slides = motors.bristle[i], rates[i], most[i], motors.pace
-            rubs, growth = bristles(motors.numbers, i, *slides)
-        yields.append(growth)
-        given.append(motor_force(*numbers, force, motor) - rubs)
-        bent = motors.motor[i] - coordinates[i], motors.motor_rate[i] - joint_rates[i]
-        passed.append(transmitted(*numbers, *bent) if kind.elastic[i] else ca.SX(0))
+    outputs = _drive_outputs(motors, forces, rates, sliding, coordinates, joint_rates)
     friction = breakaway = ca.SX.zeros(n)
     if sides is not None:
-        breakaway = most * ca.SX([float(not one) for one in kind.lugre])
+        breakaway = sliding * ca.SX([float(not has_bristles) for has_bristles in kind.lugre])
         friction = -sides.side * breakaway
-    pull = ca.vertcat(*given) - drives.viscous * rates - drives.offset + friction
+    pull = ca.vertcat(*outputs.motor_forces) - drives.viscous * rates - drives.offset + friction
     inertia = rigid * drives.inertia
-    load = rigid * (pull - drives.inertia * drift) + ca.vertcat(*passed)
-    load = ca.mtimes(rows.T, load) + applied(machine, state, wrench)
+    load = rigid * (pull - drives.inertia * drift) + ca.vertcat(*outputs.transmission_forces)
+    load = ca.mtimes(rows.T, load) + generalized_wrench(machine, state, wrench)
     load -= generalized_forces(machine, state, parameters)
     mass = mass_matrix(machine, pose, parameters)
     mass += ca.mtimes(rows.T, ca.mtimes(ca.diag(inertia), rows))
-    lower, pivots = factors(mass)
-    acceleration = backward(lower, forward(lower, load) / pivots)
-    growth = rigid * (ca.mtimes(rows, acceleration) + drift) + ca.vertcat(
-        *(
-            (pull[i] - passed[i]) / drives.inertia[i] if kind.elastic[i] else ca.SX(0)
-            for i in range(n)
-        )
+    lower, pivots = ldl_factors(mass)
+    acceleration = substitute_backward(lower, substitute_forward(lower, load) / pivots)
+    motor_growth = (
+        (pull[i] - outputs.transmission_forces[i]) / drives.inertia[i]
+        if kind.elastic[i]
+        else ca.SX(0)
+        for i in range(n)
     )
-    found = {"acceleration": acceleration, "rates": rates, "growth": growth}
-    found |= {"friction": friction, "breakaway": breakaway}
-    more = {"motor_growth": bends * growth, "change": ca.vertcat(*change)}
-    more["yield"] = ca.vertcat(*yields)
-    found |= {name: more[name] for _, name in kind.more if name in more}
+    growth = rigid * (ca.mtimes(rows, acceleration) + drift) + ca.vertcat(*motor_growth)
+    motion = {"acceleration": acceleration, "rates": rates, "growth": growth}
+    motion |= {"friction": friction, "breakaway": breakaway}
+    motion |= outputs.state_rates(kind, bends * growth)
     if sides is None:
-        return found
-    # What friction acts on: joints, which share the machine's mass, and motors by themselves.
-    reach = forward(lower, ca.mtimes(ca.diag(rigid), rows).T)
+        return motion
+    # Friction acts on joints, which share the machine's mass, and on motors by themselves.
+    reach = substitute_forward(lower, ca.mtimes(ca.diag(rigid), rows).T)
     scaled = reach / ca.repmat(pivots, 1, n)
-    own = [1 / drives.inertia[i] if kind.elastic[i] else ca.SX(0) for i in range(n)]
-    mobility = ca.mtimes(reach.T, scaled) + ca.diag(ca.vertcat(*own))
-    # Those that stick have the friction that their rest asks for, W tau = q'' - q''_alone.
-    sticks = 1 - sides.side * sides.side
-    asked = sides.hold - sides.brake * rates - growth
-    matrix = mobility * ca.mtimes(sticks, sticks.T) + ca.diag(1 - sticks)
-    holding = solve_positive_definite(matrix, sticks * asked)
+    motor_mobility = [1 / drives.inertia[i] if kind.elastic[i] else ca.SX(0) for i in range(n)]
+    mobility = ca.mtimes(reach.T, scaled) + ca.diag(ca.vertcat(*motor_mobility))
+    holding = _holding_friction(mobility, sides, rates, growth)
     growth += ca.mtimes(mobility, holding)
-    found["stuck_acceleration"] = acceleration + backward(lower, ca.mtimes(scaled, holding))
-    found |= {"stuck_growth": growth, "stuck_friction": friction + holding}
-    return found | ({"stuck_motor_growth": bends * growth} if any(kind.elastic) else {})
+    motion["stuck_acceleration"] = acceleration + substitute_backward(
+        lower, ca.mtimes(scaled, holding)
+    )
+    motion |= {"stuck_growth": growth, "stuck_friction": friction + holding}
+    return motion | ({"stuck_motor_growth": bends * growth} if any(kind.elastic) else {})
+
+
+def _drive_outputs(
+    motors: Motors,
+    forces: Expression,
+    rates: Expression,
+    sliding: Expression,
+    coordinates: list[Expression],
+    joint_rates: Expression,
+) -> _DriveOutputs:
+    """Return the drives' forces and state rates; `sliding` is the size of dry friction (n, 1)."""
+    kind, outputs = motors.kind, _DriveOutputs([], [], [], [])
+    for i in range(len(coordinates)):
+        numbers = kind, motors.numbers, i
+        force = limited_motor_force(*numbers, forces[i], rates[i])
+        if kind.lag[i]:
+            outputs.current_rates.append((force - motors.current[i]) * motors.numbers("lag", i))
+            force = motors.current[i]
+        else:
+            outputs.current_rates.append(ca.SX(0))
+        motor = motors.motor[i] if kind.elastic[i] else coordinates[i]
+        bristle_friction, bristle_rate = ca.SX(0), ca.SX(0)
+        if kind.lugre[i]:
+            slip = motors.bristle[i], rates[i], sliding[i], motors.pace
+            bristle_friction, bristle_rate = bristles(motors.numbers, i, *slip)
+        outputs.bristle_rates.append(bristle_rate)
+        outputs.motor_forces.append(motor_force(*numbers, force, motor) - bristle_friction)
+        deflection = motors.motor[i] - coordinates[i], motors.motor_rate[i] - joint_rates[i]
+        outputs.transmission_forces.append(
+            transmission_force(*numbers, *deflection) if kind.elastic[i] else ca.SX(0)
+        )
+    return outputs
+
+
+def _holding_friction(
+    mobility: Expression, sides: Sides, rates: Expression, growth: Expression
+) -> Expression:
+    """Return the friction tau (n, 1) that holds the joints that stick: W tau = q'' - q''_free."""
+    sticks = 1 - sides.side * sides.side
+    needed_growth = sides.hold - sides.brake * rates - growth
+    matrix = mobility * ca.mtimes(sticks, sticks.T) + ca.diag(1 - sticks)
+    return solve_positive_definite(matrix, sticks * needed_growth)

@@ -1,7 +1,7 @@
-"""Motors and transmissions as they are: bending, play, ripple, current, limits by speed.
+"""Motors and transmissions: elasticity, backlash, ripple, current lag, torque-speed limits.
 
-`DriveKind` says which of these a machine's drives have, so that others cost nothing; their numbers
-are an input. The motor's coordinate is counted at the joint: its angle over the ratio.
+`DriveKind` has the features of a machine's drives, so that others cost nothing; their numbers are
+an input. The motor's coordinate is referred to the joint: its angle over the ratio.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class DriveKind:
     """The features of the drives of a machine's joints, joint by joint."""
 
     dry: bool
-    """Whether some have dry friction."""
+    """Whether any has dry friction."""
     stribeck: bool
     elastic: tuple[bool, ...]
     play: tuple[bool, ...]
@@ -38,7 +38,7 @@ class DriveKind:
     cogging: tuple[int, ...]
 
     @classmethod
-    def of(cls, robot: Manipulator) -> DriveKind:
+    def from_robot(cls, robot: Manipulator) -> DriveKind:
         """Return the kind of a machine's drives."""
         drives = [leg.drive or Drive() for leg in robot.legs]
         return cls(
@@ -57,32 +57,36 @@ class DriveKind:
 
     @property
     def bends(self) -> bool:
-        """Whether some transmission bends."""
+        """Whether any transmission is elastic."""
         return any(self.elastic)
 
     @property
-    def more(self) -> tuple[tuple[str, str], ...]:
-        """The states beyond pose and velocity, each (n,), and what their rates are called."""
+    def extra_states(self) -> tuple[tuple[str, str], ...]:
+        """The states beyond pose and velocity, each (n,), and the names of their rates."""
         bends = ("motor", "motor_rate"), ("motor_rate", "motor_growth")
-        own = [("current", "change")] * any(self.lag) + [("bristle", "yield")] * any(self.lugre)
-        return (*(bends if self.bends else ()), *own)
+        lag_states = [("current", "change")] * any(self.lag) + [("bristle", "yield")] * any(
+            self.lugre
+        )
+        return (*(bends if self.bends else ()), *lag_states)
 
     def parts(self, states: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Return the parts of states (..., Y) by name: `pose`, `velocity` and those of `more`."""
-        n, names = len(self.elastic), [name for name, _ in self.more]
+        """Return the parts of states (..., Y) by name: `pose`, `velocity` and `extra_states`."""
+        n, names = len(self.elastic), [name for name, _ in self.extra_states]
         m = (states.shape[-1] - n * len(names)) // 2
-        found = {"pose": states[..., :m], "velocity": states[..., m : 2 * m]}
+        by_name = {"pose": states[..., :m], "velocity": states[..., m : 2 * m]}
         starts = range(2 * m, states.shape[-1], n)
-        return found | {name: states[..., k : k + n] for name, k in zip(names, starts, strict=True)}
+        return by_name | {
+            name: states[..., k : k + n] for name, k in zip(names, starts, strict=True)
+        }
 
     @property
     def plain(self) -> bool:
-        """Whether they are rigid and give at once what they are asked for."""
+        """Whether all drives are ideal: rigid, without delay or limits."""
         return not any(any(getattr(self, f.name)) for f in fields(self)[2:])
 
 
 class Actuators:
-    """The numbers of `actuator_numbers`, taken one after another as expressions or names."""
+    """The numbers of `actuator_numbers` by name, joint and index, as expressions or names."""
 
     def __init__(self, kind: DriveKind, vector: Expression) -> None:
         names = _names(kind)
@@ -94,12 +98,12 @@ class Actuators:
 
 
 def actuator_numbers(robot: Manipulator) -> NDArray[np.float64]:
-    """Return the numbers of a machine's motors and transmissions, at least one."""
-    found = []
-    for name, joint, k in _names(DriveKind.of(robot)):
+    """Return the numbers (k,) of a machine's motors and transmissions, k at least 1."""
+    numbers = []
+    for name, joint, k in _names(DriveKind.from_robot(robot)):
         drive = robot.legs[joint].drive or Drive()
         bends, lugre = drive.elastic, drive.lugre
-        value: Any = {
+        number: Any = {
             "stiffness": bends and bends.stiffness,
             "damping": bends and bends.damping,
             "play": bends and bends.backlash / 2.0,
@@ -111,94 +115,96 @@ def actuator_numbers(robot: Manipulator) -> NDArray[np.float64]:
             "speed": drive.curve and drive.curve[min(k, len(drive.curve) - 1)][0],
             "force": drive.curve and drive.curve[min(k, len(drive.curve) - 1)][1],
         }.get(name)
-        if value is None:
+        if number is None:
             which, part = name.split("_")
             wave = getattr(drive, which)[k]
             size = wave.size * (drive.gear if which == "cogging" else 1.0)
-            value = {"order": wave.order * drive.gear, "size": size, "phase": wave.phase}[part]
-        found.append(float(value))
-    return np.array(found or [0.0])
+            number = {"order": wave.order * drive.gear, "size": size, "phase": wave.phase}[part]
+        numbers.append(float(number))
+    return np.array(numbers or [0.0])
 
 
 def actuator_count(kind: DriveKind) -> int:
-    """Return how many numbers `actuator_numbers` has."""
+    """Return the length of `actuator_numbers`."""
     return max(1, len(_names(kind)))
 
 
 def _names(kind: DriveKind) -> list[tuple[str, int, int]]:
-    """Return name, joint and place of each number."""
-    found: list[tuple[str, int, int]] = []
+    """Return name, joint and index of each number."""
+    names: list[tuple[str, int, int]] = []
     for i in range(len(kind.elastic)):
-        found += [(name, i, 0) for name in ("stiffness", "damping") if kind.elastic[i]]
-        found += [("play", i, 0)] if kind.play[i] else []
-        found += [("lag", i, 0)] if kind.lag[i] else []
-        found += [(name, i, 0) for name in ("bristle", "drag") if kind.lugre[i]]
-        found += [(name, i, 0) for name in ("stall", "back") if kind.winding[i]]
-        found += [(name, i, k) for k in range(kind.curve[i]) for name in ("speed", "force")]
+        names += [(name, i, 0) for name in ("stiffness", "damping") if kind.elastic[i]]
+        names += [("play", i, 0)] if kind.play[i] else []
+        names += [("lag", i, 0)] if kind.lag[i] else []
+        names += [(name, i, 0) for name in ("bristle", "drag") if kind.lugre[i]]
+        names += [(name, i, 0) for name in ("stall", "back") if kind.winding[i]]
+        names += [(name, i, k) for k in range(kind.curve[i]) for name in ("speed", "force")]
         for which in ("ripple", "cogging"):
             parts = [f"{which}_{part}" for part in ("order", "size", "phase")]
-            found += [(part, i, k) for k in range(getattr(kind, which)[i]) for part in parts]
-    return found
+            names += [(part, i, k) for k in range(getattr(kind, which)[i]) for part in parts]
+    return names
 
 
-def transmitted(
-    kind: DriveKind, numbers: Actuators, i: int, bent: Expression, rate: Expression
+def transmission_force(
+    kind: DriveKind, numbers: Actuators, i: int, deflection: Expression, rate: Expression
 ) -> Expression:
-    """Return the force that a bending transmission passes to its joint, of how it is bent."""
+    """Return the force of an elastic transmission on its joint, from deflection and its rate."""
     stiffness, damping = numbers("stiffness", i), numbers("damping", i)
     if not kind.play[i]:
-        return stiffness * bent + damping * rate
-    half = numbers("play", i)
-    ahead, behind = bent - half, bent + half
+        return stiffness * deflection + damping * rate
+    half_play = numbers("play", i)
+    ahead, behind = deflection - half_play, deflection + half_play
     return ca.if_else(ahead > 0, ca.fmax(stiffness * ahead + damping * rate, 0), 0) + ca.if_else(
         behind < 0, ca.fmin(stiffness * behind + damping * rate, 0), 0
     )
 
 
-def wanted_force(
-    kind: DriveKind, numbers: Actuators, i: int, asked: Expression, rate: Expression
+def limited_motor_force(
+    kind: DriveKind, numbers: Actuators, i: int, force: Expression, rate: Expression
 ) -> Expression:
-    """Return what a motor's current is to give, after its limits at a speed."""
+    """Return the force that a motor's current is set to: the command within its speed limits."""
     if kind.curve[i]:
         speed, most = ca.fabs(rate), numbers("force", i)
         for k in range(1, kind.curve[i]):
             low, high = (numbers("speed", i, j) for j in (k - 1, k))
             slope = (numbers("force", i, k) - numbers("force", i, k - 1)) / (high - low)
             most = most + slope * (ca.fmin(ca.fmax(speed, low), high) - low)
-        asked = ca.fmin(ca.fmax(asked, -most), most)
+        force = ca.fmin(ca.fmax(force, -most), most)
     if kind.winding[i]:
         stall, back = numbers("stall", i), numbers("back", i) * rate
-        asked = ca.fmin(ca.fmax(asked, -stall - back), stall - back)
-    return asked
+        force = ca.fmin(ca.fmax(force, -stall - back), stall - back)
+    return force
 
 
 def bristles(
     numbers: Actuators,
     i: int,
-    bent: Expression,
+    deflection: Expression,
     rate: Expression,
     most: Expression,
     pace: Expression,
 ) -> tuple[Expression, Expression]:
-    """Return the friction of LuGre's bristles that slide at a friction of `most`, and their rate.
+    """Return LuGre's friction and the rate of its bristles; `most` is the friction of sliding.
 
-    They follow the rate of the joint no faster than at `pace`, 1/s, where they slide.
+    Sliding bristles follow the joint's rate with a rate constant of at most `pace`, 1/s.
     """
     stiffness, speed = numbers("bristle", i), ca.fabs(rate)
     side = ca.if_else(rate > 0, 1, 0) - ca.if_else(rate < 0, 1, 0)
-    growth = ca.fmin(stiffness * speed / most, pace) * (side * most / stiffness - bent)
+    growth = ca.fmin(stiffness * speed / most, pace) * (side * most / stiffness - deflection)
     drag = numbers("drag", i) / (1 + numbers("drag", i) * speed / (4 * most))
-    return stiffness * bent + drag * growth, growth
+    return stiffness * deflection + drag * growth, growth
 
 
 def motor_force(
-    kind: DriveKind, numbers: Actuators, i: int, given: Expression, motor: Expression
+    kind: DriveKind, numbers: Actuators, i: int, force: Expression, motor: Expression
 ) -> Expression:
-    """Return what a motor gives with its ripple and cogging, where it stands."""
-    share, more = ca.SX(1), ca.SX(0)
-    for which, total in (("ripple", share), ("cogging", more)):
+    """Return a motor's force with ripple and cogging at its coordinate."""
+    ripple_factor, cogging_force = ca.SX(1), ca.SX(0)
+    for which, total in (("ripple", ripple_factor), ("cogging", cogging_force)):
         for k in range(getattr(kind, which)[i]):
             order, size, phase = (numbers(f"{which}_{p}", i, k) for p in ("order", "size", "phase"))
             total = total + size * ca.sin(order * motor + phase)
-        share, more = (total, more) if which == "ripple" else (share, total)
-    return given * share + more
+        ripple_factor, cogging_force = (
+            (total, cogging_force) if which == "ripple" else (ripple_factor, total)
+        )
+    return force * ripple_factor + cogging_force

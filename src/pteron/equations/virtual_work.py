@@ -1,10 +1,10 @@
 """Inverse dynamics by virtual work, Eq. (13), in factored form.
 
-The wrenches that a leg's bodies need become a force at its joint and a load at its platform point,
-by rows against (c', omega), the velocity of that point and the platform's angular velocity; J_u and
-J_l of Eq. (13) are never multiplied out. The paper's F_b acts on a body; forces here are those
-that bodies need, -F_b. One column of parameters gives the inverse dynamics, the identity
-matrix the regressor.
+The required wrenches of a leg's bodies become a force at its joint and a load at its platform
+point, by rows in (c', omega), the velocity of that point and the platform's angular velocity; J_u
+and J_l of Eq. (13) are never multiplied out. The paper's F_b acts on a body; forces here are those
+required to move it, -F_b. One column of parameters gives the inverse dynamics, the identity matrix
+the regressor.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ def generalized_forces(machine: Machine, state: State, parameters: Expression) -
 def needed_forces(
     machine: Machine, state: State, parameters: Expression, carried: bool = True
 ) -> tuple[Expression, Expression]:
-    """Return what motion and gravity need at the joints (n, K), and of the platform (m, K).
+    """Return the required forces at the joints (n, K) and of the platform (m, K).
 
-    The latter along its quasi-velocities, which are those of the pose unless it tilts.
+    The platform's are along its quasi-velocities, which are the pose's rates unless it tilts.
     """
     legs, inertia = machine.moments(parameters)
     platform = state.platform

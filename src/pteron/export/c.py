@@ -29,7 +29,7 @@ from pteron.kernels.code import (
     arithmetic,
     c_constant,
     names_of,
-    rendered,
+    render_template,
     single_precision,
     statements,
     used_inputs,
@@ -150,7 +150,7 @@ def c_texts(
         f"test_{prefix}.c": "test.c.j2",
         "CMakeLists.txt": "CMakeLists.txt.j2",
     }
-    return {file: rendered("pteron.export", name, **values) for file, name in files.items()}
+    return {file: render_template("pteron.export", name, **values) for file, name in files.items()}
 
 
 def _tolerance_of(rounding: float) -> Callable[[float], float]:

@@ -19,7 +19,7 @@ from pteron.export.functions import has_drives
 from pteron.export.names import prefix_of
 from pteron.export.start_pose import good_poses, keeps_limits, start_pose
 from pteron.kernels import program, specialised
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 from pteron.manipulator.readings import refuse_readings
 
@@ -109,12 +109,12 @@ def _driven(robot: Manipulator) -> Iterator[ca.Function]:
 
     The form that controllers have, by an exponential and a sign, has derivative zero there.
     """
-    machine, n = Machine.of(robot), robot.freedom
+    machine, n = Machine.numeric(robot), robot.freedom
     sizes = dict.fromkeys(("pose", "velocity", "acceleration", "forces"), n)
     sizes["wrench"] = len(robot.platform.wrench_columns)
     symbols = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
     pose, velocity, acceleration, forces, wrench = symbols.values()
-    machine_drives = drives.Drives.of(ca.SX(ca.DM(drives.drive_numbers(robot))))
+    machine_drives = drives.Drives.from_vector(ca.SX(ca.DM(drives.drive_numbers(robot))))
     rates = ca.mtimes(jacobian(machine.state(pose)), velocity)
     dry = drives.dry_friction(machine_drives, rates) * ca.tanh(rates / machine_drives.rest_speed)
     others = machine_drives._replace(coulomb=ca.SX(n, 1), stribeck=ca.SX(n, 1))
@@ -210,7 +210,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "forces": [leg.drive.max_force if leg.drive else None for leg in robot.legs],
     }
     for name in ("load", "example"):
-        text = rendered("pteron.export", f"{name}_casadi.py.j2", **values)
+        text = render_template("pteron.export", f"{name}_casadi.py.j2", **values)
         files[target / f"{name}_{prefix}.py"] = text.encode("utf-8")
     return write_files(files)
 

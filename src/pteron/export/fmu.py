@@ -34,8 +34,8 @@ from pteron.export.start_pose import start_pose
 from pteron.export.tools import tool_lines
 from pteron.kernels import Array, as_array
 from pteron.kernels.c import c_compiler
-from pteron.kernels.code import rendered
-from pteron.kernels.compilers import built
+from pteron.kernels.code import render_template
+from pteron.kernels.compilers import compile_library
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import refuse_readings
@@ -143,15 +143,15 @@ def export_fmu(
     }
     # The token says which modelDescription.xml goes with which binary: a digest of all of it.
     parts = {
-        name: rendered("pteron.export", f"{name}.j2", token="", **values)
+        name: render_template("pteron.export", f"{name}.j2", token="", **values)
         for name in ("fmu.c", "modelDescription.xml")
     }
     digest = hashlib.sha256("".join([*texts.values(), *parts.values()]).encode()).hexdigest()
     for name in parts:
-        parts[name] = rendered("pteron.export", f"{name}.j2", token=digest[:32], **values)
+        parts[name] = render_template("pteron.export", f"{name}.j2", token=digest[:32], **values)
     sources = texts | {"fmu.c": parts["fmu.c"]}
     binary, place = _compiled(prefix, sources)
-    build = rendered("pteron.export", "buildDescription.xml.j2", prefix=prefix)
+    build = render_template("pteron.export", "buildDescription.xml.j2", prefix=prefix)
     members = {
         "modelDescription.xml": parts["modelDescription.xml"].encode(),
         "sources/buildDescription.xml": build.encode(),
@@ -189,7 +189,7 @@ def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
     with tempfile.TemporaryDirectory() as scratch:
         library = Path(scratch) / f"{prefix}{suffix}"
         advice = "set the environment variable CC to another compiler"
-        built(command, _FLAGS, sources, library, "fmu: its code", advice)
+        compile_library(command, _FLAGS, sources, library, "fmu: its code", advice)
         return library.read_bytes(), f"binaries/{place}/{library.name}"
 
 

@@ -22,11 +22,11 @@ from pteron.export.functions import exported_functions
 from pteron.export.names import marked, prefix_of
 from pteron.export.start_pose import start_pose
 from pteron.kernels import Array
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.kinematics import inverse_kinematics, jacobian
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.manipulator.readings import without_readings
+from pteron.manipulator.readings import remove_readings
 from pteron.platforms import Platform
 from pteron.platforms.joints import platform_joints
 
@@ -177,7 +177,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     ['quadrupteronkins.comp', 'quadrupteron.ini', 'quadrupteron.hal']
     """
     machine = as_manipulator(robot)
-    robot = without_readings(machine)  # LinuxCNC converts them itself, by SCALE and HOME_OFFSET
+    robot = remove_readings(machine)  # LinuxCNC converts them itself, by SCALE and HOME_OFFSET
     prefix = prefix_of(robot)
     closed = closure_of(robot).closed_form
     closed = closed and not robot.platform.tilts  # whose poses are many, and the last one is near
@@ -217,15 +217,15 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "number": repr,
     }
     files = {
-        f"{_component(prefix)}.comp": rendered("pteron.export", "kins.comp.j2", **values),
-        f"{prefix}.ini": rendered("pteron.export", "linuxcnc.ini.j2", **values),
-        f"{prefix}.hal": rendered("pteron.export", "linuxcnc.hal.j2", **values),
+        f"{_component(prefix)}.comp": render_template("pteron.export", "kins.comp.j2", **values),
+        f"{prefix}.ini": render_template("pteron.export", "linuxcnc.ini.j2", **values),
+        f"{prefix}.hal": render_template("pteron.export", "linuxcnc.hal.j2", **values),
     }
     if arm is not None and _linear(robot):
         rows = np.asarray(jacobian(robot, np.zeros(3)))
-        zero = np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3)))
+        zero = np.asarray(evaluate_unchecked(robot, "joint_coordinates", np.zeros(3)))
         offsets = _MILLIMETRES * (zero - rows @ arm.still)
-        files[f"{prefix}_matrixkins.hal"] = rendered(
+        files[f"{prefix}_matrixkins.hal"] = render_template(
             "pteron.export", "matrixkins.hal.j2", rows=rows.tolist(), offsets=offsets, **values
         )
     # halcompile reads what the locale says: nothing but ASCII.
@@ -242,7 +242,7 @@ def _component(prefix: str) -> str:
 
 def _linear(robot: Manipulator) -> bool:
     """Return whether the joints are linear in x, y and z, which are all of the pose."""
-    legs = Machine.of(robot).legs
+    legs = Machine.numeric(robot).legs
     return robot.platform.coordinates == ("x", "y", "z") and all(
         leg.row_is_constant for leg in legs
     )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 from pteron.workspace import home_pose
 from pteron.workspace.margins import joint_distances
@@ -69,8 +69,8 @@ def measures_of(robot: Manipulator, poses: Array) -> Array:
 
 
 def _measures(robot: Manipulator, poses: Array) -> Array:
-    bent = np.sqrt(unchecked(robot, "squared_type_i", poses).min(axis=-1))
-    type_ii = 2.0 * np.abs(unchecked(robot, "type_ii", poses))
+    bent = np.sqrt(evaluate_unchecked(robot, "squared_type_i", poses).min(axis=-1))
+    type_ii = 2.0 * np.abs(evaluate_unchecked(robot, "type_ii", poses))
     return np.asarray(np.minimum(bent, type_ii))
 
 

@@ -22,7 +22,7 @@ from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.names import prefix_of
 from pteron.export.tools import tool_lines
 from pteron.kernels import Graph, Port
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _BLOCKS = ("inverse_kinematics", "inverse_dynamics")
@@ -174,7 +174,7 @@ def function_block(
     ]
     tests = [f"(ABS({used}) <= {power(INPUT_POWER)})" for used in body.used]
     said = descriptions or {}
-    return rendered(
+    return render_template(
         "pteron.export",
         "block.st.j2",
         name=name,

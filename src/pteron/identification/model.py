@@ -21,7 +21,7 @@ from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters, base_regressor
 
@@ -267,7 +267,7 @@ class Model:
         if terms.offset:
             parts.append(np.broadcast_to(np.eye(n), (len(states), n, n)))
         if terms.passive != "none":
-            columns = unchecked(robot, "passive_friction", states.pose, states.velocity)
+            columns = evaluate_unchecked(robot, "passive_friction", states.pose, states.velocity)
             places = {joint: k for k, joint in enumerate(passive_joints(robot))}
             for joints in self._passive.values():
                 chosen = [places[joint] for joint in joints]
@@ -278,7 +278,7 @@ class Model:
             rates = states.joint_rates
             parts.append(diagonal(np.sign(rates) * np.exp(-((rates / speeds) ** 2))))
         if terms.payload:
-            carried = unchecked(robot, "regressor", *motion)
+            carried = evaluate_unchecked(robot, "regressor", *motion)
             carried = carried[..., -len(robot.platform.inertia.kinds) :]
             parts.append(carried * (states.payload != 0)[:, None, None])
         return np.concatenate(parts, axis=-1)

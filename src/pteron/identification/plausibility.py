@@ -18,7 +18,7 @@ from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator, parameters
 from pteron.reduction import BaseParameters, base_regressor
 
@@ -271,7 +271,7 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
     pose = random_poses(robot, _PROBES, seed=rng)
     rest = np.zeros_like(pose)
     still = base_regressor(robot, model.base, pose, rest, rest)
-    jacobians = unchecked(robot, "jacobian", pose)
+    jacobians = evaluate_unchecked(robot, "jacobian", pose)
     rank = model.base.rank
     known = covariance[:rank, :rank]
     directions = [rng.normal(size=pose.shape), *(rest + axis for axis in np.eye(pose.shape[1]))]

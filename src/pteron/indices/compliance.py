@@ -14,7 +14,7 @@ from pteron.indices.internal_forces import Equations, blocks, hold, moved, on_pl
 from pteron.indices.sensitivities import tool_arm
 from pteron.kernels import Array, as_array
 from pteron.kinematics import twist
-from pteron.kinematics.evaluate import checked, evaluated
+from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
@@ -150,9 +150,9 @@ def stiffness(
     ((3, 3), True)
     """
     robot = as_manipulator(robot)
-    poses = checked(robot, pose, "pose", on_failure)
+    poses = finite_rows(robot, pose, "pose", on_failure)
     # Errors name a state of the whole batch.
-    evaluated(robot, "manipulability", on_failure, poses)
+    evaluate_kernel(robot, "manipulability", on_failure, poses)
     parts = [
         _of_block(robot, elasticity, block)
         for (block,) in blocks([poses.reshape(-1, robot.freedom)])
@@ -169,8 +169,8 @@ def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple
     """Return the compliance at the tool (B, m, m) and the frequencies (B, m)."""
     batch, m = poses.shape
     rest = np.zeros(m)
-    equations: tuple[Array, ...] = evaluated(robot, "reactions", "nan", poses, rest, rest)
-    links: tuple[Array, ...] = evaluated(robot, "beams", "nan", poses)
+    equations: tuple[Array, ...] = evaluate_kernel(robot, "reactions", "nan", poses, rest, rest)
+    links: tuple[Array, ...] = evaluate_kernel(robot, "beams", "nan", poses)
     mass: Array = mass_matrix(robot, poses, on_failure="nan")
     size = 6 if robot.platform.tilts else m
     compliance, frequencies = np.full((batch, size, size), np.nan), np.full((batch, m), np.nan)

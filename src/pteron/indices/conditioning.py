@@ -12,7 +12,7 @@ from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError
 from pteron.indices.evaluation import evaluate
 from pteron.kernels import as_array, numeric
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike, Seed
 from pteron.workspace import bounding_box
@@ -94,7 +94,7 @@ def global_conditioning(
     if count < 1:
         raise DataError(f"count: {count} given, at least 1 expected")
     expect_to_fit("count", count, 4.0 * count / _GROUPS * robot.freedom)
-    given = checked_one(robot, pose, "pose")
+    given = finite_pose(robot, pose, "pose")
     if box is None:
         low, high = np.array([given, given])
         sides = bounding_box(robot, given)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pteron.indices.index import expect_index
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import Numbers, OnFailure, PoseLike
 
@@ -51,4 +51,4 @@ def evaluate(
     """
     robot = as_manipulator(robot)
     expect_index(robot, name)
-    return evaluated(robot, name, on_failure, poses)
+    return evaluate_kernel(robot, name, on_failure, poses)

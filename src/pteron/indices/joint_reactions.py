@@ -21,7 +21,7 @@ from pteron.indices.internal_forces import (
     times,
 )
 from pteron.kernels import Array, as_array
-from pteron.kinematics.evaluate import checked, evaluated
+from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
 
@@ -135,12 +135,12 @@ def reactions(
     rest = np.zeros(robot.freedom)
     given = {"pose": pose, "velocity": velocity, "acceleration": acceleration, "wrench": wrench}
     states = [
-        none.get(name, rest) if part is None else checked(robot, part, name, on_failure)
+        none.get(name, rest) if part is None else finite_rows(robot, part, name, on_failure)
         for name, part in given.items()
     ]
     states.append(np.zeros(3) if moment is None else as_array(moment, "moment", (3,)))
     # Errors name a state of the whole batch.
-    evaluated(robot, "inverse_dynamics", on_failure, *states[:3])
+    evaluate_kernel(robot, "inverse_dynamics", on_failure, *states[:3])
     lead = np.broadcast_shapes(*(part.shape[:-1] for part in states))
     flat = [
         np.broadcast_to(part, (*lead, part.shape[-1])).reshape(-1, part.shape[-1])
@@ -177,7 +177,7 @@ def _solved(
     Of what self-stress leaves free that of the least norm is taken.
     """
     state = pose, velocity, acceleration
-    found = Equations(*evaluated(robot, "reactions", "nan", *state))
+    found = Equations(*evaluate_kernel(robot, "reactions", "nan", *state))
     batch, n, joints, _ = found.passed.shape
     points, passed = found.points.copy(), np.full(found.passed.shape, np.nan)
     actuators, unheld = np.full((batch, n), np.nan), np.full(batch, np.nan)
@@ -213,6 +213,6 @@ def _solved(
 
 def _names(robot: Manipulator) -> tuple[tuple[str, ...], ...]:
     """Return the joints' names, of the paper: P0 and R1 to R4."""
-    machine = Machine.of(robot)
+    machine = Machine.numeric(robot)
     legs = machine.state(ca.SX.zeros(robot.freedom)).legs
     return tuple(tuple(f"{joint.kind}{k}" for k, joint in enumerate(leg.chain)) for leg in legs)

@@ -11,7 +11,7 @@ from pteron.arguments import checked_arguments
 from pteron.errors import DataError
 from pteron.indices.sensitivities import at_tool, geometric_sensitivities
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked, evaluated
+from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import Numbers, OnFailure, PerCoordinate, PoseLike
 
@@ -107,9 +107,9 @@ def pose_error(
     array([30., 30., 30.])
     """
     robot = as_manipulator(robot)
-    poses = checked(robot, pose, "pose", on_failure)
+    poses = finite_rows(robot, pose, "pose", on_failure)
     known = geometric_sensitivities(robot, poses, on_failure=on_failure)
-    rows: Array = evaluated(robot, "jacobian", on_failure, poses)
+    rows: Array = evaluate_kernel(robot, "jacobian", on_failure, poses)
     good = np.isfinite(known.matrix).all(axis=(-2, -1))
     back = np.full(rows.shape, np.nan)
     back[good] = np.linalg.inv(rows[good])

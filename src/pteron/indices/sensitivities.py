@@ -14,7 +14,7 @@ from pteron.equations.machine import numbers
 from pteron.equations.variations import slope_matrix, slope_terms, variations
 from pteron.kernels import Array, general_program, layout_of
 from pteron.kinematics import twist
-from pteron.kinematics.evaluate import checked, evaluated
+from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.legs.kind import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
@@ -93,9 +93,9 @@ def geometric_sensitivities(
     array([1., 0., 0.])
     """
     robot = as_manipulator(robot)
-    poses = checked(robot, pose, "pose", on_failure)
-    held: Array = evaluated(robot, "manipulability", on_failure, poses)
-    rows: Array = evaluated(robot, "jacobian", on_failure, poses)
+    poses = finite_rows(robot, pose, "pose", on_failure)
+    held: Array = evaluate_kernel(robot, "manipulability", on_failure, poses)
+    rows: Array = evaluate_kernel(robot, "jacobian", on_failure, poses)
     dimensions = list(_dimensions(robot))
     names, roles, units, ways = zip(*dimensions, strict=True)
     flat = poses.reshape(-1, robot.freedom)

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from pteron.kernels.functions import FUNCTIONS as FUNCTIONS, needs_of as needs_of
     from pteron.kernels.graph import Graph as Graph, graph_of as graph_of
     from pteron.kernels.intervals import Enclosure as Enclosure
-    from pteron.kernels.kept import Program as Program
     from pteron.kernels.kernel import (
         Array as Array,
         Kernel as Kernel,
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
         as_array as as_array,
         count_operations as count_operations,
     )
+    from pteron.kernels.program_cache import Program as Program
     from pteron.kernels.programs import (
         LOADED as LOADED,
         REDUCIBLE as REDUCIBLE,

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
-def bisected(
+def bisect_condition(
     holds: Callable[[Any], Any], low: ArrayLike, high: ArrayLike, halvings: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return two places between which a condition stops holding: it holds at the first only.
+    """Return an interval, halved, at whose low end a condition holds and at whose high end not.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def bisected(
     Returns
     -------
     tuple of array
-        The last place where it holds, and the first known one where it does not.
+        The largest known argument where it holds, and the smallest known one where it does not.
 
     Examples
     --------

@@ -8,10 +8,10 @@ from functools import cached_property
 
 from pteron.kernels.c import c_language
 from pteron.kernels.code import names_of, statements
-from pteron.kernels.exponential import straight
+from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import Graph, graph_of
-from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Port
+from pteron.kernels.program_cache import Program
 
 _ANGLES = {"sin": "sine", "cos": "cosine"}
 
@@ -33,22 +33,22 @@ class Block:
     split: bool = False
 
     @cached_property
-    def varying(self) -> tuple[Port, ...]:
+    def state_inputs(self) -> tuple[Port, ...]:
         """The inputs of a state."""
         return tuple(port for port in self.program.inputs if not port.shared)
 
     @cached_property
-    def fixed(self) -> tuple[Port, ...]:
+    def machine_inputs(self) -> tuple[Port, ...]:
         """The inputs that are the machine's own numbers."""
         return tuple(port for port in self.program.inputs if port.shared)
 
     @cached_property
-    def at(self) -> dict[str, int]:
+    def first_rows(self) -> dict[str, int]:
         """The first row of each input among its kind, and of each output."""
-        return {**_starts(self.varying), **_starts(self.fixed)}
+        return {**_starts(self.state_inputs), **_starts(self.machine_inputs)}
 
     @cached_property
-    def out(self) -> dict[str, int]:
+    def output_rows(self) -> dict[str, int]:
         """The first row of each output."""
         return _starts([port for port in self.program.outputs if not self._is_late(port)])
 
@@ -56,50 +56,55 @@ class Block:
     def sizes(self) -> dict[str, int]:
         """Numbers of rows: of inputs, of the machine's numbers, of `own`, and of outputs."""
         return {
-            "in": max(1, sum(port.size for port in self.varying)),
-            "numbers": max(1, sum(port.size for port in self.fixed)),
-            "own": max(1, len(self._own)),
-            "kept": max(1, len(self._kept)),
+            "in": max(1, sum(port.size for port in self.state_inputs)),
+            "numbers": max(1, sum(port.size for port in self.machine_inputs)),
+            "own": max(1, len(self._machine_rows)),
+            "kept": max(1, len(self._passed_rows)),
             "out": sum(port.size for port in self.program.outputs if not self._is_late(port)),
         }
 
     @cached_property
-    def once(self) -> list[str]:
+    def machine_statements(self) -> list[str]:
         """The statements that fill `own`."""
         names = self._names()
-        lines = self._lines([k for k in self._graph.operations() if k in self._shared], names, "")
-        return [*lines, *(f"own[{row}][k] = {names[k]};" for k, row in self._own.items())]
+        lines = self._lines(
+            [k for k in self._graph.operations() if k in self._shared_nodes], names, ""
+        )
+        return [*lines, *(f"own[{row}][k] = {names[k]};" for k, row in self._machine_rows.items())]
 
     def body(self, sincos: str) -> list[str]:
         """Return the statements for a state; `sincos` is C's function for sine and cosine."""
         graph, names = self._graph, self._names()
-        for k, row in self._own.items():
+        for k, row in self._machine_rows.items():
             names[k] = f"own[{row}][k]"
-        late = self._late if self.split else frozenset[int]()
-        rest = [k for k in graph.operations() if k not in self._shared and k not in late]
-        lines = self._lines(rest, names, sincos)
-        lines += (f"kept[{row}][k] = {names[k]};" for k, row in self._kept.items())
-        found = {row: names[k] for row, k in self._results(later=False)}
+        late = self._late_nodes if self.split else frozenset[int]()
+        state_nodes = [
+            k for k in graph.operations() if k not in self._shared_nodes and k not in late
+        ]
+        lines = self._lines(state_nodes, names, sincos)
+        lines += (f"kept[{row}][k] = {names[k]};" for k, row in self._passed_rows.items())
+        expressions = {row: names[k] for row, k in self._results(later=False)}
         if not self.split:
-            found |= {
-                row: f"slides ? {found[row]} : {names[k]}" for row, k in self._results(later=True)
+            expressions |= {
+                row: f"slides ? {expressions[row]} : {names[k]}"
+                for row, k in self._results(later=True)
             }
-        return [*lines, *(f"out[{row}][k] = {value};" for row, value in found.items())]
+        return [*lines, *(f"out[{row}][k] = {text};" for row, text in expressions.items())]
 
     @cached_property
-    def second(self) -> list[str]:
+    def second_part(self) -> list[str]:
         """The statements of the second part."""
         names = self._names()
-        for where, rows in (("own", self._own), ("kept", self._kept)):
+        for where, rows in (("own", self._machine_rows), ("kept", self._passed_rows)):
             for k, row in rows.items():
                 names[k] = f"{where}[{row}][k]"
-        lines = self._lines(sorted(self._late), names, "sincos_")
+        lines = self._lines(sorted(self._late_nodes), names, "sincos_")
         return [*lines, *(f"out[{row}][k] = {names[k]};" for row, k in self._results(later=True))]
 
     def _results(self, *, later: bool) -> list[tuple[int, int]]:
         """Return rows of `out` and their nodes, of one of the parts."""
         return [
-            (self.out[(self.later or {}).get(port.name, port.name)] + i, k)
+            (self.output_rows[(self.later or {}).get(port.name, port.name)] + i, k)
             for port, part in zip(self.program.outputs, self._graph.outputs, strict=True)
             if self._is_late(port) == later
             for i, k in enumerate(part)
@@ -110,58 +115,60 @@ class Block:
 
     @property
     def has_angles(self) -> bool:
-        """Whether there is a sine or a cosine of a value that depends on the state."""
+        """Whether the state determines the argument of a sine or a cosine."""
         nodes = self._graph.nodes
-        return any(n.operation in _ANGLES for k, n in enumerate(nodes) if k not in self._shared)
+        return any(
+            n.operation in _ANGLES for k, n in enumerate(nodes) if k not in self._shared_nodes
+        )
 
     @cached_property
     def _graph(self) -> Graph:
-        return graph_of(straight(self.program.function), self.program.inputs)
+        return graph_of(with_lowered_exponentials(self.program.function), self.program.inputs)
 
     @cached_property
-    def _shared(self) -> frozenset[int]:
+    def _shared_nodes(self) -> frozenset[int]:
         graph = self._graph
         return frozenset(k for k in graph.operations() if graph.nodes[k].shared)
 
     @cached_property
-    def _late(self) -> frozenset[int]:
-        """The nodes that only the later outputs need."""
+    def _late_nodes(self) -> frozenset[int]:
+        """The nodes on which the later outputs alone depend."""
         graph, needed = self._graph, {k for _, k in self._results(later=False)}
         late = set[int]()
         for k in reversed(graph.operations()):
             if k in needed:
                 needed |= set(graph.nodes[k].arguments)
-            elif k not in self._shared:
+            elif k not in self._shared_nodes:
                 late.add(k)
         return frozenset(late)
 
     @cached_property
-    def _kept(self) -> dict[int, int]:
+    def _passed_rows(self) -> dict[int, int]:
         """The rows of `kept`, by node: values of the first part that the second reads."""
         if not self.split:
             return {}
         graph = self._graph
-        first = set(graph.operations()) - self._late - self._shared
-        read = {i for k in self._late for i in graph.nodes[k].arguments}
+        first = set(graph.operations()) - self._late_nodes - self._shared_nodes
+        read = {i for k in self._late_nodes for i in graph.nodes[k].arguments}
         read |= {k for _, k in self._results(later=True)}
         return {k: row for row, k in enumerate(sorted(read & first))}
 
     @cached_property
-    def _own(self) -> dict[int, int]:
+    def _machine_rows(self) -> dict[int, int]:
         """The rows of `own`, by node: those that nodes that are not shared read."""
         graph = self._graph
         read = {k for part in graph.outputs for k in part}
         for k in graph.operations():
-            if k not in self._shared:
+            if k not in self._shared_nodes:
                 read |= set(graph.nodes[k].arguments)
-        return {k: row for row, k in enumerate(sorted(read & self._shared))}
+        return {k: row for row, k in enumerate(sorted(read & self._shared_nodes))}
 
     def _names(self) -> list[str]:
         ports = self.program.inputs
 
         def name(i: int, j: int) -> str:
             where = "numbers" if ports[i].shared else "in"
-            return f"{where}[{self.at[ports[i].name] + j}][k]"
+            return f"{where}[{self.first_rows[ports[i].name] + j}][k]"
 
         return names_of(self._graph, name, c_language("float64").constant)
 
@@ -186,8 +193,8 @@ class Block:
 
 
 def _starts(ports: Sequence[Port]) -> dict[str, int]:
-    found, row = {}, 0
+    starts, row = {}, 0
     for port in ports:
-        found[port.name] = row
+        starts[port.name] = row
         row += port.size
-    return found
+    return starts

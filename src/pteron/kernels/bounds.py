@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from pteron.errors import DataError, ModelError
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.interval_arithmetic import Interval, add, multiply, subtract
-from pteron.kernels.intervals import Enclosure, enclosed, occurs_once
+from pteron.kernels.intervals import Enclosure, enclose_nodes, occurs_once
 from pteron.kernels.kernel import Array, Port, as_array
 from pteron.kernels.programs import program
 from pteron.kernels.targets import FIXED
@@ -51,14 +51,14 @@ class Bounded:
     @cached_property
     def _graph(self) -> Graph:
         """The graph of the outputs, dense, and of all their elements' gradients, (m, R)."""
-        (given,) = self.function.sx_in()
-        outputs = [ca.densify(output) for output in self.function.call([given])]
+        (pose,) = self.function.sx_in()
+        outputs = [ca.densify(expression_) for expression_ in self.function.call([pose])]
         elements = ca.vertcat(*map(ca.vec, outputs))
-        slopes = ca.densify(ca.jacobian(elements, given).T)
-        return graph_of(ca.Function("bounded", [given], ca.cse([*outputs, slopes])))
+        slopes = ca.densify(ca.jacobian(elements, pose).T)
+        return graph_of(ca.Function("bounded", [pose], ca.cse([*outputs, slopes])))
 
     def rows(self, name: str) -> range:
-        """Return the numbers of an output's elements, counted over all outputs."""
+        """Return the indices of an output's elements among those of all outputs."""
         start = 0
         for port in self.outputs:
             if port.name == name:
@@ -76,7 +76,7 @@ class Bounded:
         graph, size = self._graph, low.shape[1]
         elements = [k for nodes in graph.outputs[:-1] for k in nodes]
         nodes = [elements[r] for r in rows]
-        least, most, defined, continuous = enclosed(graph, nodes, [low], [high], len(low))
+        least, most, defined, continuous = enclose_nodes(graph, nodes, [low], [high], len(low))
         moving = np.flatnonzero((low != high).any(axis=0)).tolist()
         for at, r in enumerate(rows):
             boxes = np.flatnonzero(continuous[:, at])
@@ -95,8 +95,8 @@ def _mean_value(
     count = len(low)
     with np.errstate(all="ignore"):  # of boxes without an end
         middle = 0.5 * low + 0.5 * high
-    at, upper, *_ = (part[:, 0] for part in enclosed(graph, [node], [middle], [middle], count))
-    least, most, known, _ = enclosed(graph, list(slopes.values()), [low], [high], count)
+    at, upper, *_ = (part[:, 0] for part in enclose_nodes(graph, [node], [middle], [middle], count))
+    least, most, known, _ = enclose_nodes(graph, list(slopes.values()), [low], [high], count)
     with np.errstate(all="ignore"):
         total = Interval(at, upper)
         for k, i in enumerate(slopes):
@@ -108,7 +108,7 @@ def _mean_value(
 
 
 def bounded(robot: RobotLike, what: str) -> Bounded:
-    """Return a function of a machine's poses, as its equations are written, for `bounds`.
+    """Return a function of a machine's poses, in its plain form, for `bounds`.
 
     Raises
     ------
@@ -116,22 +116,24 @@ def bounded(robot: RobotLike, what: str) -> Bounded:
         If there is no such function, or it depends on more than the pose.
     """
     robot = as_manipulator(robot)
-    return _bounded(robot, what)
+    return _cached_bounded_function(robot, what)
 
 
 @lru_cache(maxsize=256)
-def _bounded(robot: Manipulator, what: str) -> Bounded:
+def _cached_bounded_function(robot: Manipulator, what: str) -> Bounded:
     built = program(robot, what, plain=True)
     names = [port.name for port in built.inputs]
     if "pose" not in names or set(names) - {"pose", *FIXED}:
-        told = ", ".join(names)
-        raise ModelError(f"what: {what!r} depends on {told}; bounds are on functions of the pose")
+        input_names = ", ".join(names)
+        raise ModelError(
+            f"what: {what!r} depends on {input_names}; bounds are on functions of the pose"
+        )
     pose = ca.SX.sym("pose", robot.freedom)
-    given = [
+    arguments = [
         pose if port.name == "pose" else ca.SX(ca.DM(FIXED[port.name](robot)))
         for port in built.inputs
     ]
-    outputs = built.function.call(given)
+    outputs = built.function.call(arguments)
     return Bounded(ca.Function(what, [pose], outputs), built.outputs)
 
 
@@ -174,15 +176,15 @@ def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure
     (0.646, 0.65, True)
     """
     function = bounded(robot, what)
-    given = as_array(boxes, "boxes", (2, function.function.size1_in(0)))
-    if not (given[..., 0, :] <= given[..., 1, :]).all():
+    corners = as_array(boxes, "boxes", (2, function.function.size1_in(0)))
+    if not (corners[..., 0, :] <= corners[..., 1, :]).all():
         raise DataError("boxes: a least value is above the greatest, or NaN")
-    lead, flat = given.shape[:-2], given.reshape(-1, *given.shape[-2:])
-    found = {}
+    lead, flat = corners.shape[:-2], corners.reshape(-1, *corners.shape[-2:])
+    enclosures = {}
     for port in function.outputs:
         low, high, defined = function(flat[:, 0], flat[:, 1], function.rows(port.name))
         shape = lead + port.shape
-        found[port.name] = Enclosure(
+        enclosures[port.name] = Enclosure(
             low.reshape(shape), high.reshape(shape), defined.reshape(shape)
         )
-    return found
+    return enclosures

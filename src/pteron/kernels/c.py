@@ -34,18 +34,18 @@ from pteron.kernels.code import (
     Language,
     c_constant,
     module_values,
-    rendered,
+    render_template,
     single_precision,
 )
-from pteron.kernels.compilers import built, run
-from pteron.kernels.exponential import straight
+from pteron.kernels.compilers import compile_library, run
+from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import Graph, graph_of
-from pteron.kernels.kept import kept_result
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
+from pteron.kernels.program_cache import cached_result
 
 FLAGS = (
     *("-std=c99", "-O3", "-march=native", "-fno-math-errno", "-fPIC"),
-    # Nobody looks at the traps of floating-point operations; minding them keeps loops scalar.
+    # The traps of floating-point operations are not used; support for them keeps loops scalar.
     "-fno-trapping-math",
     # gcc 12 makes fused operations of pairs of statements even so (vfmaddsub), unless it is kept
     # from pairing them; loops, which are what is vectorised here, do not need that.
@@ -81,18 +81,18 @@ def compiler() -> tuple[str, ...] | None:
 
 
 @lru_cache(maxsize=4)
-def _command(given: str, path: str) -> tuple[str, ...] | None:
+def _command(setting: str, path: str) -> tuple[str, ...] | None:
     try:
-        words = shlex.split(given) or ["cc" if shutil.which("cc", path=path) else "gcc"]
+        words = shlex.split(setting) or ["cc" if shutil.which("cc", path=path) else "gcc"]
     except ValueError:
         return None
-    found = shutil.which(words[0], path=path)
-    return (found, *words[1:]) if found else None
+    executable = shutil.which(words[0], path=path)
+    return (executable, *words[1:]) if executable else None
 
 
 @lru_cache(maxsize=4)
 def compiler_version(command: tuple[str, ...]) -> str:
-    """Return what a compiler says of itself."""
+    """Return a compiler's version text."""
     return run([*command, "--version"]).stdout
 
 
@@ -115,7 +115,7 @@ def module_source(
 def module_of(template: str, values: Mapping[str, Any], dtype: str, block: int = 32) -> str:
     """Return the C of a template of a module, of what `module_values` returns."""
     real = "float" if dtype == "float32" else "double"
-    return rendered("pteron.kernels", template, real=real, block=block, **values)
+    return render_template("pteron.kernels", template, real=real, block=block, **values)
 
 
 def c_language(dtype: str) -> Language:
@@ -159,22 +159,22 @@ class Code:
 
     @cached_property
     def source(self) -> str:
-        """The C code: writing it takes 0.1 s and more, so that it is kept."""
+        """The C code, cached on disk: writing it takes 0.1 s and more."""
         function, outputs = self._program
         key = self.name, function.serialize(), self.ports, outputs, self.dtype, version("jinja2")
-        return kept_result(("c source", *key), ("templates",), self._written)
+        return cached_result(("c source", *key), ("templates",), self._write_source)
 
-    def _written(self) -> str:
+    def _write_source(self) -> str:
         function, outputs = self._program
-        graph = graph_of(straight(function), self.ports)
+        graph = graph_of(with_lowered_exponentials(function), self.ports)
         return module_source(self.name, graph, self.ports, outputs, self.dtype)
 
     @property
     def _entry(self) -> str:
         command = compiler()
         if command is None:
-            given = os.environ.get("CC")
-            why = f"CC={given} is not one" if given else "which are not here"
+            setting = os.environ.get("CC")
+            why = f"CC={setting} is not one" if setting else "which are not here"
             raise ModelError(
                 f'target: "c" needs a C compiler and Python\'s headers, {why}; '
                 'install them, or use "vm" or "numba"'
@@ -193,10 +193,10 @@ class Code:
         been at it.
         """
         if self._module is None:
-            self._module = self._loaded()
+            self._module = self._load_module()
         return self._module
 
-    def _loaded(self) -> ModuleType:
+    def _load_module(self) -> ModuleType:
         path = str(entry(self._entry, _LIBRARY, self._build))
         loader = ExtensionFileLoader("pteron_kernel", path)
         spec = importlib.util.spec_from_file_location("pteron_kernel", path, loader=loader)
@@ -217,22 +217,23 @@ class Code:
         headers = (f"-I{path}" for path in (sysconfig.get_path("include"), np.get_include()))
         advice = 'use "vm" or "numba", or set CC to another compiler'
         flags, sources = [*FLAGS, *headers, *LINKED], {"kernel.c": self.source}
-        built(command, flags, sources, folder / _LIBRARY, 'target: "c"', advice)
+        compile_library(command, flags, sources, folder / _LIBRARY, 'target: "c"', advice)
 
     def bound(
         self, fixed: Mapping[str, Array], otherwise: Callable[..., Any], most: int = sys.maxsize
     ) -> Callable[..., Any]:
         """Return the callable with some inputs fixed, as cheap as a call from Python can be.
 
-        What needs converting or checking, and batches of `most` states or more, go to `otherwise`.
+        Inputs that need conversion or checks, and batches of `most` states or more, go to
+        `otherwise`.
         """
-        values = (
+        fixed_arrays = (
             np.array(fixed[port.name], self.dtype).reshape(port.shape)
             if port.name in fixed
             else None
             for port in self.ports
         )
-        bound: Callable[..., Any] = self.module.bind(otherwise, most, *values)
+        bound: Callable[..., Any] = self.module.bind(otherwise, most, *fixed_arrays)
         return bound
 
 
@@ -252,9 +253,9 @@ class Compiled(ArrayKernel):
         return self.code.source
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        # Threads are for batches: `checked` splits them.
+        # Threads are for batches: `evaluate_checked` splits them.
         most = 2 * SHARE if self.threads > 1 else sys.maxsize
-        self.call = self.code.bound(self.fixed, self.checked, most)
+        self.call = self.code.bound(self.fixed, self.evaluate_checked, most)
         return self.call(*values, **fixed)
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:

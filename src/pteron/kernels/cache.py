@@ -1,9 +1,9 @@
 """The cache on disk: compiled code, so that a second start does not compile, and texts of programs.
 
-An entry is a folder of files under the user's cache directory, named by a digest of all that it
-was made of. It is built in a folder of its own and moved into place, so that two processes may
-build it at once; a manifest of digests tells a damaged one, which is then built again. Entries used
-least lately are removed when all of them exceed 512 MB.
+An entry is a folder of files under the user's cache directory, named by a digest of all its
+sources. It is built in a temporary folder and moved into place, so that two processes may build it
+at once; a manifest of digests detects a damaged one, which is then rebuilt. The least recently used
+entries are removed when all of them exceed 512 MB.
 
 A text, such as a serialised CasADi function, is one file, which begins with its digest; the latest
 3000 are kept.
@@ -49,25 +49,25 @@ _MARK = ".made-by-pteron"
 no other folder."""
 
 _STALE = 3600.0
-"""Seconds after which nobody works on a folder any more."""
+"""Seconds after which a work folder counts as abandoned."""
 
 TEXTS = "texts"
 """The folder of texts."""
 
 MOST = 3000
-"""Texts that are kept, of some 10 kB each."""
+"""Maximum number of cached texts, of some 10 kB each."""
 
 _WRITTEN = count()
 """Number of texts that this process has written."""
 
 MOST_BYTES = 1 << 29
-"""Size of all entries together, above which those that were used least lately are removed."""
+"""Size of all entries above which the least recently used are removed, bytes."""
 
 
 def directory() -> Path:
     """Return the directory of compiled code; it need not exist."""
-    given = os.environ.get(VARIABLE)
-    return Path(given) if given else user_cache_path("pteron") / "kernels"
+    setting = os.environ.get(VARIABLE)
+    return Path(setting) if setting else user_cache_path("pteron") / "kernels"
 
 
 @lru_cache(maxsize=1)
@@ -84,7 +84,7 @@ def host() -> str:
 
 
 def digest(*parts: str) -> str:
-    """Return a name for what is made of these texts on this machine."""
+    """Return a digest of texts and of this host, as a name."""
     total = hashlib.sha256()
     for part in (*parts, host()):
         total.update(len(part).to_bytes(8, "little") + part.encode())
@@ -92,30 +92,30 @@ def digest(*parts: str) -> str:
 
 
 def find(name: str, file: str) -> Path | None:
-    """Return the file of an entry that is there and whole, or None."""
+    """Return the file of an existing, intact entry, or None."""
     folder = _root() / name
     try:
         manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
-        whole = file in manifest and all(_hash(folder / f) == v for f, v in manifest.items())
+        is_intact = file in manifest and all(_hash(folder / f) == v for f, v in manifest.items())
     except (OSError, ValueError, AttributeError, TypeError):
         return None
     with suppress(OSError):  # used now, and as old as ever
         os.utime(folder / _MANIFEST, ns=(time.time_ns(), (folder / _MANIFEST).stat().st_mtime_ns))
-    return folder / file if whole else None
+    return folder / file if is_intact else None
 
 
 def entry(name: str, file: str, build: Callable[[Path], None]) -> Path:
-    """Return a file of an entry; `build` fills a new folder where there is none, or no whole.
+    """Return a file of an entry; `build` fills a new folder where none exists or it is damaged.
 
     Raises
     ------
     OutputError
         If the disk takes no more.
     """
-    found = find(name, file)
-    if found is not None:
-        return found
-    root, work = _begun()
+    cached = find(name, file)
+    if cached is not None:
+        return cached
+    root, work = _prepare_work_folder()
     try:
         build(work)
         files = [path for path in sorted(work.rglob("*")) if path.is_file()]
@@ -130,30 +130,30 @@ def entry(name: str, file: str, build: Callable[[Path], None]) -> Path:
     except BaseException:
         shutil.rmtree(work, ignore_errors=True)
         raise
-    return _moved(work, root / name, file) / file
+    return _move_into_place(work, root / name, file) / file
 
 
 def find_text(name: str) -> str | None:
-    """Return a text that is kept and whole, or None."""
+    """Return a cached, intact text, or None."""
     try:
-        data = (_root() / TEXTS / name).read_bytes()
-        if data[:32] == hashlib.sha256(data[32:]).digest():
-            return zlib.decompress(data[32:]).decode()
+        content = (_root() / TEXTS / name).read_bytes()
+        if content[:32] == hashlib.sha256(content[32:]).digest():
+            return zlib.decompress(content[32:]).decode()
     except (OSError, zlib.error, UnicodeDecodeError):
         pass
     return None
 
 
-def keep_text(name: str, text: str, most: int = MOST) -> None:
-    """Keep a text where the disk takes it; where there are too many, the oldest give way."""
-    data = zlib.compress(text.encode(), 1)
+def store_text(name: str, text: str, most: int = MOST) -> None:
+    """Cache a text if the disk accepts it; of more than `most` texts the oldest are removed."""
+    content = zlib.compress(text.encode(), 1)
     folder = _root() / TEXTS
     with suppress(OSError):
         folder.mkdir(mode=0o700, exist_ok=True)
         with tempfile.NamedTemporaryFile(prefix=_WORK, dir=folder, delete=False) as file:
             work = Path(file.name)
             try:
-                file.write(hashlib.sha256(data).digest() + data)
+                file.write(hashlib.sha256(content).digest() + content)
                 file.close()
                 work.replace(folder / name)
             finally:
@@ -162,16 +162,16 @@ def keep_text(name: str, text: str, most: int = MOST) -> None:
         # every fiftieth part of `most`.
         if next(_WRITTEN) % max(most // 50, 1):
             return
-        kept = list(os.scandir(folder))
-        if len(kept) > most:
-            for old in sorted(kept, key=_age)[: len(kept) - 3 * most // 4]:
+        texts = list(os.scandir(folder))
+        if len(texts) > most:
+            for old in sorted(texts, key=_age)[: len(texts) - 3 * most // 4]:
                 Path(old).unlink(missing_ok=True)
 
 
-def _age(found: os.DirEntry[str]) -> float:
-    """Return when a file was written; what another process removed meanwhile counts as oldest."""
+def _age(listed: os.DirEntry[str]) -> float:
+    """Return a file's modification time; 0 if another process removed it meanwhile."""
     try:
-        return found.stat().st_mtime
+        return listed.stat().st_mtime
     except OSError:
         return 0.0
 
@@ -181,11 +181,11 @@ def _root() -> Path:
     folder = directory()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = folder.stat()
+        status = folder.stat()
     except OSError:
         return _private()
     # On Windows a user's folders are closed to others, and modes say nothing.
-    ours = os.name == "nt" or (found.st_uid == os.geteuid() and not found.st_mode & 0o022)
+    ours = os.name == "nt" or (status.st_uid == os.geteuid() and not status.st_mode & 0o022)
     return folder if ours else _private()
 
 
@@ -196,11 +196,11 @@ def _private() -> Path:
     return folder
 
 
-def _begun() -> tuple[Path, Path]:
-    """Return the directory of entries, cleared of what is not needed, and a new folder in it."""
+def _prepare_work_folder() -> tuple[Path, Path]:
+    """Return the directory of entries, after removing excess ones, and a new work folder in it."""
     root = _root()
     _sweep(root)
-    _bound(root, MOST_BYTES)
+    _limit_size(root, MOST_BYTES)
     try:
         return root, _work_folder(root)
     except OSError:
@@ -215,15 +215,15 @@ def _work_folder(root: Path) -> Path:
 
 
 def _sweep(root: Path) -> None:
-    """Remove what processes that were killed at work have left behind, and nothing else."""
+    """Remove the work folders of processes that were killed, and nothing else."""
     for mark in root.glob(f"{_WORK}*/{_MARK}"):
         with suppress(OSError):
-            if time.time() - mark.stat().st_mtime > _STALE or not _at_work(mark.read_text()):
+            if time.time() - mark.stat().st_mtime > _STALE or not _may_be_running(mark.read_text()):
                 shutil.rmtree(mark.parent, ignore_errors=True)
 
 
-def _at_work(mark: str) -> bool:
-    """Say whether the process of a mark may still be there; another computer's may."""
+def _may_be_running(mark: str) -> bool:
+    """Return whether the process of a mark may still be running; always of another computer."""
     node, _, number = mark.rpartition(" ")
     if os.name != "posix" or node != platform.node() or not number.isdigit():
         return True
@@ -236,34 +236,34 @@ def _at_work(mark: str) -> bool:
     return True
 
 
-def _bound(root: Path, most: int) -> None:
-    """Remove the entries that were used least lately, where all are larger than that together.
+def _limit_size(root: Path, most: int) -> None:
+    """Remove the least recently used entries until all of them together have `most` bytes.
 
-    One that a process is about to load may go: it is then built again. What is loaded stays.
+    An entry that a process is about to load may be removed: it is then rebuilt.
     """
-    found = []
+    entries = []
     for manifest in root.glob(f"*/{_MANIFEST}"):
         with suppress(OSError):
             size = sum(path.stat().st_size for path in manifest.parent.iterdir())
             used = max(manifest.stat().st_atime, manifest.stat().st_mtime)
-            found.append((used, size, manifest.parent))
-    total = sum(size for _, size, _ in found)
-    for _, size, folder in sorted(found):
+            entries.append((used, size, manifest.parent))
+    total = sum(size for _, size, _ in entries)
+    for _, size, folder in sorted(entries):
         if total <= most:
             return
-        _removed(folder)
+        _remove_folder(folder)
         total -= size
 
 
-def _removed(folder: Path) -> None:
-    """Move a folder out of the way, so that nobody sees half of it, and remove it."""
+def _remove_folder(folder: Path) -> None:
+    """Remove a folder atomically: rename it first, so that no process sees it incomplete."""
     wreck = _work_folder(folder.parent)
     with suppress(OSError):
         folder.rename(wreck / folder.name)
     shutil.rmtree(wreck, ignore_errors=True)
 
 
-def _moved(work: Path, target: Path, file: str) -> Path:
+def _move_into_place(work: Path, target: Path, file: str) -> Path:
     """Move a finished folder into place, unless another process was first."""
     for _ in range(3):
         try:
@@ -272,7 +272,7 @@ def _moved(work: Path, target: Path, file: str) -> Path:
             if find(target.name, file) is not None:
                 shutil.rmtree(work, ignore_errors=True)
                 return target
-            _removed(target)  # in place, but damaged
+            _remove_folder(target)  # in place, but damaged
         else:
             return target
     return work

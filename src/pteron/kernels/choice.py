@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 
 from pteron.kernels.c import Code, compiler
 from pteron.kernels.compilers import end_all
-from pteron.kernels.kept import Program, kept
-from pteron.kernels.kernel import Array, Kernel, sliced
+from pteron.kernels.kernel import Array, Kernel, slice_states
+from pteron.kernels.program_cache import Program, cached_program
 from pteron.kernels.programs import ALIKE, Columns, layout_of, program
 from pteron.kernels.targets import FIXED, Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
@@ -30,17 +30,17 @@ _AT_EXIT = 3.0
 """Seconds that a process waits at its end for a compiler in the background: most take less."""
 
 _AT_WORK = threading.Semaphore(1)
-"""Admits one compilation at a time; a caller that finds it taken asks again later."""
+"""Admits one compilation at a time; a caller that cannot acquire it tries again later."""
 
 _PATIENCE = 0.1
 """Seconds of the virtual machine's work before C code is asked for: a fifth of a compilation."""
 
-_WAITING: weakref.WeakSet[Tier] = weakref.WeakSet()
+_WAITING: weakref.WeakSet[SharedCode] = weakref.WeakSet()
 """Functions whose code is being compiled in the background."""
 
 
 def _begin_in_a_fork() -> None:
-    """Let a forked process compile: the thread that would release the semaphore is not in it."""
+    """Reset the semaphore in a forked process: the thread that would release it is not in it."""
     global _AT_WORK
     _AT_WORK = threading.Semaphore(1)
     for tier in list(_WAITING):
@@ -54,7 +54,7 @@ if hasattr(os, "register_at_fork"):
 
 def numeric(
     robot: RobotLike, what: str, *, base: Selects | None = None, wrench: bool = False
-) -> Adaptive:
+) -> TieredKernel:
     """Return the kernel with which the public functions evaluate `what` of a machine.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
@@ -70,19 +70,19 @@ def numeric(
     columns = None if base is None else columns_of(base)
     # Kernels are kept by machine, not by a name, whose file may change.
     machine = robot if isinstance(robot, Manipulator) else as_manipulator(robot)
-    return _known(machine, what, columns, wrench, ALIKE.get())
+    return _cached_kernel(machine, what, columns, wrench, ALIKE.get())
 
 
 @lru_cache(maxsize=512)
-def _known(
+def _cached_kernel(
     robot: Manipulator, what: str, columns: Columns | None, wrench: bool, like: Manipulator | None
-) -> Adaptive:
-    kernel = guarded(robot, what, VirtualMachine, columns, wrench=wrench)
+) -> TieredKernel:
+    kernel = kernel_with_status(robot, what, VirtualMachine, columns, wrench=wrench)
     tier = _tier(layout_of(robot), what, columns, wrench, like is not None)
-    return Adaptive(kernel, tier)
+    return TieredKernel(kernel, tier)
 
 
-def guarded(
+def kernel_with_status(
     robot: Manipulator,
     what: str,
     kind: type[Kernel],
@@ -90,33 +90,33 @@ def guarded(
     *,
     wrench: bool = False,
 ) -> Kernel:
-    """Return a kernel whose last output is `status`: 1 where the others count, else 0."""
+    """Return a kernel whose last output is `status`: 1 where the others are valid, else 0."""
     built = program(robot, what, columns, wrench=wrench, guarded=True)
     fixed = {p.name: FIXED[p.name](robot) for p in built.inputs if p.name in FIXED}
     return kind(built.name, built.function, built.inputs, built.outputs, fixed)
 
 
-def adaptive(key: tuple[Any, ...], build: Callable[[], Program]) -> Adaptive:
-    """Return the kernel of a program that belongs to no machine, kept under a key."""
-    built = kept(key, build)
+def tiered_kernel(key: tuple[Any, ...], build: Callable[[], Program]) -> TieredKernel:
+    """Return the kernel of a program of no machine, cached under a key."""
+    built = cached_program(key, build)
     parts = built.name, built.function, built.inputs, built.outputs
-    return Adaptive(VirtualMachine(*parts), _tier_of(Code(*parts)))
+    return TieredKernel(VirtualMachine(*parts), _tier_of(Code(*parts)))
 
 
 @lru_cache(maxsize=512)
 def _tier(
     layout: Manipulator, what: str, columns: Columns | None, wrench: bool, general: bool
-) -> Tier:
+) -> SharedCode:
     """Return the code that machines of one layout share; if `general`, those of one topology."""
     built = program(layout, what, columns, wrench=wrench, guarded=True)
     return _tier_of(Code(built.name, built.function, built.inputs, built.outputs))
 
 
-def _tier_of(code: Code) -> Tier:
-    return Tier(code, math.inf if os.environ.get(VARIABLE) == "vm" else _PATIENCE)
+def _tier_of(code: Code) -> SharedCode:
+    return SharedCode(code, math.inf if os.environ.get(VARIABLE) == "vm" else _PATIENCE)
 
 
-class Tier:
+class SharedCode:
     """The C code of one function and layout, and the time that calls have spent without it.
 
     Parameters
@@ -133,7 +133,7 @@ class Tier:
         self._patience = patience
 
     def fetch(self, *, at_any_cost: bool) -> None:
-        """Load the code if it is on disk; if not, compile it and wait, but `at_any_cost` only.
+        """Load the code if it is cached; with `at_any_cost` compile it otherwise, and wait.
 
         A batch of millions of states is worth the wait.
         """
@@ -144,8 +144,8 @@ class Tier:
             with taken:
                 self._load()
 
-    def missed(self, seconds: float) -> None:
-        """Add time, s, that the virtual machine spent; from `patience` on, compile in a thread."""
+    def add_interpreter_time(self, seconds: float) -> None:
+        """Add time of the virtual machine, s; beyond `patience`, compile in a thread."""
         self._patience -= seconds
         taken = _AT_WORK
         if self._patience > 0.0 or not taken.acquire(blocking=False):
@@ -168,7 +168,7 @@ class Tier:
                 taken.release()
 
     def ask_again(self) -> None:
-        """Ask for the code after further work: whoever compiled it is gone."""
+        """Request the code again after further work: the thread that compiled it is gone."""
         self._patience = _PATIENCE
 
     def _load(self) -> None:
@@ -196,7 +196,7 @@ def _end(worker: threading.Thread) -> None:
         worker.join(_AT_EXIT)
 
 
-class Adaptive(VirtualMachine):
+class TieredKernel(VirtualMachine):
     """A kernel that runs on the virtual machine until its C code is ready, then in C.
 
     Parameters
@@ -209,7 +209,7 @@ class Adaptive(VirtualMachine):
         Number of states after which it is checked again whether the code is ready.
     """
 
-    def __init__(self, kernel: Kernel, tier: Tier, chunk: int = 1 << 15) -> None:
+    def __init__(self, kernel: Kernel, tier: SharedCode, chunk: int = 1 << 15) -> None:
         super().__init__(kernel.name, kernel.function, kernel.ports, kernel.outputs, kernel.fixed)
         self.tier = tier
         self._chunk = chunk
@@ -221,24 +221,24 @@ class Adaptive(VirtualMachine):
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         if not self.tier.ready:
-            return self.checked(*values, **fixed)
-        self.call = self.tier.code.bound(self.fixed, self.checked)
+            return self.evaluate_checked(*values, **fixed)
+        self.call = self.tier.code.bound(self.fixed, self.evaluate_checked)
         return self.call(*values, **fixed)
 
-    def _of_one_state(self, values: Sequence[Any]) -> Any:
+    def _evaluate_one_state(self, values: Sequence[Any]) -> Any:
         begin = time.perf_counter()
-        found = super()._of_one_state(values)
-        if found is not None:
-            self.tier.missed(time.perf_counter() - begin)
-        return found
+        outputs = super()._evaluate_one_state(values)
+        if outputs is not None:
+            self.tier.add_interpreter_time(time.perf_counter() - begin)
+        return outputs
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         for start in range(0, batch, self._chunk):
             stop = min(start + self._chunk, batch)
-            part = sliced(inputs, outputs, start, stop)
+            part = slice_states(inputs, outputs, start, stop)
             if self.tier.ready:
                 self.tier.code.module.run(*part[0], *part[1])
                 continue
             begin = time.perf_counter()
             super()._run(stop - start, *part)
-            self.tier.missed(time.perf_counter() - begin)
+            self.tier.add_interpreter_time(time.perf_counter() - begin)

@@ -17,7 +17,7 @@ import numpy as np
 from pteron.kernels.exponential import exponential_function
 from pteron.kernels.graph import CONSTANT, INPUT, Graph, graph_of
 from pteron.kernels.kernel import Port
-from pteron.kernels.sincos import LIMIT, near
+from pteron.kernels.sincos import LIMIT, reduced_sincos
 
 if TYPE_CHECKING:
     import jinja2
@@ -57,11 +57,11 @@ def single_precision(printed: Mapping[str, str]) -> dict[str, str]:
     return {op: re.sub(r"^(\w+)\(", r"\1f(", text) for op, text in printed.items()}
 
 
-def c_constant(value: float, dtype: str = "float64") -> str:
+def c_constant(number: float, dtype: str = "float64") -> str:
     """Return a floating-point literal of C, in brackets where it has a sign."""
-    if np.isnan(value):
+    if np.isnan(number):
         return "NAN"
-    text = f"{np.float32(value)!s}" if dtype == "float32" else repr(float(value))
+    text = f"{np.float32(number)!s}" if dtype == "float32" else repr(float(number))
     if not any(sign in text for sign in ".en"):
         text += ".0"
     text += "F" if dtype == "float32" else ""
@@ -99,8 +99,8 @@ def statements(
         node = graph.nodes[k]
         if node.operation not in printed:
             raise ValueError(f"operation {node.operation} has no printer")
-        value = printed[node.operation].format(*(names[i] for i in node.arguments))
-        lines.append(form.format(names[k], value))
+        text = printed[node.operation].format(*(names[i] for i in node.arguments))
+        lines.append(form.format(names[k], text))
     return lines
 
 
@@ -137,8 +137,8 @@ def module_values(
 ) -> dict[str, Any]:
     """Return the values of a module's template: statements for one state, and for a block.
 
-    In a block the inputs' elements have a row each, and behind them an angle's sine and cosine:
-    these are found ahead of the long loop, and what depends on shared inputs alone once.
+    In a block the inputs' elements have a row each, followed by each angle's sine and cosine, which
+    are computed ahead of the long loop; statements of shared inputs alone run once.
     """
     nodes, operations = graph.nodes, graph.operations()
     printed, form = language.printed, language.form
@@ -149,7 +149,7 @@ def module_values(
         if nodes[k].outlying:
             of_angle.setdefault(nodes[k].arguments[0], []).append(k)
     shared = [k for k in operations if nodes[k].shared]
-    rest = [k for k in operations if not nodes[k].shared and not nodes[k].outlying]
+    state_nodes = [k for k in operations if not nodes[k].shared and not nodes[k].outlying]
     results = [
         (port, j, k)
         for port, places in zip(outputs, graph.outputs, strict=True)
@@ -157,13 +157,15 @@ def module_values(
     ]
 
     names = names_of(graph, lambda i, j: f"{inputs[i].name}[{j}]", language.constant)
-    one = []
-    for number, (angle, found) in enumerate(of_angle.items(), 1):
-        one.append(language.pair.format(number, names[angle]))
-        for k in found:
+    one_state = []
+    for number, (angle, functions) in enumerate(of_angle.items(), 1):
+        one_state.append(language.pair.format(number, names[angle]))
+        for k in functions:
             names[k] = language.parts[nodes[k].operation].format(number)
-    one += statements(graph, shared + rest, names, printed, form)
-    one += [language.returned.format(f"{port.name}_out", j, names[k]) for port, j, k in results]
+    one_state += statements(graph, shared + state_nodes, names, printed, form)
+    one_state += [
+        language.returned.format(f"{port.name}_out", j, names[k]) for port, j, k in results
+    ]
 
     def input_name(i: int, j: int) -> str:
         return f"{inputs[i].name}[{j}]" if inputs[i].shared else language.cell.format(rows[i, j])
@@ -171,19 +173,19 @@ def module_values(
     names = names_of(graph, input_name, language.constant)
     once = statements(graph, shared, names, printed, form)
     angles = []
-    for row, (angle, found) in zip(count(len(rows), 2), of_angle.items(), strict=False):
+    for row, (angle, functions) in zip(count(len(rows), 2), of_angle.items(), strict=False):
         sine, cosine = language.cell.format(row), language.cell.format(row + 1)
         angles.append((names[angle], sine, cosine))
-        for k in found:
+        for k in functions:
             names[k] = sine if nodes[k].operation == "sin" else cosine
-    body = statements(graph, rest, names, printed, form)
+    body = statements(graph, state_nodes, names, printed, form)
     body += [language.stored.format(row, names[k]) for row, (_, _, k) in enumerate(results)]
 
     return arithmetic(language.near_form) | {
         "name": name,
         "inputs": inputs,
         "outputs": outputs,
-        "one": one,
+        "one": one_state,
         "shared": once,
         "angles": angles,
         "body": body,
@@ -195,13 +197,13 @@ def module_values(
 
 def arithmetic(form: str = "const double {0} = {1};") -> dict[str, Any]:
     """Return statements of sine, cosine and exponential; `form` is that of one."""
-    found: dict[str, Any] = {"limit": LIMIT}
-    for function in (near(), exponential_function()):
+    template_values: dict[str, Any] = {"limit": LIMIT}
+    for function in (reduced_sincos(), exponential_function()):
         name, graph = function.name(), graph_of(function)
         names = names_of(graph, lambda i, j: "argument", c_constant)
-        found[name] = statements(graph, graph.operations(), names, C, form)
-        found[f"{name}_results"] = [names[places[0]] for places in graph.outputs]
-    return found
+        template_values[name] = statements(graph, graph.operations(), names, C, form)
+        template_values[f"{name}_results"] = [names[places[0]] for places in graph.outputs]
+    return template_values
 
 
 def _runs(used: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int, int]]:
@@ -215,7 +217,7 @@ def _runs(used: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int, int]
         row += width
 
 
-def rendered(package: str, template: str, **values: Any) -> str:
+def render_template(package: str, template: str, **values: Any) -> str:
     """Return the text of a template in the folder `templates` of a package."""
     return _environment(package).get_template(template).render(values)
 

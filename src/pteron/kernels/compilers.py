@@ -57,7 +57,7 @@ def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     return subprocess.CompletedProcess(command, process.returncode, out, error)
 
 
-def built(
+def compile_library(
     command: Sequence[str],
     flags: Iterable[str],
     sources: Mapping[str, str],
@@ -78,8 +78,8 @@ def built(
     done = run([*command, *flags, *files, "-o", str(library), "-lm"])
     if done.returncode != 0 or not library.exists():
         lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}, no library"]
-        told = f"{what} could not be compiled with {' '.join(command)}: {lines[0]}"
-        raise ModelError(f"{told}; {advice}")
+        failure = f"{what} could not be compiled with {' '.join(command)}: {lines[0]}"
+        raise ModelError(f"{failure}; {advice}")
 
 
 def end_all() -> None:

@@ -1,7 +1,7 @@
 """Entries of the table of functions that can be compiled: inputs, equations, conditions.
 
 For each function: its inputs, its outputs as CasADi expressions, and the conditions on the pose
-under which its result counts. `pose_functions` and `functions` fill the table.
+under which its result is valid. `pose_functions` and `functions` fill the table.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ Outputs = dict[str, Output]
 """Outputs by name, in order."""
 
 Need = Literal["rows", "reach", "type I", "angles", "type II"]
-"""A condition on the pose: in reach, not singular of type I, of type II; "rows" asks for the first
-two of those legs alone whose row [dq/dc | dq/dphi] depends on the pose; "angles" for angles of the
-platform that are not singular."""
+"""A condition on the pose: in reach, not singular of type I, of type II; "rows" is the first two
+conditions on the legs whose row [dq/dc | dq/dphi] depends on the pose; "angles" means nonsingular
+angles of the platform."""
 
 TYPE_I = 1e-4
 """Least type-I measure of a leg (0 where it is singular) where a result is divided by it: the
@@ -49,22 +49,22 @@ class Entry:
     inputs: tuple[str, ...]
     build: _Build
     needs: tuple[Need, ...] = ()
-    """Conditions on the pose for the result to count, in the order of the messages."""
+    """Conditions on the pose for a valid result, in the order of the messages."""
 
 
 POSE, RATE = ("pose",), ("pose", "velocity")
 MOTION = ("pose", "velocity", "acceleration")
-REACHED: tuple[Need, ...] = ("reach",)
-ROWS: tuple[Need, ...] = ("rows",)
-BENT: tuple[Need, ...] = ("reach", "type I")
-HELD: tuple[Need, ...] = ("reach", "type I", "type II")
-MOVED: tuple[Need, ...] = (*BENT, "angles")
+NEEDS_REACH: tuple[Need, ...] = ("reach",)
+NEEDS_CONSTANT_ROWS: tuple[Need, ...] = ("rows",)
+NEEDS_TYPE_I: tuple[Need, ...] = ("reach", "type I")
+NEEDS_TYPE_II: tuple[Need, ...] = ("reach", "type I", "type II")
+NEEDS_ANGLES: tuple[Need, ...] = (*NEEDS_TYPE_I, "angles")
 
 TABLE: dict[str, Entry] = {}
 """All functions by name."""
 
 
-def row(
+def equation_entry(
     equation: Callable[..., Any],
     inputs: tuple[str, ...],
     outputs: str,
@@ -72,36 +72,38 @@ def row(
 ) -> Entry:
     """Return the entry of an equation that takes the machine and the inputs, in order.
 
-    `outputs` are the names of its results, apart by blanks.
+    `outputs` are the names of its results, separated by blanks.
     """
-    return _named(lambda m, v: equation(m, *(v[name] for name in inputs)), inputs, outputs, needs)
+    return _entry_of(
+        lambda m, v: equation(m, *(v[name] for name in inputs)), inputs, outputs, needs
+    )
 
 
-def of_state(
+def state_entry(
     equation: Callable[[Any], Any],
     inputs: tuple[str, ...],
     outputs: str,
     needs: tuple[Need, ...] = (),
 ) -> Entry:
-    """Return the same of an equation that takes the state of the machine."""
-    return _named(lambda m, v: equation(state(m, v)), inputs, outputs, needs)
+    """Return the entry of an equation that takes the state of the machine."""
+    return _entry_of(lambda m, v: equation(state(m, v)), inputs, outputs, needs)
 
 
-def _named(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Need, ...]) -> Entry:
+def _entry_of(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Need, ...]) -> Entry:
     names = outputs.split()
 
-    def named(m: Machine, v: Symbols) -> Outputs:
-        found = build(m, v)
-        return dict(zip(names, found if len(names) > 1 else [found], strict=True))
+    def build_outputs(m: Machine, v: Symbols) -> Outputs:
+        results = build(m, v)
+        return dict(zip(names, results if len(names) > 1 else [results], strict=True))
 
-    return Entry(inputs, named, needs)
+    return Entry(inputs, build_outputs, needs)
 
 
 def state(m: Machine, v: Symbols) -> Any:
-    """Return the state of a machine, of the orders that the symbols have."""
+    """Return the state of a machine, to the order of the given symbols."""
     return m.state(v["pose"], v.get("velocity"), v.get("acceleration"))
 
 
-def stacked(column: Expression) -> tuple[Expression, tuple[int, ...]]:
+def as_vector(column: Expression) -> tuple[Expression, tuple[int, ...]]:
     """Return a column as a vector, also where it has one element or none."""
     return column, column.shape[:1]

@@ -16,7 +16,7 @@ from math import factorial
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.kernels.graph import rewritten
+from pteron.kernels.graph import rewrite_operations
 
 _DOUBLINGS = 12
 """Doublings of the argument: 2^12 = 4096."""
@@ -73,6 +73,6 @@ _RULES: dict[str, Callable[..., Expression]] = {
 
 
 @lru_cache(maxsize=256)
-def straight(function: ca.Function) -> ca.Function:
+def with_lowered_exponentials(function: ca.Function) -> ca.Function:
     """Return a function whose exponentials are computed by `exponential`, and tanh with it."""
-    return rewritten(function, _RULES)
+    return rewrite_operations(function, _RULES)

@@ -1,7 +1,7 @@
 """Exact arithmetic for CasADi graphs, in the rationals and prime fields; target `exact`.
 
 `evaluate` walks the instructions of an SX function with numbers of a field instead of floats;
-`Evaluation` does so at many states, and works out once what does not depend on them. An angle is
+`Evaluation` does so at many states, and evaluates state-independent nodes once. An angle is
 given by the tangent t of its half, so that its sine and cosine are rational. A square root must
 exist in the field, or `NoSquareRoot` is raised.
 """
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, PteronError
 from pteron.kernels.graph import CONSTANT, INPUT, graph_of
-from pteron.kernels.kernel import Kernel, unmasked
+from pteron.kernels.kernel import Kernel, require_unmasked
 
 Element = TypeVar("Element")
 
@@ -110,7 +110,7 @@ class PrimeField:
 
 
 class Evaluation(Generic[Element]):
-    """A function in a field, ready for many states: what its first inputs decide is known.
+    """A function in a field, for many states: nodes of its first inputs alone are precomputed.
 
     Parameters
     ----------
@@ -137,8 +137,8 @@ class Evaluation(Generic[Element]):
         moving: set[int] = set()
         for k, node in enumerate(graph.nodes):
             if node.operation == CONSTANT:
-                value = Fraction(0 if isnan(node.value) else node.value)
-                self._known[k] = field.number(value)
+                number = Fraction(0 if isnan(node.value) else node.value)
+                self._known[k] = field.number(number)
             elif node.operation == INPUT:
                 port, element = node.arguments
                 if port < len(fixed):
@@ -153,13 +153,13 @@ class Evaluation(Generic[Element]):
             else:
                 step = operations[node.operation], node.arguments
                 if moving.isdisjoint(node.arguments):
-                    # What does not exist is told when a state asks for it.
+                    # An error is raised when a state needs the node.
                     with suppress(NoSquareRoot, ZeroDivisionError):
                         self._known[k] = step[0](*[self._known[j] for j in step[1]])
                         continue
                 moving.add(k)
                 self._steps[k] = step
-        self._each: list[list[int]] | None = None
+        self._steps_by_element: list[list[int]] | None = None
 
     def __call__(self, *inputs: Sequence[Element]) -> list[list[Element]]:
         """Return the outputs at a state, the other inputs given; nonzeros by columns.
@@ -171,63 +171,63 @@ class Evaluation(Generic[Element]):
         ZeroDivisionError
             If a denominator vanishes.
         """
-        values = self._started(inputs)
-        self._worked_out(values, self._steps)
-        return [[values[k] for k in nodes] for nodes in self._outputs]
+        elements = self._initial_elements(inputs)
+        self._compute_steps(elements, self._steps)
+        return [[elements[k] for k in nodes] for nodes in self._outputs]
 
     def elements(self, *inputs: Sequence[Element]) -> Iterator[Element]:
-        """Yield the same, one element after another, each worked out when it is asked for."""
-        if self._each is None:
-            self._each = self._apart()
-        values = self._started(inputs)
-        wanted = (k for nodes in self._outputs for k in nodes)
-        for k, steps in zip(wanted, self._each, strict=True):
-            self._worked_out(values, steps)
-            yield values[k]
+        """Yield the outputs element by element, lazily."""
+        if self._steps_by_element is None:
+            self._steps_by_element = self._separate_steps()
+        known = self._initial_elements(inputs)
+        output_nodes = (k for nodes in self._outputs for k in nodes)
+        for k, steps in zip(output_nodes, self._steps_by_element, strict=True):
+            self._compute_steps(known, steps)
+            yield known[k]
 
-    def _started(self, inputs: Sequence[Sequence[Element]]) -> list[Element]:
-        values = self._known.copy()
+    def _initial_elements(self, inputs: Sequence[Sequence[Element]]) -> list[Element]:
+        elements = self._known.copy()
         for k, port, element in self._inputs:
-            values[k] = inputs[port][element]
-        return values
+            elements[k] = inputs[port][element]
+        return elements
 
-    def _worked_out(self, values: list[Element], steps: Iterable[int]) -> None:
+    def _compute_steps(self, elements: list[Element], steps: Iterable[int]) -> None:
         for k in steps:
             operation, arguments = self._steps[k]
             if len(arguments) == 2:
                 i, j = arguments
-                values[k] = operation(values[i], values[j])
+                elements[k] = operation(elements[i], elements[j])
             else:
-                values[k] = operation(values[arguments[0]])
+                elements[k] = operation(elements[arguments[0]])
 
-    def _apart(self) -> list[list[int]]:
-        """Return the steps to each element of the outputs beyond those to the elements before."""
+    def _separate_steps(self) -> list[list[int]]:
+        """Return, for each output element, the steps that no previous element needs."""
         done: set[int] = set()
-        found = []
+        steps_by_element = []
         for root in (k for nodes in self._outputs for k in nodes):
-            more, waiting = set(), [root]
+            new_steps, waiting = set(), [root]
             while waiting:
                 k = waiting.pop()
-                if k in self._steps and k not in done and k not in more:
-                    more.add(k)
+                if k in self._steps and k not in done and k not in new_steps:
+                    new_steps.add(k)
                     waiting += self._steps[k][1]
-            done |= more
-            found.append(sorted(more))
-        return found
+            done |= new_steps
+            steps_by_element.append(sorted(new_steps))
+        return steps_by_element
 
 
 def _operations(field: Field[Element]) -> dict[str, Callable[..., Element]]:
     """Return the operations of a graph that are exact in a field."""
-    zero, one = field.number(0), field.number(1)
+    zero, unit = field.number(0), field.number(1)
 
     def sine(t: Element) -> Element:
-        return field.divide(field.add(t, t), field.add(one, field.multiply(t, t)))
+        return field.divide(field.add(t, t), field.add(unit, field.multiply(t, t)))
 
     def cosine(t: Element) -> Element:
         square = field.multiply(t, t)
-        return field.divide(field.subtract(one, square), field.add(one, square))
+        return field.divide(field.subtract(unit, square), field.add(unit, square))
 
-    def select(test: Element, value: Element) -> Element:
+    def select(test: Element, chosen: Element) -> Element:
         # What is left out of range is NaN in floats; an exact number it is not.
         if test != zero:
             raise NoSquareRoot
@@ -245,7 +245,7 @@ def _operations(field: Field[Element]) -> dict[str, Callable[..., Element]]:
         "select": select,
     }
     if isinstance(field, RationalField):
-        operations["less"] = lambda a, b: one if a < b else zero
+        operations["less"] = lambda a, b: unit if a < b else zero
     return operations
 
 
@@ -274,24 +274,24 @@ class Exact(Kernel):
     """
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        given = self._by_name(values, fixed)
+        by_port = self._values_by_port(values, fixed)
         inputs = []
         for port in self.ports:
-            array = np.asarray(unmasked(given[port.name], port.name), dtype=object)
+            array = np.asarray(require_unmasked(by_port[port.name], port.name), dtype=object)
             if array.shape != port.shape:
                 raise DataError(
                     f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"
                 )
-            inputs.append([Fraction(value) for value in array.ravel().tolist()])
+            inputs.append([Fraction(numbers) for numbers in array.ravel().tolist()])
         try:
-            found = evaluate(self.function, RationalField(), inputs)
+            exact_outputs = evaluate(self.function, RationalField(), inputs)
         except NoSquareRoot:
             raise NoSquareRoot(
                 f"{self.function.name()}: in fractions a square root of this state does not exist "
                 '(it is irrational, or the pose out of reach); use another target, such as "c"'
             ) from None
         results = tuple(
-            np.array(value, dtype=object).reshape(port.shape)
-            for value, port in zip(found, self.outputs, strict=True)
+            np.array(numbers, dtype=object).reshape(port.shape)
+            for numbers, port in zip(exact_outputs, self.outputs, strict=True)
         )
         return results[0] if len(results) == 1 else results

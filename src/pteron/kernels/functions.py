@@ -31,14 +31,14 @@ from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 from pteron.kernels.entries import (
     ANGLES as ANGLES,
-    BENT,
-    HELD,
     MOTION,
-    MOVED,
+    NEEDS_ANGLES,
+    NEEDS_CONSTANT_ROWS,
+    NEEDS_REACH,
+    NEEDS_TYPE_I,
+    NEEDS_TYPE_II,
     POSE,
     RATE,
-    REACHED,
-    ROWS,
     TABLE as TABLE,
     TYPE_I as TYPE_I,
     TYPE_II as TYPE_II,
@@ -47,29 +47,29 @@ from pteron.kernels.entries import (
     Output as Output,
     Outputs,
     Symbols as Symbols,
-    of_state,
-    row,
-    stacked,
+    as_vector,
+    equation_entry,
     state,
+    state_entry,
 )
 from pteron.kernels.pose_functions import platform_points
 
 _SAMPLE = (*MOTION, "joints", "joint_rates", "memory", "gains")
 
 
-def _shaped(matrix: Expression) -> tuple[Expression, tuple[int, ...]]:
+def _as_matrix(matrix: Expression) -> tuple[Expression, tuple[int, ...]]:
     """Return an expression as a matrix, also where it has one column."""
     return matrix, matrix.shape
 
 
 def _set_payload(m: Machine, v: Symbols) -> Outputs:
-    platform, given = m.robot.platform, v["parameters"]
+    platform, inertial = m.robot.platform, v["parameters"]
     # What a platform that slides carries is on its axis.
     center = ca.SX(3, 1) if platform.slides else v["center"]
     inertia = ca.vertsplit(v["inertia"])
     load = carried_values(type(platform.inertia), v["mass"], ca.vertsplit(center), inertia)
-    start = given.shape[0] - len(load)  # the platform's are the last
-    return {"loaded_parameters": ca.vertcat(given[:start], given[start:] + ca.vertcat(*load))}
+    start = inertial.shape[0] - len(load)  # the platform's are the last
+    return {"loaded_parameters": ca.vertcat(inertial[:start], inertial[start:] + ca.vertcat(*load))}
 
 
 def _rigid(m: Machine, v: Symbols, at: Any) -> Expression:
@@ -82,62 +82,64 @@ def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
     return {"forces": _rigid(m, v, state(m, v))}
 
 
-def _under_forces(m: Machine, v: Symbols) -> Any:
+def _dynamics_arguments(m: Machine, v: Symbols) -> Any:
     """Return pose, velocity, forces, parameters and wrench."""
     wrench = v.get("wrench", ca.SX.zeros(m.wrench_size))
     return v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
 
 
 def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
-    return {"acceleration": lagrangian.forward_dynamics(m, *_under_forces(m, v))}
+    return {"acceleration": lagrangian.forward_dynamics(m, *_dynamics_arguments(m, v))}
 
 
 def _drive_forces(m: Machine, v: Symbols, *, smooth: bool) -> Outputs:
-    at, own = state(m, v), drives.Drives.of(v["drives"])
+    at, drive_numbers = state(m, v), drives.Drives.from_vector(v["drives"])
     moving = drives.joint_motion(at)
-    return {"forces": _rigid(m, v, at) + drives.drive_forces(own, *moving, smooth=smooth)}
+    return {"forces": _rigid(m, v, at) + drives.drive_forces(drive_numbers, *moving, smooth=smooth)}
 
 
 def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
     moving = v["joint_rates"], v["joint_accelerations"]
-    found, *_ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
-    at = m.state(found, *kinematics.platform_rates(m, found, *moving))
-    own = drives.drive_forces(drives.Drives.of(v["drives"]), *moving, smooth=True)
-    return {"forces": _rigid(m, v, at) + own, "found": found}
+    pose, *_ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
+    at = m.state(pose, *kinematics.platform_rates(m, pose, *moving))
+    drive_loads = drives.drive_forces(drives.Drives.from_vector(v["drives"]), *moving, smooth=True)
+    return {"forces": _rigid(m, v, at) + drive_loads, "found": pose}
 
 
 def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
-    own = drives.Drives.of(v["drives"])
-    return {"acceleration": drives.drive_accelerations(m, *(*_under_forces(m, v), own))}
+    drive_numbers = drives.Drives.from_vector(v["drives"])
+    return {
+        "acceleration": drives.drive_accelerations(m, *(*_dynamics_arguments(m, v), drive_numbers))
+    }
 
 
-def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
+def _control_outputs(m: Machine, v: Symbols, *, what: str) -> Outputs:
     """Return a control law's forces and next memory; an adaptive law takes no parameters."""
     selection = v.get("selection", ca.SX(len(m.parameters), 0))
-    estimates = control.estimated(what, m.freedom, selection.shape[1])
+    estimates = control.estimate_count(what, m.freedom, selection.shape[1])
     gains, memory = (
-        control.split(v[name], control.lengths(parts[what], m.freedom, estimates))
+        control.split_parts(v[name], control.lengths(parts[what], m.freedom, estimates))
         for name, parts in (("gains", control.GAINS), ("memory", control.MEMORY))
     )
     sample = control.Sample(
         m,
-        control.Wanted(v["pose"], v["velocity"], v["acceleration"]),
+        control.DesiredMotion(v["pose"], v["velocity"], v["acceleration"]),
         v["joints"],
         v["joint_rates"],
         gains,
         memory,
-        drives.Drives.of(v["drives"]),
+        drives.Drives.from_vector(v["drives"]),
         v.get("parameters", ca.SX.nan(len(m.parameters))),
         selection,
         TYPE_II,
     )
-    forces, kept = LAWS[what](sample)
-    return {"forces": forces, "next_memory": ca.vertcat(*(kept[name] for name in memory))}
+    forces, next_memory = LAWS[what](sample)
+    return {"forces": forces, "next_memory": ca.vertcat(*(next_memory[name] for name in memory))}
 
 
 def _law(name: str) -> Entry:
     known = () if "learnt" in control.MEMORY[name] else ("parameters",)
-    return Entry((*_SAMPLE, *known, "drives"), partial(_controlled, what=name), HELD)
+    return Entry((*_SAMPLE, *known, "drives"), partial(_control_outputs, what=name), NEEDS_TYPE_II)
 
 
 def _forces(m: Machine, v: Symbols, *, name: str) -> Outputs:
@@ -147,7 +149,7 @@ def _forces(m: Machine, v: Symbols, *, name: str) -> Outputs:
 
 def _regressor(m: Machine, v: Symbols) -> Outputs:
     selection = v.get("selection", ca.SX.eye(len(m.parameters)))
-    return {"regressor": _shaped(inverse_dynamics(m, state(m, v), selection))}
+    return {"regressor": _as_matrix(inverse_dynamics(m, state(m, v), selection))}
 
 
 def _paper_terms(m: Machine, v: Symbols) -> Outputs:
@@ -169,27 +171,31 @@ _OF_JOINTS = ("joints", "joint_rates", "joint_accelerations", "pose", "parameter
 
 TABLE |= {
     "passive_friction": Entry(
-        RATE, lambda m, v: {"forces": _shaped(passive_friction(m, state(m, v)))}, HELD
+        RATE, lambda m, v: {"forces": _as_matrix(passive_friction(m, state(m, v)))}, NEEDS_TYPE_II
     ),
     "set_payload": Entry(("mass", "center", "inertia", "parameters"), _set_payload),
-    "inverse_dynamics": Entry(_LOADED, _inverse_dynamics, HELD),
-    "forward_dynamics": Entry(_PUSHED, _forward_dynamics, MOVED),
-    "drive_forces": Entry(_DRIVEN, partial(_drive_forces, smooth=False), HELD),
-    "feed_forward": Entry(_DRIVEN, partial(_drive_forces, smooth=True), HELD),
+    "inverse_dynamics": Entry(_LOADED, _inverse_dynamics, NEEDS_TYPE_II),
+    "forward_dynamics": Entry(_PUSHED, _forward_dynamics, NEEDS_ANGLES),
+    "drive_forces": Entry(_DRIVEN, partial(_drive_forces, smooth=False), NEEDS_TYPE_II),
+    "feed_forward": Entry(_DRIVEN, partial(_drive_forces, smooth=True), NEEDS_TYPE_II),
     "joint_feed_forward": Entry(_OF_JOINTS, _joint_feed_forward),
-    "drive_accelerations": Entry((*_PUSHED, "drives"), _drive_accelerations, MOVED),
+    "drive_accelerations": Entry((*_PUSHED, "drives"), _drive_accelerations, NEEDS_ANGLES),
     **{name: _law(name) for name in LAWS},
-    "mass_matrix": row(lagrangian.mass_matrix, _AT_REST, "mass", BENT),
-    "coriolis_matrix": row(lagrangian.coriolis_matrix, _MOVING, "coriolis", BENT),
-    "bias_forces": Entry(_MOVING, partial(_forces, name="bias"), BENT),
-    "gravity_forces": Entry(_AT_REST, partial(_forces, name="gravity"), BENT),
-    "kinetic_energy": row(lagrangian.kinetic_energy, _MOVING, "energy", BENT),
-    "potential_energy": row(lagrangian.potential_energy, _AT_REST, "energy", REACHED),
-    **dict.fromkeys(("regressor", "base_regressor"), Entry(MOTION, _regressor, HELD)),
-    "paper_regressor": Entry(
-        MOTION, lambda m, v: {"regressor": regressor.paper_regressor(m, state(m, v))}, HELD
+    "mass_matrix": equation_entry(lagrangian.mass_matrix, _AT_REST, "mass", NEEDS_TYPE_I),
+    "coriolis_matrix": equation_entry(
+        lagrangian.coriolis_matrix, _MOVING, "coriolis", NEEDS_TYPE_I
     ),
-    "paper_terms": Entry(MOTION, _paper_terms, BENT),
+    "bias_forces": Entry(_MOVING, partial(_forces, name="bias"), NEEDS_TYPE_I),
+    "gravity_forces": Entry(_AT_REST, partial(_forces, name="gravity"), NEEDS_TYPE_I),
+    "kinetic_energy": equation_entry(lagrangian.kinetic_energy, _MOVING, "energy", NEEDS_TYPE_I),
+    "potential_energy": equation_entry(
+        lagrangian.potential_energy, _AT_REST, "energy", NEEDS_REACH
+    ),
+    **dict.fromkeys(("regressor", "base_regressor"), Entry(MOTION, _regressor, NEEDS_TYPE_II)),
+    "paper_regressor": Entry(
+        MOTION, lambda m, v: {"regressor": regressor.paper_regressor(m, state(m, v))}, NEEDS_TYPE_II
+    ),
+    "paper_terms": Entry(MOTION, _paper_terms, NEEDS_TYPE_I),
 }
 
 FUNCTIONS = tuple(TABLE)
@@ -202,23 +208,23 @@ INTERNAL = ("driven_motion",)
 def _driven_motion(m: Machine, v: Symbols) -> Outputs:
     kind: transmissions.DriveKind = v["kind"]
     sides = sticking.Sides(v["side"], v["hold"], v["brake"]) if kind.dry else None
-    own = drives.Drives.of(v["drives"])
+    drive_numbers = drives.Drives.from_vector(v["drives"])
     if not kind.stribeck:  # a sixth of the operations less
-        own = own._replace(stribeck=ca.SX.zeros(*own.stribeck.shape))
-    none = ca.SX.zeros(m.freedom)
-    states = {name: v.get(name, none) for name in ("motor", "motor_rate", "current", "bristle")}
+        drive_numbers = drive_numbers._replace(stribeck=ca.SX.zeros(*drive_numbers.stribeck.shape))
+    zero = ca.SX.zeros(m.freedom)
+    states = {name: v.get(name, zero) for name in ("motor", "motor_rate", "current", "bristle")}
     numbers = transmissions.Actuators(kind, v["actuators"])
     motors = sticking.Motors(kind, numbers, **states, pace=v.get("pace", ca.SX(0)))
-    given = v["pose"], v["velocity"], v["forces"], v["parameters"], v["wrench"]
-    return dict(sticking.moved(m, *given, own, motors, sides))
+    dynamics = v["pose"], v["velocity"], v["forces"], v["parameters"], v["wrench"]
+    return dict(sticking.stick_slip_rates(m, *dynamics, drive_numbers, motors, sides))
 
 
-def _sensed(at: Any) -> Any:
+def _sensed_joints(at: Any) -> Any:
     return control.coordinates(at), drives.joint_motion(at)[0]
 
 
 def _geometric_index(m: Machine, v: Symbols, *, what: str) -> Outputs:
-    return {"value": indices.OF_GEOMETRY[what](m, state(m, v))}
+    return {"value": indices.GEOMETRIC_INDICES[what](m, state(m, v))}
 
 
 def _kappa(m: Machine, v: Symbols) -> Outputs:
@@ -227,31 +233,33 @@ def _kappa(m: Machine, v: Symbols) -> Outputs:
 
 
 def _homogeneous_jacobian(m: Machine, v: Symbols) -> Outputs:
-    found = indices.homogeneous(m, state(m, v))
-    return {"jacobian": found.matrix, "length": found.length}
+    homogeneous = indices.homogeneous(m, state(m, v))
+    return {"jacobian": homogeneous.matrix, "length": homogeneous.length}
 
 
-def _padded(columns: Sequence[Expression], count: int) -> Expression:
+def _pad_rows(columns: Sequence[Expression], count: int) -> Expression:
     """Return columns as rows (count, k), NaN where there are too few."""
     rows = ca.horzcat(*columns).T
     return ca.vertcat(rows, ca.SX.nan(count - rows.shape[0], rows.shape[1]))
 
 
 def _reactions(m: Machine, v: Symbols) -> Outputs:
-    found = reactions.equilibrium(m, state(m, v), v["parameters"])
-    wrenches = [[ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in found.legs]
+    equilibrium = reactions.equilibrium(m, state(m, v), v["parameters"])
+    wrenches = [
+        [ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in equilibrium.legs
+    ]
     points, passed = (
-        ca.vertcat(*(_padded(rows, max(map(len, columns))) for rows in columns))
-        for columns in ([leg.points for leg in found.legs], wrenches)
+        ca.vertcat(*(_pad_rows(rows, max(map(len, columns))) for rows in columns))
+        for columns in ([leg.points for leg in equilibrium.legs], wrenches)
     )
     return {
-        "rows": _shaped(found.rows),
-        "right": found.right,
-        "presumed_rows": _shaped(found.presumed_rows),
-        "presumed_right": stacked(found.presumed_right),
-        "loads": _shaped(found.loads),
-        "driven_rows": _shaped(found.driven_rows),
-        "driven": found.driven,
+        "rows": _as_matrix(equilibrium.rows),
+        "right": equilibrium.right,
+        "presumed_rows": _as_matrix(equilibrium.presumed_rows),
+        "presumed_right": as_vector(equilibrium.presumed_right),
+        "loads": _as_matrix(equilibrium.loads),
+        "driven_rows": _as_matrix(equilibrium.driven_rows),
+        "driven": equilibrium.driven,
         "ends": platform_points(m, v["pose"]),
         "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
         "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
@@ -259,32 +267,36 @@ def _reactions(m: Machine, v: Symbols) -> Outputs:
 
 
 def _beams(m: Machine, v: Symbols) -> Outputs:
-    found = reactions.beams(m, state(m, v))
-    *links, couples = found._asdict().items()
-    return {**dict(links), "couples": _shaped(ca.horzcat(*couples[1]).T)}
+    beams = reactions.beams(m, state(m, v))
+    *links, couples = beams._asdict().items()
+    return {**dict(links), "couples": _as_matrix(ca.horzcat(*couples[1]).T)}
 
 
-_DEFINED = (
+_DEFINED_AT_TYPE_II = (
     *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
     *("force_least", "turning_moment", "pressure_angle", "output_pressure_angle"),
 )
 """The indices of geometry that are defined at type-II singularities too, if only as infinite."""
 
 TABLE |= {
-    "driven_motion": Entry((*_PUSHED, "drives"), _driven_motion, MOVED),
-    "sensed": of_state(_sensed, RATE, "joints rates", BENT),
+    "driven_motion": Entry((*_PUSHED, "drives"), _driven_motion, NEEDS_ANGLES),
+    "sensed": state_entry(_sensed_joints, RATE, "joints rates", NEEDS_TYPE_I),
     **{
-        name: Entry(POSE, partial(_geometric_index, what=name), BENT if name in _DEFINED else HELD)
-        for name in indices.OF_GEOMETRY
+        name: Entry(
+            POSE,
+            partial(_geometric_index, what=name),
+            NEEDS_TYPE_I if name in _DEFINED_AT_TYPE_II else NEEDS_TYPE_II,
+        )
+        for name in indices.GEOMETRIC_INDICES
     },
-    "kappa": Entry(_AT_REST, _kappa, BENT),
-    "homogeneous_jacobian": Entry(POSE, _homogeneous_jacobian, ROWS),
-    "reactions": Entry(_LOADED, _reactions, HELD),
-    "beams": Entry(POSE, _beams, BENT),
-    "standing": row(kinematics.standing, POSE, "standing way"),
+    "kappa": Entry(_AT_REST, _kappa, NEEDS_TYPE_I),
+    "homogeneous_jacobian": Entry(POSE, _homogeneous_jacobian, NEEDS_CONSTANT_ROWS),
+    "reactions": Entry(_LOADED, _reactions, NEEDS_TYPE_II),
+    "beams": Entry(POSE, _beams, NEEDS_TYPE_I),
+    "standing": equation_entry(kinematics.pose_status, POSE, "standing way"),
 }
 
 
 def needs_of(what: str) -> tuple[Need, ...]:
-    """Return the conditions on the pose under which a function's result counts."""
+    """Return the conditions on the pose under which a function's result is valid."""
     return TABLE[what].needs

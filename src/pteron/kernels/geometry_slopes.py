@@ -13,8 +13,8 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
-from pteron.kernels.choice import Adaptive, adaptive
-from pteron.kernels.kept import Program, kept
+from pteron.kernels.choice import TieredKernel, tiered_kernel
+from pteron.kernels.program_cache import Program, cached_program
 from pteron.kernels.programs import bare
 from pteron.manipulator import Manipulator, RobotLike
 
@@ -30,10 +30,10 @@ def slopes_program(robot: RobotLike) -> Program:
     the geometry.
     """
     layout = bare(robot)
-    return kept(_key(layout), lambda: _built(layout))
+    return cached_program(_key(layout), lambda: _build_program(layout))
 
 
-def slopes_kernel(robot: RobotLike) -> Adaptive:
+def slopes_kernel(robot: RobotLike) -> TieredKernel:
     """Return the kernel of that function."""
     return _kernel(bare(robot))
 
@@ -48,7 +48,7 @@ def slope_columns(robot: Manipulator) -> list[range]:
     sizes = [sum(len(q.value) for q in leg.quantities) + 6 for leg in robot.legs]
     total, most = sum(sizes), max(sizes)
     if robot.platform.turning_keys:
-        total += 9 + sum(len(value) for value in robot.platform.quantities.values())
+        total += 9 + sum(len(vector) for vector in robot.platform.quantities.values())
     if robot.platform.planes or robot.platform.turning_keys:
         return [range(total)] * len(sizes)
     starts = (min(start, total - most) for start in accumulate(sizes[:-1], initial=0))
@@ -56,22 +56,22 @@ def slope_columns(robot: Manipulator) -> list[range]:
 
 
 @lru_cache(maxsize=16)
-def _kernel(layout: Manipulator) -> Adaptive:
-    return adaptive(_key(layout), lambda: _built(layout))
+def _kernel(layout: Manipulator) -> TieredKernel:
+    return tiered_kernel(_key(layout), lambda: _build_program(layout))
 
 
 def _key(layout: Manipulator) -> tuple[str, Manipulator]:
     return "geometry_slopes", layout
 
 
-def _built(layout: Manipulator) -> Program:
-    machine, geometry = Machine.symbols(layout)
+def _build_program(layout: Manipulator) -> Program:
+    machine, geometry = Machine.symbolic(layout)
     pose = ca.SX.sym("pose", layout.freedom)
     state = machine.state(pose)
     joints = ca.vertcat(*(leg.coordinate for leg in state.legs))
     slopes = ca.jacobian(joints, geometry)
     parts = [slopes[i, list(part)] for i, part in enumerate(slope_columns(layout))]
-    found: dict[str, Expression] = {
+    outputs: dict[str, Expression] = {
         "joints": joints,
         "jacobian": ca.jacobian(joints, pose),
         "slopes": ca.vertcat(*parts),
@@ -82,9 +82,11 @@ def _built(layout: Manipulator) -> Program:
     if layout.platform.planes or layout.platform.turning_keys:
         axes = ca.horzsplit(state.platform.axes)
         count = slope_columns(layout)[0].stop
-        moved = ca.jacobian(state.platform.body.position, geometry)[:, :count]
-        turned = [ca.jacobian(axis, geometry)[:, :count] for axis in axes]
-        pairs = zip(axes, turned, strict=True)
-        found["shifts"] = ca.vertcat(moved, sum(ca.mtimes(ca.skew(a), da) for a, da in pairs) / 2)
-    given = {"geometry": geometry, "pose": pose}
-    return Program.of_named("geometry_slopes", given, found, shared=("geometry",))
+        point_slopes = ca.jacobian(state.platform.body.position, geometry)[:, :count]
+        axis_slopes = [ca.jacobian(axis, geometry)[:, :count] for axis in axes]
+        pairs = zip(axes, axis_slopes, strict=True)
+        outputs["shifts"] = ca.vertcat(
+            point_slopes, sum(ca.mtimes(ca.skew(a), da) for a, da in pairs) / 2
+        )
+    inputs = {"geometry": geometry, "pose": pose}
+    return Program.from_symbols("geometry_slopes", inputs, outputs, shared=("geometry",))

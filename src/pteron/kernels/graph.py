@@ -87,13 +87,13 @@ class Graph:
 
         `inputs` gives those of the inputs, by port and element.
         """
-        found: list[Value] = []
+        computed: list[Value] = []
         for node in self.nodes:
             if node.operation == INPUT:
-                found.append(inputs(*node.arguments))
+                computed.append(inputs(*node.arguments))
             else:
-                found.append(rule(node, [found[k] for k in node.arguments]))
-        return found
+                computed.append(rule(node, [computed[k] for k in node.arguments]))
+        return computed
 
     def results(self, values: Sequence[Value]) -> list[list[Value]]:
         """Return the elements of each output, of the nodes' values."""
@@ -115,8 +115,8 @@ def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
             nodes.append(node)
         return seen[key]
 
-    def constant(value: float) -> int:
-        return add(Node(CONSTANT, value=value, shared=True))
+    def constant(number: float) -> int:
+        return add(Node(CONSTANT, value=number, shared=True))
 
     for k in range(function.n_instructions()):
         code = function.instruction_id(k)
@@ -152,23 +152,25 @@ def expression(node: Node, arguments: Sequence[Expression]) -> Expression:
     return make(_CODES.get(node.operation) or int(node.operation), *arguments)
 
 
-def rewritten(function: ca.Function, rules: Mapping[str, Callable[..., Expression]]) -> ca.Function:
-    """Return a function in which other expressions take the place of some operations."""
+def rewrite_operations(
+    function: ca.Function, rules: Mapping[str, Callable[..., Expression]]
+) -> ca.Function:
+    """Return a function with some operations replaced by the expressions of rules."""
     graph = graph_of(function)
     if not any(node.operation in rules for node in graph.nodes):
         return function
     entries = [symbol.nonzeros() for symbol in function.sx_in()]
 
     def rule(node: Node, arguments: list[Expression]) -> Expression:
-        own = rules.get(node.operation)
-        return own(*arguments) if own else expression(node, arguments)
+        replacement = rules.get(node.operation)
+        return replacement(*arguments) if replacement else expression(node, arguments)
 
-    values = graph.values(lambda i, j: entries[i][j], rule)
-    return function_like(function, graph.results(values))
+    computed = graph.values(lambda i, j: entries[i][j], rule)
+    return function_like(function, graph.results(computed))
 
 
 def function_like(
-    given: ca.Function,
+    model: ca.Function,
     elements: Sequence[Sequence[Expression]],
     inputs: Sequence[Expression] | None = None,
     *,
@@ -176,11 +178,9 @@ def function_like(
 ) -> ca.Function:
     """Return a function with the names and the sparsities of another, its outputs' elements new.
 
-    Equal expressions become one; `once` says that they are already, which saves the search.
+    Common subexpressions are merged; `once` asserts that they are already, which saves the search.
     """
-    outputs = [
-        ca.SX(given.sparsity_out(i), ca.vertcat(*values)) for i, values in enumerate(elements)
-    ]
-    arguments = given.sx_in() if inputs is None else inputs
-    names = given.name_in(), given.name_out()
-    return ca.Function(given.name(), arguments, outputs if once else ca.cse(outputs), *names)
+    outputs = [ca.SX(model.sparsity_out(i), ca.vertcat(*parts)) for i, parts in enumerate(elements)]
+    arguments = model.sx_in() if inputs is None else inputs
+    names = model.name_in(), model.name_out()
+    return ca.Function(model.name(), arguments, outputs if once else ca.cse(outputs), *names)

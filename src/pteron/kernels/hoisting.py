@@ -8,11 +8,11 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.kernels.graph import Node, expression, function_like, graph_of
-from pteron.kernels.kept import Program
+from pteron.kernels.program_cache import Program
 
 
-def hoisted(program: Program, name: str) -> tuple[Program, ca.Function]:
-    """Return a program without the work that depends on its input x alone, and that work.
+def hoist_invariants(program: Program, name: str) -> tuple[Program, ca.Function]:
+    """Return a program without the operations on its input x alone, and the function of these.
 
     They are functions `first` and `second` with function(..., x, ...) = first(..., second(x), ...):
     second(x) has the largest subexpressions of x. Inputs and outputs keep their names and order.
@@ -24,20 +24,20 @@ def hoisted(program: Program, name: str) -> tuple[Program, ca.Function]:
     graph = graph_of(function, tuple(ports))
     numbers: dict[int, tuple[Expression, Expression]] = {}
 
-    def outside(k: int, value: Expression) -> Expression:
+    def symbol_of(k: int, computed: Expression) -> Expression:
         """Return a node's value as the first function sees it."""
-        if not graph.nodes[k].shared or value.is_constant():
-            return value
-        return numbers.setdefault(k, (value, ca.SX.sym(f"n{len(numbers)}")))[1]
+        if not graph.nodes[k].shared or computed.is_constant():
+            return computed
+        return numbers.setdefault(k, (computed, ca.SX.sym(f"n{len(numbers)}")))[1]
 
-    def rule(node: Node, values: list[Expression]) -> Expression:
+    def rule(node: Node, computed: list[Expression]) -> Expression:
         if not node.shared:
-            values = [outside(k, v) for k, v in zip(node.arguments, values, strict=True)]
-        return expression(node, values)
+            computed = [symbol_of(k, v) for k, v in zip(node.arguments, computed, strict=True)]
+        return expression(node, computed)
 
-    values = graph.values(lambda i, j: symbols[i].nonzeros()[j], rule)
-    results = [[outside(k, values[k]) for k in nodes] for nodes in graph.outputs]
-    made = ca.Function(
+    computed = graph.values(lambda i, j: symbols[i].nonzeros()[j], rule)
+    results = [[symbol_of(k, computed[k]) for k in nodes] for nodes in graph.outputs]
+    hoisted_function = ca.Function(
         name, [symbols[place]], [ca.densify(ca.vertcat(*(v for v, _ in numbers.values())))]
     )
     inputs = list(symbols)
@@ -45,4 +45,4 @@ def hoisted(program: Program, name: str) -> tuple[Program, ca.Function]:
     ports = list(program.inputs)
     ports[place] = replace(ports[place], shape=(len(numbers),))
     first = function_like(function, results, inputs)
-    return replace(program, function=first, inputs=tuple(ports)), made
+    return replace(program, function=first, inputs=tuple(ports)), hoisted_function

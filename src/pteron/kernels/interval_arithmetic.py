@@ -29,7 +29,7 @@ Bound = Any
 """An array (B,), or a number that serves the whole batch."""
 
 Mask = NDArray[np.bool_] | None
-"""For each box, whether something holds of it; None where it holds of no box."""
+"""A flag for each box; None if all are False."""
 
 _ULP = 2.0**-52
 """Share of itself by which a bound from + - * / or a root is widened."""
@@ -57,11 +57,11 @@ class Interval(NamedTuple):
     """Boxes in which it may jump."""
 
 
-def constant(value: float) -> Interval:
+def constant(number: float) -> Interval:
     """Return a number as an interval; NaN is defined nowhere."""
-    if np.isnan(value):
+    if np.isnan(number):
         return Interval(-np.inf, np.inf, *(np.ones(1, bool) for _ in range(3)))
-    return Interval(value, value)
+    return Interval(number, number)
 
 
 def either(a: Mask, b: Mask) -> Mask:
@@ -69,38 +69,38 @@ def either(a: Mask, b: Mask) -> Mask:
     return b if a is None else a if b is None else a | b
 
 
-def _marks(*given: Interval) -> tuple[Mask, Mask, Mask]:
-    maybe, never, jump = given[0][2:]
-    for other in given[1:]:
+def _marks(*intervals: Interval) -> tuple[Mask, Mask, Mask]:
+    maybe, never, jump = intervals[0][2:]
+    for other in intervals[1:]:
         maybe, never = either(maybe, other.maybe), either(never, other.never)
         jump = either(jump, other.jump)
     return maybe, never, jump
 
 
-def _below(x: Bound) -> Bound:
+def _round_down(x: Bound) -> Bound:
     return x - np.abs(x) * _ULP
 
 
-def _above(x: Bound) -> Bound:
+def _round_up(x: Bound) -> Bound:
     return x + np.abs(x) * _ULP
 
 
-def _well_below(x: Bound, share: float = _ULP) -> Bound:
+def _lower_bound(x: Bound, share: float = _ULP) -> Bound:
     return x - (np.abs(x) * share + _UNDERFLOW)
 
 
-def _well_above(x: Bound, share: float = _ULP) -> Bound:
+def _upper_bound(x: Bound, share: float = _ULP) -> Bound:
     return x + (np.abs(x) * share + _UNDERFLOW)
 
 
 def add(a: Interval, b: Interval) -> Interval:
     """Return a + b."""
-    return Interval(_below(a.low + b.low), _above(a.high + b.high), *_marks(a, b))
+    return Interval(_round_down(a.low + b.low), _round_up(a.high + b.high), *_marks(a, b))
 
 
 def subtract(a: Interval, b: Interval) -> Interval:
     """Return a - b."""
-    return Interval(_below(a.low - b.high), _above(a.high - b.low), *_marks(a, b))
+    return Interval(_round_down(a.low - b.high), _round_up(a.high - b.low), *_marks(a, b))
 
 
 def negate(a: Interval) -> Interval:
@@ -117,32 +117,32 @@ def multiply(a: Interval, b: Interval) -> Interval:
         least, most = (_finite_product(end, b.low) for end in ends)
     else:
         products = [x * y for x in a[:2] for y in b[:2]]
-        least, most = _least(products), _most(products)
+        least, most = _least_of(products), _greatest_of(products)
         if np.isnan(np.sum(least)):  # as each is where one of the products is
             products = [_finite_product(x, y) for x in a[:2] for y in b[:2]]
-            least, most = _least(products), _most(products)
-    return Interval(_well_below(least), _well_above(most), *_marks(a, b))
+            least, most = _least_of(products), _greatest_of(products)
+    return Interval(_lower_bound(least), _upper_bound(most), *_marks(a, b))
 
 
 def _finite_product(x: Bound, y: Bound) -> Bound:
     """Return x y, where zero times an infinite bound, which stands for finite values, is zero."""
-    found = x * y
-    return np.where((x == 0.0) | (y == 0.0), 0.0, found) if np.isnan(np.sum(found)) else found
+    product = x * y
+    return np.where((x == 0.0) | (y == 0.0), 0.0, product) if np.isnan(np.sum(product)) else product
 
 
-def _least(values: list[Bound]) -> Bound:
-    return np.minimum(np.minimum(values[0], values[1]), np.minimum(values[2], values[3]))
+def _least_of(bounds: list[Bound]) -> Bound:
+    return np.minimum(np.minimum(bounds[0], bounds[1]), np.minimum(bounds[2], bounds[3]))
 
 
-def _most(values: list[Bound]) -> Bound:
-    return np.maximum(np.maximum(values[0], values[1]), np.maximum(values[2], values[3]))
+def _greatest_of(bounds: list[Bound]) -> Bound:
+    return np.maximum(np.maximum(bounds[0], bounds[1]), np.maximum(bounds[2], bounds[3]))
 
 
 def square(a: Interval) -> Interval:
     """Return a a, which is not negative."""
     size = absolute(a)
-    low = np.maximum(_well_below(size.low * size.low), 0.0)
-    return Interval(low, _well_above(size.high * size.high), *a[2:])
+    low = np.maximum(_lower_bound(size.low * size.low), 0.0)
+    return Interval(low, _upper_bound(size.high * size.high), *a[2:])
 
 
 def divide(a: Interval, b: Interval) -> Interval:
@@ -150,12 +150,12 @@ def divide(a: Interval, b: Interval) -> Interval:
     zero = np.logical_not((b.low > 0.0) | (b.high < 0.0))
     if not np.any(zero):
         quotients = [x / y for x in a[:2] for y in b[:2]]
-        least, most = _least(quotients), _most(quotients)
-        return Interval(_well_below(least), _well_above(most), *_marks(a, b))
+        least, most = _least_of(quotients), _greatest_of(quotients)
+        return Interval(_lower_bound(least), _upper_bound(most), *_marks(a, b))
     # 1 / b is all of one side where b is zero at an end alone; else it may be anything.
     low = np.where(zero & (b.low < 0.0), -np.inf, 1.0 / np.where(b.high == 0.0, np.nan, b.high))
     high = np.where(zero & (b.high > 0.0), np.inf, 1.0 / np.where(b.low == 0.0, np.nan, b.low))
-    inverse = Interval(_well_below(low), _well_above(high))
+    inverse = Interval(_lower_bound(low), _upper_bound(high))
     maybe, never, jump = _marks(a, b)
     nowhere = (b.low == 0.0) & (b.high == 0.0)
     low, high, *_ = multiply(Interval(a.low, a.high), inverse)
@@ -171,7 +171,7 @@ def root(a: Interval) -> Interval:
     part, none = ~np.atleast_1d(a.low >= 0.0), np.atleast_1d(a.high < 0.0)
     maybe = either(a.maybe, part if part.any() else None)
     never = either(a.never, none if none.any() else None)
-    return Interval(np.maximum(_below(low), 0.0), _above(high), maybe, never, a.jump)
+    return Interval(np.maximum(_round_down(low), 0.0), _round_up(high), maybe, never, a.jump)
 
 
 def absolute(a: Interval) -> Interval:
@@ -187,19 +187,19 @@ def _wave(a: Interval, function: Callable[[Bound], Bound], peak: float) -> Inter
     most = np.maximum(*ends)
     slack = _NEAR * (1.0 + np.abs(a.low) + np.abs(a.high))
 
-    def reached(at: float) -> Bound:
+    def contains_extreme(at: float) -> Bound:
         first = np.floor((a.low - at - slack) / (2.0 * np.pi))
         return first < np.floor((a.high - at + slack) / (2.0 * np.pi))
 
     wide = ~(a.high - a.low < 6.0)
-    low = np.where(wide | reached(peak + np.pi), -1.0, _well_below(least, _LIBM))
-    high = np.where(wide | reached(peak), 1.0, _well_above(most, _LIBM))
+    low = np.where(wide | contains_extreme(peak + np.pi), -1.0, _lower_bound(least, _LIBM))
+    high = np.where(wide | contains_extreme(peak), 1.0, _upper_bound(most, _LIBM))
     return Interval(np.maximum(low, -1.0), np.minimum(high, 1.0), *a[2:])
 
 
 def exponential(a: Interval) -> Interval:
     """Return exp(a)."""
-    low, high = _well_below(np.exp(a.low), _LIBM), _well_above(np.exp(a.high), _LIBM)
+    low, high = _lower_bound(np.exp(a.low), _LIBM), _upper_bound(np.exp(a.high), _LIBM)
     return Interval(np.maximum(low, 0.0), high, *a[2:])
 
 
@@ -209,17 +209,17 @@ def angle(y: Interval, x: Interval) -> Interval:
     angles = [np.arctan2(s + 0.0, c) for s in y[:2] for c in x[:2]]
     crossed = np.atleast_1d((x.low <= 0.0) & (y.low < 0.0) & (y.high >= 0.0))
     around = np.atleast_1d((x.low <= 0.0) & (x.high >= 0.0) & (y.low <= 0.0) & (y.high >= 0.0))
-    whole, most = crossed | around, float(np.nextafter(np.pi, 4.0))
-    low = np.where(whole, -most, _well_below(_least(angles), _LIBM))
-    high = np.where(whole, most, _well_above(_most(angles), _LIBM))
+    full_range, most = crossed | around, float(np.nextafter(np.pi, 4.0))
+    low = np.where(full_range, -most, _lower_bound(_least_of(angles), _LIBM))
+    high = np.where(full_range, most, _upper_bound(_greatest_of(angles), _LIBM))
     maybe, never, jump = _marks(y, x)
-    return Interval(low, high, maybe, never, either(jump, whole if whole.any() else None))
+    return Interval(low, high, maybe, never, either(jump, full_range if full_range.any() else None))
 
 
 def _stepwise(function: Callable[[Bound], Bound], a: Interval) -> Interval:
     """Return a function that grows in steps, such as floor or sign, which jumps between them."""
     low, high = function(a.low), function(a.high)
-    return Interval(low, high, a.maybe, a.never, either(a.jump, _where(low != high)))
+    return Interval(low, high, a.maybe, a.never, either(a.jump, _mask_or_none(low != high)))
 
 
 def minimum(a: Interval, b: Interval) -> Interval:
@@ -232,62 +232,62 @@ def maximum(a: Interval, b: Interval) -> Interval:
     return Interval(np.maximum(a.low, b.low), np.maximum(a.high, b.high), *_marks(a, b))
 
 
-def _where(mask: Any) -> Mask:
+def _mask_or_none(mask: Any) -> Mask:
     mask = np.atleast_1d(mask)
     return mask if mask.any() else None
 
 
-def _truth(surely: Any, surely_not: Any, *given: Interval) -> Interval:
+def _truth(certain: Any, impossible: Any, *intervals: Interval) -> Interval:
     """Return 1 where a test surely holds, 0 where it surely does not, and between them else."""
-    low, high = np.where(surely, 1.0, 0.0), np.where(surely_not, 0.0, 1.0)
-    maybe, never, jump = _marks(*given)
-    return Interval(low, high, maybe, never, either(jump, _where(low != high)))
+    low, high = np.where(certain, 1.0, 0.0), np.where(impossible, 0.0, 1.0)
+    maybe, never, jump = _marks(*intervals)
+    return Interval(low, high, maybe, never, either(jump, _mask_or_none(low != high)))
 
 
-def less(a: Interval, b: Interval) -> Interval:
+def is_less(a: Interval, b: Interval) -> Interval:
     """Return whether a < b."""
     return _truth(a.high < b.low, a.low >= b.high, a, b)
 
 
-def less_equal(a: Interval, b: Interval) -> Interval:
+def is_less_equal(a: Interval, b: Interval) -> Interval:
     """Return whether a <= b."""
     return _truth(a.high <= b.low, a.low > b.high, a, b)
 
 
-def equal(a: Interval, b: Interval) -> Interval:
+def is_equal(a: Interval, b: Interval) -> Interval:
     """Return whether a = b."""
     same = np.logical_and(np.equal(a.low, b.high), np.equal(a.high, b.low))
     return _truth(same, (a.high < b.low) | (a.low > b.high), a, b)
 
 
-def inverted(a: Interval) -> Interval:
+def is_zero(a: Interval) -> Interval:
     """Return whether a is zero, of a test."""
     return _truth((a.low == 0.0) & (a.high == 0.0), (a.low > 0.0) | (a.high < 0.0), a)
 
 
-def holds(a: Interval) -> Interval:
+def is_nonzero(a: Interval) -> Interval:
     """Return whether a is not zero, of a test."""
-    return inverted(inverted(a))
+    return is_zero(is_zero(a))
 
 
-def select(test: Interval, value: Interval) -> Interval:
+def select(test: Interval, chosen: Interval) -> Interval:
     """Return the value where the test holds, else 0."""
-    truth = holds(test)
+    truth = is_nonzero(test)
     on, off = np.atleast_1d(truth.low > 0.0), np.atleast_1d(truth.high < 1.0)
     # Where the value is defined nowhere, 0 is all that may be.
-    zero = off if value.never is None else off | (value.never & ~on)
-    low = np.where(on, value.low, np.where(zero, 0.0, np.minimum(value.low, 0.0)))
-    high = np.where(on, value.high, np.where(zero, 0.0, np.maximum(value.high, 0.0)))
+    zero = off if chosen.never is None else off | (chosen.never & ~on)
+    low = np.where(on, chosen.low, np.where(zero, 0.0, np.minimum(chosen.low, 0.0)))
+    high = np.where(on, chosen.high, np.where(zero, 0.0, np.maximum(chosen.high, 0.0)))
     unsure = ~on & ~off
-    maybe = None if value.maybe is None else value.maybe & ~off
-    never = None if value.never is None else value.never & on
-    jump = None if value.jump is None else value.jump & ~off
+    maybe = None if chosen.maybe is None else chosen.maybe & ~off
+    never = None if chosen.never is None else chosen.never & on
+    jump = None if chosen.jump is None else chosen.jump & ~off
     return Interval(
         low,
         high,
         either(test.maybe, maybe),
         either(test.never, never),
-        either(either(test.jump, jump), _where(unsure)),
+        either(either(test.jump, jump), _mask_or_none(unsure)),
     )
 
 
@@ -307,13 +307,13 @@ RULES: dict[str, Callable[..., Interval]] = {
     "sign": partial(_stepwise, np.sign),
     "fmin": minimum,
     "fmax": maximum,
-    "less": less,
-    "less_equal": less_equal,
-    "equal": equal,
-    "unequal": lambda a, b: inverted(equal(a, b)),
-    "not": inverted,
-    "and": lambda a, b: minimum(holds(a), holds(b)),
-    "or": lambda a, b: maximum(holds(a), holds(b)),
+    "less": is_less,
+    "less_equal": is_less_equal,
+    "equal": is_equal,
+    "unequal": lambda a, b: is_zero(is_equal(a, b)),
+    "not": is_zero,
+    "and": lambda a, b: minimum(is_nonzero(a), is_nonzero(b)),
+    "or": lambda a, b: maximum(is_nonzero(a), is_nonzero(b)),
     "select": select,
 }
 """The rule of each operation of a graph; a product of equal factors is a `square`."""

@@ -53,11 +53,11 @@ class Boxed(Kernel):
     """
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        given = self._by_name(values, fixed)
+        by_port = self._values_by_port(values, fixed)
         arrays = []
         for port in self.ports:
             shape = port.shape if port.shared else (2, *port.shape)
-            arrays.append(as_array(given[port.name], port.name, shape))
+            arrays.append(as_array(by_port[port.name], port.name, shape))
         lead = np.broadcast_shapes(
             *(
                 array.shape[: array.ndim - len(port.shape) - 1]
@@ -72,23 +72,27 @@ class Boxed(Kernel):
                 lows.append(array.reshape(1, -1))
                 highs.append(lows[-1])
                 continue
-            whole = np.broadcast_to(array, (*lead, 2, *port.shape)).reshape(count, 2, -1)
-            if not (whole[:, 0] <= whole[:, 1]).all():
+            boxes = np.broadcast_to(array, (*lead, 2, *port.shape)).reshape(count, 2, -1)
+            if not (boxes[:, 0] <= boxes[:, 1]).all():
                 raise DataError(f"{port.name}: a box's least value is above its greatest, or NaN")
-            lows.append(whole[:, 0])
-            highs.append(whole[:, 1])
+            lows.append(boxes[:, 0])
+            highs.append(boxes[:, 1])
         graph = graph_of(self.function)
-        found = enclosed(graph, [k for nodes in graph.outputs for k in nodes], lows, highs, count)
+        enclosed_nodes = enclose_nodes(
+            graph, [k for nodes in graph.outputs for k in nodes], lows, highs, count
+        )
         ends = np.cumsum([len(nodes) for nodes in graph.outputs])[:-1]
         results = []
         for port, *parts in zip(
-            self.outputs, *(np.split(part, ends, axis=1) for part in found[:3]), strict=True
+            self.outputs,
+            *(np.split(part, ends, axis=1) for part in enclosed_nodes[:3]),
+            strict=True,
         ):
             results.append(Enclosure(*(part.reshape(lead + port.shape) for part in parts)))
         return results[0] if len(results) == 1 else tuple(results)
 
 
-def enclosed(
+def enclose_nodes(
     graph: Graph,
     nodes: Sequence[int],
     lows: Sequence[Array],
@@ -99,29 +103,29 @@ def enclosed(
 
     Only what the nodes depend on is computed.
     """
-    needed = needed_by(graph, nodes)
+    needed = dependencies_of(graph, nodes)
     columns = list(zip(*(_columns(*both) for both in zip(lows, highs, strict=True)), strict=True))
     low, high = np.empty((len(nodes), count)), np.empty((len(nodes), count))
     defined, continuous = (np.ones((len(nodes), count), bool) for _ in range(2))
     with np.errstate(all="ignore"):
         for start in range(0, count, _CHUNK):
             part = slice(start, min(start + _CHUNK, count))
-            values = _walk(graph, needed, columns, part)
+            intervals = _walk(graph, needed, columns, part)
             for row, k in enumerate(nodes):
-                value = values[k]
-                assert value is not None
-                low[row, part], high[row, part] = value.low, value.high
-                _mark(low[row, part], high[row, part], value)
-                if value.maybe is not None:
-                    defined[row, part] = ~value.maybe
-                if value.maybe is not None or value.jump is not None:
-                    jump = arithmetic.either(value.maybe, value.jump)
+                interval = intervals[k]
+                assert interval is not None
+                low[row, part], high[row, part] = interval.low, interval.high
+                _mark(low[row, part], high[row, part], interval)
+                if interval.maybe is not None:
+                    defined[row, part] = ~interval.maybe
+                if interval.maybe is not None or interval.jump is not None:
+                    jump = arithmetic.either(interval.maybe, interval.jump)
                     continuous[row, part] = ~np.asarray(jump)
     return low.T, high.T, defined.T, continuous.T
 
 
 def _columns(low: Array, high: Array) -> tuple[list[Array], list[Array]]:
-    """Return the elements of an input in all boxes, or once where they are the same in all."""
+    """Return the elements of an input in all boxes, or one value where all boxes agree."""
     lows, highs = [], []
     for a, b in zip(low.T, high.T, strict=True):
         alike = len(a) > 0 and bool((a == a[0]).all() and (b == b[0]).all())
@@ -136,56 +140,56 @@ def _walk(
     columns: Sequence[Sequence[Sequence[Array]]],
     part: slice,
 ) -> list[Interval | None]:
-    values: list[Interval | None] = [None] * len(graph.nodes)
+    intervals: list[Interval | None] = [None] * len(graph.nodes)
     for k in needed:
         node = graph.nodes[k]
         if node.operation == INPUT:
             port, element = node.arguments
             low, high = (side[port][element] for side in columns)
-            values[k] = Interval(low, high) if len(low) == 1 else Interval(low[part], high[part])
+            intervals[k] = Interval(low, high) if len(low) == 1 else Interval(low[part], high[part])
         elif node.operation == CONSTANT:
-            values[k] = constant(node.value)
+            intervals[k] = constant(node.value)
         elif node.operation == "mul" and node.arguments[0] == node.arguments[1]:
-            values[k] = arithmetic.square(values[node.arguments[0]])  # type: ignore[arg-type]
+            intervals[k] = arithmetic.square(intervals[node.arguments[0]])  # type: ignore[arg-type]
         elif node.operation not in RULES:
             raise DataError(f"operation {node.operation} has no rule for intervals")
         else:
-            values[k] = RULES[node.operation](*(values[i] for i in node.arguments))
-    return values
+            intervals[k] = RULES[node.operation](*(intervals[i] for i in node.arguments))
+    return intervals
 
 
-def _mark(low: Array, high: Array, value: Interval) -> None:
-    """Say in bounds (B,) where nothing is known, and where there is nothing to know."""
+def _mark(low: Array, high: Array, interval: Interval) -> None:
+    """Set unknown bounds (B,) to infinity, and bounds of undefined outputs to NaN, in place."""
     low[np.isnan(low)], high[np.isnan(high)] = -np.inf, np.inf
-    if value.never is not None:
-        never = np.broadcast_to(value.never, low.shape)
+    if interval.never is not None:
+        never = np.broadcast_to(interval.never, low.shape)
         low[never] = high[never] = np.nan
 
 
-def needed_by(graph: Graph, nodes: Sequence[int]) -> list[int]:
-    """Return the nodes that others depend on, themselves too, in order."""
-    wanted = set(nodes)
+def dependencies_of(graph: Graph, nodes: Sequence[int]) -> list[int]:
+    """Return the nodes on which some nodes depend, including these, in order."""
+    needed = set(nodes)
     for k in range(max(nodes, default=-1), -1, -1):
-        if k in wanted and graph.nodes[k].operation != INPUT:
-            wanted.update(graph.nodes[k].arguments)
-    return sorted(wanted)
+        if k in needed and graph.nodes[k].operation != INPUT:
+            needed.update(graph.nodes[k].arguments)
+    return sorted(needed)
 
 
 def occurs_once(graph: Graph, node: int, moving: Collection[int]) -> bool:
-    """Say whether a node's natural interval is exact, but for rounding: no input occurs twice.
+    """Return whether a node's natural interval is exact up to rounding: no input occurs twice.
 
     Of the first input only the elements in `moving` are intervals; the others are numbers.
     """
     uses: dict[int, int] = {}
     fixed: set[int] = set()
-    for k in needed_by(graph, [node]):
+    for k in dependencies_of(graph, [node]):
         operation, arguments = graph.nodes[k].operation, graph.nodes[k].arguments
         if operation == INPUT:
-            still = arguments[1] not in moving
+            is_fixed = arguments[1] not in moving
         else:
-            still = fixed.issuperset(arguments)
+            is_fixed = fixed.issuperset(arguments)
             for i in set(arguments) - fixed:
                 uses[i] = uses.get(i, 0) + 1
-        if still:
+        if is_fixed:
             fixed.add(k)
     return max(uses.values(), default=0) <= 1

@@ -18,8 +18,8 @@ from pteron.errors import DataError
 from pteron.extras import of_extra
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
-from pteron.kernels.kernel import Kernel, unmasked
-from pteron.kernels.named_columns import by_name
+from pteron.kernels.kernel import Kernel, require_unmasked
+from pteron.kernels.named_columns import pick_columns
 
 _TRUTHS = ("less", "less_equal", "equal", "unequal", "not", "and", "or")
 """Operations whose truth values are made 1.0 or 0.0: in JAX they would not add up as numbers."""
@@ -60,13 +60,13 @@ class Traced(Kernel):
         lines += statements(graph, graph.operations(), names, _PRINTED, "    {0} = {1}")
         results = []
         for port, nodes in zip(self.outputs, graph.outputs, strict=True):
-            values = ", ".join(names[k] for k in nodes)
-            lines.append(f"    {port.name}_out = stack({values})")
+            elements = ", ".join(names[k] for k in nodes)
+            lines.append(f"    {port.name}_out = stack({elements})")
             results.append(f"{port.name}_out")
         return "\n".join([*lines, f"    return {', '.join(results)},\n"])
 
     @cached_property
-    def _traced(self) -> Callable[..., Any]:
+    def _jitted_function(self) -> Callable[..., Any]:
         jax = of_extra("jax", "jax", 'target: "jax" needs JAX')
         jnp = jax.numpy
 
@@ -80,7 +80,7 @@ class Traced(Kernel):
         function = space[self.name]
 
         def evaluate(*values: Any) -> Any:
-            arrays = [jnp.asarray(value, np.dtype(self.dtype)) for value in values]
+            arrays = [jnp.asarray(part, np.dtype(self.dtype)) for part in values]
             lead = jnp.broadcast_shapes(
                 *(
                     array.shape[: array.ndim - len(port.shape)]
@@ -88,32 +88,32 @@ class Traced(Kernel):
                 )
             )
             results = []
-            for value, port in zip(function(*arrays), self.outputs, strict=True):
-                value = jnp.broadcast_to(value, (*lead, value.shape[-1]))
-                results.append(value.reshape(lead + port.shape))
+            for part, port in zip(function(*arrays), self.outputs, strict=True):
+                part = jnp.broadcast_to(part, (*lead, part.shape[-1]))
+                results.append(part.reshape(lead + port.shape))
             return results[0] if len(results) == 1 else tuple(results)
 
         compiled: Callable[..., Any] = jax.jit(evaluate)
         return compiled
 
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
-        traced, given = self._traced, self._by_name(values, fixed)
+        traced, by_port = self._jitted_function, self._values_by_port(values, fixed)
         for port in self.ports:
-            given[port.name] = by_name(
-                unmasked(given[port.name], port.name), port.columns, port.name
+            by_port[port.name] = pick_columns(
+                require_unmasked(by_port[port.name], port.name), port.columns, port.name
             )
-            self._check_digits(port.name, given[port.name])
-            shape = np.shape(given[port.name])
+            self._check_digits(port.name, by_port[port.name])
+            shape = np.shape(by_port[port.name])
             if shape[max(len(shape) - len(port.shape), 0) :] != port.shape:
                 expected = ", ".join(["...", *map(str, port.shape)])
                 raise DataError(f"{port.name}: shape {shape} given, ({expected}) expected")
-        return traced(*(given[port.name] for port in self.ports))
+        return traced(*(by_port[port.name] for port in self.ports))
 
-    def _check_digits(self, name: str, value: Any) -> None:
+    def _check_digits(self, name: str, array: Any) -> None:
         """Refuse an array that JAX has rounded to 32 bits, values and derivatives alike."""
         import jax
 
-        if isinstance(value, jax.Array) and (str(value.dtype), self.dtype) == _ROUNDED:
+        if isinstance(array, jax.Array) and (str(array.dtype), self.dtype) == _ROUNDED:
             raise DataError(
                 f"{name}: a float32 array of JAX given, float64 expected; make it after `compile`, "
                 'or after jax.config.update("jax_enable_x64", True), or compile with '

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import DataError
-from pteron.kernels.named_columns import by_name
+from pteron.kernels.named_columns import pick_columns
 from pteron.shapes import PoseLike
 
 Array = NDArray[np.float64]
@@ -112,10 +112,10 @@ class Kernel(ABC):
         self.call: Callable[..., Any] = self._evaluate
 
     def __repr__(self) -> str:
-        given, found = (
+        input_names, output_names = (
             ", ".join(port.name for port in ports) for ports in (self.inputs, self.outputs)
         )
-        return f"<{type(self).__name__} {self.name}: {given} -> {found}>"
+        return f"<{type(self).__name__} {self.name}: {input_names} -> {output_names}>"
 
     @property
     def operations(self) -> int:
@@ -155,7 +155,7 @@ class Kernel(ABC):
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
         """Do what `call` is asked for; a target may put something faster in its place."""
 
-    def _by_name(self, values: Sequence[Any], fixed: Mapping[str, Any]) -> dict[str, Any]:
+    def _values_by_port(self, values: Sequence[Any], fixed: Mapping[str, Any]) -> dict[str, Any]:
         """Return the value of each port."""
         if len(values) != len(self.inputs):
             names = ", ".join(port.name for port in self.inputs)
@@ -168,12 +168,12 @@ class Kernel(ABC):
                 raise DataError(
                     f"{self.name}: {name!r} cannot be given by name; inputs that can: {known}"
                 )
-        given = {port.name: value for port, value in zip(self.inputs, values, strict=True)}
+        by_port = {port.name: array for port, array in zip(self.inputs, values, strict=True)}
         for name in fixed.keys() & self.made.keys():
             make = self.made[name]
-            whole = as_array(fixed[name], name, (make.size1_in(0),))
-            fixed = {**fixed, name: np.array(make(whole)).ravel()}
-        return {**self.fixed, **fixed, **given}
+            numbers = as_array(fixed[name], name, (make.size1_in(0),))
+            fixed = {**fixed, name: np.array(make(numbers)).ravel()}
+        return {**self.fixed, **fixed, **by_port}
 
 
 class ArrayKernel(Kernel):
@@ -187,23 +187,23 @@ class ArrayKernel(Kernel):
         """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        return self.checked(*values, **fixed)
+        return self.evaluate_checked(*values, **fixed)
 
-    def checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate the kernel, after checking, converting and broadcasting what is given."""
-        given = self._by_name(values, fixed)
+    def evaluate_checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Evaluate the kernel after checking, converting and broadcasting the inputs."""
+        by_port = self._values_by_port(values, fixed)
         for port in self.ports:
-            given[port.name] = as_array(
-                given[port.name], port.name, port.shape, self.dtype, port.columns
+            by_port[port.name] = as_array(
+                by_port[port.name], port.name, port.shape, self.dtype, port.columns
             )
-            if port.shared and given[port.name].shape != port.shape:
+            if port.shared and by_port[port.name].shape != port.shape:
                 raise DataError(
-                    f"{port.name}: shape {given[port.name].shape} given, {port.shape} expected: "
+                    f"{port.name}: shape {by_port[port.name].shape} given, {port.shape} expected: "
                     "one value for all states"
                 )
         lead = broadcast_lead(
             {
-                port.name: given[port.name].shape[: given[port.name].ndim - len(port.shape)]
+                port.name: by_port[port.name].shape[: by_port[port.name].ndim - len(port.shape)]
                 for port in self.ports
                 if not port.shared
             }
@@ -211,15 +211,15 @@ class ArrayKernel(Kernel):
         batch = prod(lead)
         inputs: list[Array] = []
         for port in self.ports:
-            whole = given[port.name]
-            if not port.shared and whole.shape != lead + port.shape:
-                whole = np.broadcast_to(whole, lead + port.shape)
+            array = by_port[port.name]
+            if not port.shared and array.shape != lead + port.shape:
+                array = np.broadcast_to(array, lead + port.shape)
             if port.shared or not self._strided:
-                whole = np.ascontiguousarray(whole)
-            inputs.append(whole.reshape(port.size if port.shared else (batch, port.size)))
+                array = np.ascontiguousarray(array)
+            inputs.append(array.reshape(port.size if port.shared else (batch, port.size)))
         outputs = [np.empty((batch, port.size), dtype=self.dtype) for port in self.outputs]
         if self.threads > 1 and batch >= 2 * SHARE:
-            self._split(batch, inputs, outputs)
+            self._run_in_threads(batch, inputs, outputs)
         else:
             self._run(batch, inputs, outputs)
         results = tuple(
@@ -227,24 +227,26 @@ class ArrayKernel(Kernel):
         )
         return results[0] if len(results) == 1 else results
 
-    def _split(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+    def _run_in_threads(
+        self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]
+    ) -> None:
         """Run slices of the batch in threads; a state's numbers do not depend on its slice."""
         count = min(self.threads, batch // SHARE)
         bounds = [batch * k // count for k in range(count + 1)]
 
         def run(start: int, stop: int) -> None:
-            self._run(stop - start, *sliced(inputs, outputs, start, stop))
+            self._run(stop - start, *slice_states(inputs, outputs, start, stop))
 
         with ThreadPoolExecutor(count) as pool:
             list(pool.map(run, bounds[:-1], bounds[1:]))
 
 
-def sliced(
+def slice_states(
     inputs: Sequence[Array], outputs: Sequence[Array], start: int, stop: int
 ) -> tuple[list[Array], list[Array]]:
     """Return the inputs and outputs of `_run` for the states from `start` to `stop`."""
-    given = [value if value.ndim == 1 else value[start:stop] for value in inputs]
-    return given, [value[start:stop] for value in outputs]
+    parts = [array if array.ndim == 1 else array[start:stop] for array in inputs]
+    return parts, [array[start:stop] for array in outputs]
 
 
 def count_operations(function: ca.Function) -> int:
@@ -257,21 +259,21 @@ def count_operations(function: ca.Function) -> int:
 
 
 def as_array(
-    value: PoseLike,
+    raw: PoseLike,
     name: str,
     shape: tuple[int, ...],
     dtype: str = "float64",
     columns: Sequence[str] = (),
 ) -> Array:
-    """Return `value` as floats whose last axes are `shape`, or say what was expected.
+    """Return an array of floats whose last axes are `shape`; raise where it is none.
 
-    Of a table they are the `columns` of these names.
+    Of a table they are its columns of the names `columns`.
     """
     array: Array
-    if type(value) is np.ndarray and value.dtype == np.dtype(dtype) and value.flags.aligned:
-        array = value
+    if type(raw) is np.ndarray and raw.dtype == np.dtype(dtype) and raw.flags.aligned:
+        array = raw
     else:
-        array = _converted(by_name(value, columns, name), name, dtype)
+        array = _convert_to_floats(pick_columns(raw, columns, name), name, dtype)
     if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:
         expected = ", ".join(["...", *map(str, shape)])
         raise DataError(f"{name}: shape {array.shape} given, ({expected}) expected")
@@ -280,33 +282,33 @@ def as_array(
     return array
 
 
-def _converted(value: ArrayLike, name: str, dtype: str) -> Array:
-    value = unmasked(value, name)
+def _convert_to_floats(raw: ArrayLike, name: str, dtype: str) -> Array:
+    raw = require_unmasked(raw, name)
     try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "iufO":
+        array = np.asarray(raw)
+        if array.dtype.kind not in "iufO":
             raise TypeError
-        if given.dtype.kind == "O" and any(isinstance(v, str | bytes) for v in given.flat):
+        if array.dtype.kind == "O" and any(isinstance(v, str | bytes) for v in array.flat):
             raise TypeError
-        return np.require(given, dtype, "A")
+        return np.require(array, dtype, "A")
     except (TypeError, ValueError, OverflowError):
         raise DataError(f"{name}: not an array of real numbers") from None
 
 
-def unmasked(value: Any, name: str) -> Any:
+def require_unmasked(array: Any, name: str) -> Any:
     """Return a masked array's data, or raise `DataError` if elements are masked; else `value`."""
-    if not isinstance(value, np.ma.MaskedArray):
-        return value
-    if np.ma.is_masked(value):
+    if not isinstance(array, np.ma.MaskedArray):
+        return array
+    if np.ma.is_masked(array):
         raise DataError(
-            f"{name}: {value.size - value.count()} of {value.size} elements are masked; "
+            f"{name}: {array.size - array.count()} of {array.size} elements are masked; "
             "leave those states out, or fill them with NaN: .filled(numpy.nan)"
         )
-    return value.data
+    return array.data
 
 
 def broadcast_lead(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
-    """Return the common shape of the leading axes, or name the inputs that do not agree."""
+    """Return the common shape of the leading axes; raise where they do not broadcast."""
     first, *others = shapes.values()
     if all(shape == first for shape in others):
         return first

@@ -19,13 +19,13 @@ from pteron.equations.transmissions import DriveKind
 from pteron.kernels.blocks import Block
 from pteron.kernels.c import FLAGS, LINKED, SUFFIX, c_compiler, compiler_version
 from pteron.kernels.cache import digest, entry
-from pteron.kernels.code import arithmetic, rendered
-from pteron.kernels.compilers import built
-from pteron.kernels.kept import Program, name_of
+from pteron.kernels.code import arithmetic, render_template
+from pteron.kernels.compilers import compile_library
 from pteron.kernels.kernel import Array
+from pteron.kernels.program_cache import Program, name_of
 
 ROUNDS = 200
-"""Most changes of sides in a step; six joints have 729 sets of them, and a few changes do."""
+"""Maximum number of active-set changes in a step; of 729 sets for six joints a few are visited."""
 
 PARTS = 3
 """Parts of a period: the sensors' look and a late command divide it."""
@@ -42,7 +42,7 @@ GIVEN = (
 RESULTS = (*("states", "acceleration", "joints", "rates", "forces", "asked", "memories"),)
 """Quantities recorded at each sample, where there is an array for them."""
 
-TOLD = {
+LOOP_INPUTS = {
     "pose": "wanted",
     "velocity": "wanted + M",
     "acceleration": "wanted + 2 * M",
@@ -52,10 +52,10 @@ TOLD = {
     "motor_rates": "measured + 3 * N",
     "memory": "memory",
 }
-"""The inputs that a controller may have, and where the loop's C has them."""
+"""The inputs that a controller may have, as expressions of the loop's C."""
 
-_RIGID = {"motors": TOLD["joints"], "motor_rates": TOLD["joint_rates"]}
-"""The same where no transmission bends."""
+_RIGID = {"motors": LOOP_INPUTS["joints"], "motor_rates": LOOP_INPUTS["joint_rates"]}
+"""Motor inputs where no transmission is elastic."""
 
 _ASK = ctypes.CFUNCTYPE(
     None,
@@ -99,21 +99,21 @@ class LinkedLaw:
         """Return the arguments of its call: those that go in, and those that come out."""
         tables = dict(self.tables)
         taken = [
-            tables[port.name] if port.shared else f"given + {block.at[port.name]}"
+            tables[port.name] if port.shared else f"given + {block.first_rows[port.name]}"
             for port in block.program.inputs
         ]
-        return taken + [name for name in ("forces", "next_memory") if name in block.out]
+        return taken + [name for name in ("forces", "next_memory") if name in block.output_rows]
 
     def readings(self, block: Block) -> list[tuple[int, float, float]]:
-        """Return the places of joints and rates among its inputs, with zeros and scales."""
-        rest = (0.0,) * len(self.zeros)
+        """Return the input rows of joints and rates that have readings, with zeros and scales."""
+        zero_rates = (0.0,) * len(self.zeros)
         zeros = dict.fromkeys(("joints", "motors"), self.zeros)
-        zeros |= dict.fromkeys(("joint_rates", "motor_rates"), rest)
+        zeros |= dict.fromkeys(("joint_rates", "motor_rates"), zero_rates)
         return [
-            (block.at[name] + i, zero, scale)
-            for name, own in zeros.items()
-            if name in block.at
-            for i, (zero, scale) in enumerate(zip(own, self.scales, strict=True))
+            (block.first_rows[name] + i, zero, scale)
+            for name, joint_zeros in zeros.items()
+            if name in block.first_rows
+            for i, (zero, scale) in enumerate(zip(joint_zeros, self.scales, strict=True))
             if (zero, scale) != (0.0, 1.0)
         ]
 
@@ -157,20 +157,20 @@ class LoopCode:
         """The C code."""
         plant, _, *laws = self._blocks
         law = laws[0] if laws else None
-        sizes = {port.name: port.size for port in plant.varying}
+        sizes = {port.name: port.size for port in plant.state_inputs}
         freedom = sizes["pose"]
-        rates = [("in", plant.at["velocity"] + j) for j in range(freedom)]
-        rates += [("out", plant.out["acceleration"] + j) for j in range(freedom)]
-        more = []
-        for name, growth in self.kind.more:
-            more.append((name, len(rates), sizes[name]))
-            given = growth in plant.at
-            start = plant.at[growth] if given else plant.out[growth]
-            rates += [("in" if given else "out", start + j) for j in range(sizes[name])]
+        rates = [("in", plant.first_rows["velocity"] + j) for j in range(freedom)]
+        rates += [("out", plant.output_rows["acceleration"] + j) for j in range(freedom)]
+        extra_states = []
+        for name, growth in self.kind.extra_states:
+            extra_states.append((name, len(rates), sizes[name]))
+            is_input = growth in plant.first_rows
+            start = plant.first_rows[growth] if is_input else plant.output_rows[growth]
+            rates += [("in" if is_input else "out", start + j) for j in range(sizes[name])]
         memory = 0
         if law is not None:
-            memory = {port.name: port.size for port in law.varying}.get("memory", 0)
-        return rendered(
+            memory = {port.name: port.size for port in law.state_inputs}.get("memory", 0)
+        return render_template(
             "pteron.kernels",
             "loop.c.j2",
             name=self.plant.name,
@@ -186,20 +186,22 @@ class LoopCode:
             wrench=sizes["wrench"],
             memory=memory,
             rates=rates,
-            more=more,
+            more=extra_states,
             dry=self.kind.dry,
             bends=self.kind.bends,
             elastic=[int(soft) for soft in self.kind.elastic],
             encoders=sizes["forces"] * (2 if self.kind.bends else 1),
             parts=PARTS,
-            told=TOLD if self.kind.bends else TOLD | _RIGID,
+            told=LOOP_INPUTS if self.kind.bends else LOOP_INPUTS | _RIGID,
             rounds=ROUNDS,
             ports=self._names,
         )
 
     @cached_property
     def _names(self) -> list[str]:
-        numbers = (f"{block.name}_{port.name}" for block in self._blocks for port in block.fixed)
+        numbers = (
+            f"{block.name}_{port.name}" for block in self._blocks for port in block.machine_inputs
+        )
         return [*STATE, *GIVEN, *RESULTS, *numbers]
 
     @cached_property
@@ -227,7 +229,7 @@ class LoopCode:
         advice = "set CC to another compiler, or PTERON_KERNELS=vm"
         flags, sources = [*FLAGS, *LINKED], {"loop.c": self.source}
         what = "the simulation's loop"
-        built(c_compiler() or (), flags, sources, folder / _LIBRARY, what, advice)
+        compile_library(c_compiler() or (), flags, sources, folder / _LIBRARY, what, advice)
 
     def run(
         self,
@@ -250,13 +252,13 @@ class LoopCode:
         failures: list[BaseException] = []
         joints = arrays["most"].shape[2]
 
-        def asked(machine: int, sample: int, measured: Any, forces: Any) -> None:
-            into = np.ctypeslib.as_array(forces, (joints,))
-            into[:] = np.nan
+        def answer_request(machine: int, sample: int, measured: Any, forces: Any) -> None:
+            commanded = np.ctypeslib.as_array(forces, (joints,))
+            commanded[:] = np.nan
             if not failures:
-                told = np.ctypeslib.as_array(measured, (2 * joints,)).copy()
+                readings = np.ctypeslib.as_array(measured, (2 * joints,)).copy()
                 try:
-                    into[:] = ask(machine, sample, told)  # type: ignore[misc]
+                    commanded[:] = ask(machine, sample, readings)  # type: ignore[misc]
                 except BaseException as error:
                     failures.append(error)
 
@@ -266,7 +268,7 @@ class LoopCode:
             (ctypes.c_double * len(times))(*times),
             (ctypes.c_long * len(counts))(*counts),
             table,
-            _ASK(asked) if ask is not None else _ASK(),
+            _ASK(answer_request) if ask is not None else _ASK(),
         )
         if failures:
             raise failures[0]

@@ -14,9 +14,9 @@ from pteron.equations.transmissions import DriveKind
 from pteron.errors import ModelError
 from pteron.kernels.c import c_compiler
 from pteron.kernels.choice import VARIABLE
-from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array
 from pteron.kernels.loop_code import PARTS, LinkedLaw, LoopCode
+from pteron.kernels.program_cache import Program
 from pteron.kernels.programs import bare, general_program, motion_program, program
 from pteron.kernels.samples import Ask, Evaluated, Plant, run_samples
 from pteron.kernels.targets import FIXED
@@ -77,7 +77,7 @@ class Loop:
         linked: LinkedLaw | None = None,
         general: bool = False,
     ) -> None:
-        self.kind = DriveKind.of(robot)
+        self.kind = DriveKind.from_robot(robot)
         self.plant = _plant(bare(robot), self.kind, general)
         self.sensed = general_program(robot, "sensed") if general else program(robot, "sensed")
         self.law, self.linked = law, linked
@@ -127,8 +127,8 @@ class Loop:
             if go is not None:
                 plant.go = go  # type: ignore[method-assign]
             law = None if self.law is None else Evaluated("law", self.law)
-            given = plant, Evaluated("sensed", self.sensed), law
-            run_samples(*given, arrays, samples, times, counts, ask)
+            programs = plant, Evaluated("sensed", self.sensed), law
+            run_samples(*programs, arrays, samples, times, counts, ask)
             return
         code = self.code(lanes)
         shares = max(1, min(threads, batch // LANES))
@@ -159,8 +159,8 @@ class Loop:
         """
         batch, n = len(state), robot.joint_count
         encoders = n * (2 if self.kind.bends else 1)
-        own = {"side": n, "memory": 0, "encoders": 4 * encoders}
-        own |= dict.fromkeys(("clock", "done", "fault"), 1)
+        machine_sizes = {"side": n, "memory": 0, "encoders": 4 * encoders}
+        machine_sizes |= dict.fromkeys(("clock", "done", "fault"), 1)
         shared = {"given": n, "wrench": len(robot.column_names["wrench"]), "at_motor": 2 * n}
         shared |= dict.fromkeys(("steps", "noises", "round", "noise"), encoders)
         return {
@@ -168,7 +168,7 @@ class Loop:
             "seen": state.copy(),
             "queue": np.zeros((batch, late + 2, n)),
             "told": np.zeros((batch, behind + 1, 2 * encoders)),
-            **{name: np.zeros((batch, 1, size)) for name, size in own.items()},
+            **{name: np.zeros((batch, 1, size)) for name, size in machine_sizes.items()},
             **{name: np.zeros((1, 1, size)) for name, size in shared.items()},
             "most": np.full((1, 1, n), np.inf),
             "share": np.ones((1, 1, 1)),
@@ -212,9 +212,9 @@ def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, A
 
 @lru_cache(maxsize=256)
 def _numbers(robot: Manipulator, what: str) -> Array:
-    found = FIXED[what](robot).reshape(1, 1, -1)
-    found.setflags(write=False)  # all runs of the machine read it
-    return found
+    array = FIXED[what](robot).reshape(1, 1, -1)
+    array.setflags(write=False)  # all runs of the machine read it
+    return array
 
 
 _plant = lru_cache(maxsize=64)(motion_program)

@@ -1,4 +1,4 @@
-"""Tables that are given where an array is expected: their columns are picked by name."""
+"""Tables in place of arrays: their columns are selected by name."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _MANY = 12
 """Columns of a table that a message lists."""
 
 
-def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
-    """Return the columns of a table, in the order asked for; what is no table, unchanged.
+def pick_columns(table: Any, columns: Sequence[str], name: str) -> Any:
+    """Return the requested columns of a table, in order; an argument that is no table, unchanged.
 
     Parameters
     ----------
@@ -38,31 +38,31 @@ def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
         If columns are missing, have names of two levels, or one of them has no numbers or another
         length; or for a table where no names are known.
     """
-    if _is_labelled(value):
-        value = _by_label(value)
-    has = _names(value)
-    if not has:
-        return value
+    if _has_labels(table):
+        table = _columns_from_labels(table)
+    column_names = _names(table)
+    if not column_names:
+        return table
     if not columns:
         raise DataError(
             f"{name}: a table with names given, an array expected, its columns in order: "
             "table[names].to_numpy()"
         )
-    if any(isinstance(one, tuple) for one in has):
+    if any(isinstance(column_name, tuple) for column_name in column_names):
         raise DataError(f"{name}: the table's columns have names of two levels; keep one")
-    if missing := [column for column in columns if column not in has]:
-        more = f" and {len(has) - _MANY} more" if len(has) > _MANY else ""
-        listed = ", ".join(shown(one, bare=True) for one in has[:_MANY])
+    if missing := [column for column in columns if column not in column_names]:
+        remaining = f" and {len(column_names) - _MANY} more" if len(column_names) > _MANY else ""
+        listed = ", ".join(shown(column_name, bare=True) for column_name in column_names[:_MANY])
         raise DataError(
-            f"{name}: no column {', '.join(missing)} in a table of {listed}{more}; name its "
+            f"{name}: no column {', '.join(missing)} in a table of {listed}{remaining}; name its "
             "columns so, in SI units and radians, or give an array"
         )
-    if callable(numbers := getattr(value, "numbers", None)):
+    if callable(numbers := getattr(table, "numbers", None)):
         return numbers(columns)
     for column in columns:
-        if has.count(column) > 1:
+        if column_names.count(column) > 1:
             raise DataError(f"{name}, column {column}: stands twice in the table; keep one")
-    parts = [_column(value[column], f"{name}, column {column}") for column in columns]
+    parts = [_column(table[column], f"{name}, column {column}") for column in columns]
     try:
         return np.stack(np.broadcast_arrays(*parts), axis=-1)
     except ValueError:
@@ -70,41 +70,41 @@ def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
         raise DataError(f"{name}: columns of different lengths: {shapes}") from None
 
 
-def _names(value: Any) -> list[str]:
-    """Return the names of a table's columns; none of what is no table, or has no names."""
-    if isinstance(value, np.ndarray):
-        return list(value.dtype.names or ())
-    if isinstance(value, list | tuple | float | int):
+def _names(table: Any) -> list[str]:
+    """Return the names of a table's columns; [] for an argument without named columns."""
+    if isinstance(table, np.ndarray):
+        return list(table.dtype.names or ())
+    if isinstance(table, list | tuple | float | int):
         return []
-    if isinstance(value, Mapping):
-        given: Any = value.keys()
+    if isinstance(table, Mapping):
+        raw_names: Any = table.keys()
     else:
-        given = getattr(value, "columns", None)
-        if given is None and callable(keys := getattr(value, "keys", None)):
-            given = keys()  # a row of a DataFrame of pandas
+        raw_names = getattr(table, "columns", None)
+        if raw_names is None and callable(keys := getattr(table, "keys", None)):
+            raw_names = keys()  # a row of a DataFrame of pandas
     try:
-        names = list(() if given is None or callable(given) else given)
+        names = list(() if raw_names is None or callable(raw_names) else raw_names)
     except TypeError:
         return []
-    return names if any(isinstance(one, str | tuple) for one in names) else []
+    return names if any(isinstance(column, str | tuple) for column in names) else []
 
 
-def _is_labelled(value: Any) -> bool:
+def _has_labels(array: Any) -> bool:
     """Return whether a value is a DataArray of xarray whose last axis has names."""
-    if isinstance(value, np.ndarray) or not getattr(value, "dims", ()):
+    if isinstance(array, np.ndarray) or not getattr(array, "dims", ()):
         return False
-    labels = getattr(value, "coords", {}).get(value.dims[-1])
-    return labels is not None and all(isinstance(one, str) for one in labels.values.tolist())
+    labels = getattr(array, "coords", {}).get(array.dims[-1])
+    return labels is not None and all(isinstance(label, str) for label in labels.values.tolist())
 
 
-def _by_label(value: Any) -> dict[str, Any]:
-    axis = value.dims[-1]
-    return {str(one): value.sel({axis: one}).values for one in value.coords[axis].values}
+def _columns_from_labels(array: Any) -> dict[str, Any]:
+    axis = array.dims[-1]
+    return {str(label): array.sel({axis: label}).values for label in array.coords[axis].values}
 
 
-def _column(value: Any, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _column(raw: Any, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     try:
-        if (array := np.asarray(value)).dtype.kind not in "biufO":
+        if (array := np.asarray(raw)).dtype.kind not in "biufO":
             raise TypeError
         return np.asarray(array, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 from pteron.errors import ModelError
 from pteron.extras import install_command
 from pteron.kernels.cache import digest, entry, find
-from pteron.kernels.code import PYTHON, Language, module_values, rendered
-from pteron.kernels.exponential import straight
+from pteron.kernels.code import PYTHON, Language, module_values, render_template
+from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, ArrayKernel, Port
 
@@ -39,7 +39,7 @@ class Jitted(ArrayKernel):
     @cached_property
     def source(self) -> str:
         """The Python code."""
-        graph = graph_of(straight(self.function), self.ports)
+        graph = graph_of(with_lowered_exponentials(self.function), self.ports)
         return _source(self.name, graph, self.ports, self.outputs)
 
     @property
@@ -69,37 +69,37 @@ class Jitted(ArrayKernel):
         return self.call(*values, **fixed)
 
     def _direct(self) -> Callable[..., Any]:
-        """Return the callable: one state of plain arrays goes to `one`, all else to `checked`."""
-        one = self._module.one  # which says in a line if Numba is missing
+        """Return the callable: `evaluate_state` for plain arrays, else `evaluate_checked`."""
+        evaluate_state = self._module.one  # which says in a line if Numba is missing
         from numba.core.errors import NumbaError
 
-        checked, count, empty = self.checked, len(self.inputs), np.empty
+        evaluate_any, count, empty = self.evaluate_checked, len(self.inputs), np.empty
         shapes = [port.shape for port in self.outputs]
         sizes = [port.size for port in self.outputs]
         order = [port.name in self.fixed for port in self.ports]
         known = [
-            np.array(value, dtype=float).ravel()
-            for value in (self.fixed[p.name] for p in self.ports if p.name in self.fixed)
+            np.array(number, dtype=float).ravel()
+            for number in (self.fixed[p.name] for p in self.ports if p.name in self.fixed)
         ]
 
         def call(*values: Any, **fixed: Any) -> Any:
             if not fixed and len(values) == count and getattr(values[0], "ndim", 0) == 1:
                 outputs = [empty(size) for size in sizes]
                 try:
-                    if one(*values, *known, *outputs):
+                    if evaluate_state(*values, *known, *outputs):
                         if len(outputs) == 1:
                             return outputs[0].reshape(shapes[0])
                         return tuple(map(np.reshape, outputs, shapes))
                 except (TypeError, NumbaError):  # integers, or not to be written
                     pass
-            return checked(*values, **fixed)
+            return evaluate_any(*values, **fixed)
 
         # Fixed inputs come last, as `compile` has them.
-        return call if order == sorted(order) else checked
+        return call if order == sorted(order) else evaluate_any
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         # To Numba an array that must not be written is of another type.
-        writable = [value if value.flags.writeable else value.copy() for value in inputs]
+        writable = [array if array.flags.writeable else array.copy() for array in inputs]
         self._module.run(*writable, *outputs)
 
 
@@ -132,5 +132,5 @@ def _source(name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[P
         stored="result[{0}, k] = {1}",
         returned="{0}[{1}] = {2}",
     )
-    values = module_values(name, graph, inputs, outputs, language)
-    return rendered("pteron.kernels", "numba.py.j2", width=_BLOCK, **values)
+    template_values = module_values(name, graph, inputs, outputs, language)
+    return render_template("pteron.kernels", "numba.py.j2", width=_BLOCK, **template_values)

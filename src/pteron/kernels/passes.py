@@ -1,4 +1,4 @@
-"""`optimised`: rewrites a CasADi function to fewer operations, so that equations can be plain.
+"""`optimise_function` rewrites a CasADi function to fewer operations; equations can be plain.
 
 An equation says what it means: a lever times a force, a length times a sine, a sum over the legs.
 The savings that a person would make by hand are made here, once, for every equation:
@@ -34,10 +34,10 @@ import casadi as ca
 
 from pteron.kernels.kernel import count_operations
 from pteron.kernels.terms import TermGraph, sign_of
-from pteron.kernels.translation import read, written
+from pteron.kernels.translation import to_function, to_term_graph
 
 
-def optimised(function: ca.Function) -> ca.Function:
+def optimise_function(function: ca.Function) -> ca.Function:
     """Return a function of the same inputs, outputs and values that takes less time.
 
     It has fewer operations, but for one more for each division that is saved: a division takes as
@@ -52,38 +52,38 @@ def optimised(function: ca.Function) -> ca.Function:
     >>> count_operations(plain), count_operations(optimised(plain))
     (5, 4)
     """
-    given = read(function)
-    (graph, roots), best, least = given, given, _cost(*given)
+    original = to_term_graph(function)
+    (graph, roots), best, least = original, original, _cost(*original)
     while True:
-        for step in (_flattened, _factored, _shared):
+        for step in (_flatten_terms, _factor_sums, _share_pairs):
             graph, roots = step(graph, roots)
         cost = _cost(graph, roots)
         if cost >= least:
             break
         best, least = (graph, roots), cost
-    found = written(*best, function)
-    if count_operations(found) >= count_operations(function):
-        best, found = given, function
-    divided = _divided(*best)
-    return found if divided is None else written(*divided, function)
+    shortest = to_function(*best, function)
+    if count_operations(shortest) >= count_operations(function):
+        best, shortest = original, function
+    divided = _share_divisions(*best)
+    return shortest if divided is None else to_function(*divided, function)
 
 
-def _divided(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]] | None:
-    """Return the graph with one division for what several quotients are divided by, if any."""
+def _share_divisions(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]] | None:
+    """Return the graph with one division for each divisor of several quotients; None if none."""
     uses = old.uses(roots)
-    if not any(old.is_a("inverse", k) and uses[k] > 1 for k in uses):
+    if not any(old.is_kind("inverse", k) and uses[k] > 1 for k in uses):
         return None
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
-        several = old.is_a("inverse", k) and uses[k] > 1
-        return new.reciprocal(values[0]) if several else old.copied(new, k, values)
+        several = old.is_kind("inverse", k) and uses[k] > 1
+        return new.reciprocal(values[0]) if several else old.copy_node(new, k, values)
 
-    return old.rebuilt(roots, rule)
+    return old.rebuild(roots, rule)
 
 
 def _cost(graph: TermGraph, roots: list[int]) -> int:
-    """Return the operations, but for negations."""
-    cost, alone = 0, {abs(value) for value in roots}
+    """Return the number of operations without negations."""
+    cost, alone = 0, {abs(root) for root in roots}
     order = graph.order(roots)
     for k in order:
         kind, operands = graph.kinds[k], graph.operands[k]
@@ -91,13 +91,13 @@ def _cost(graph: TermGraph, roots: list[int]) -> int:
             cost += len(operands) - 1
         elif operands and kind != "inverse":
             cost += 1
-        if kind != "product" or all(graph.is_a("inverse", v) for v in operands):
+        if kind != "product" or all(graph.is_kind("inverse", v) for v in operands):
             alone.update(abs(v) for v in operands)
-    return cost + sum(graph.is_a("inverse", k) for k in order if k in alone)
+    return cost + sum(graph.is_kind("inverse", k) for k in order if k in alone)
 
 
-def _flattened(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
-    """Return the graph with sums that are used once, in a sum, as part of it; products likewise."""
+def _flatten_terms(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
+    """Return the graph with sums that one sum alone uses merged into it; products likewise."""
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
@@ -105,37 +105,39 @@ def _flattened(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
         if kind == "reciprocal" and uses[k] == 1:
             return new.inverse(values[0])
         if kind not in ("sum", "product"):
-            return old.copied(new, k, values)
+            return old.copy_node(new, k, values)
         parts: list[int] = []
-        for v, value in zip(old.operands[k], values, strict=True):
-            inner = [value]
-            if uses[abs(v)] == 1 and new.is_a(kind, value):
-                inner = list(new.operands[abs(value)])
-                if value < 0 and kind == "sum":
+        for v, operand in zip(old.operands[k], values, strict=True):
+            inner = [operand]
+            if uses[abs(v)] == 1 and new.is_kind(kind, operand):
+                inner = list(new.operands[abs(operand)])
+                if operand < 0 and kind == "sum":
                     inner = [-part for part in inner]
-                elif value < 0:
+                elif operand < 0:
                     inner[0] = -inner[0]
             parts += inner
         return new.sum(parts) if kind == "sum" else new.product(parts)
 
-    return old.rebuilt(roots, rule)
+    return old.rebuild(roots, rule)
 
 
-def _factored(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
+def _factor_sums(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
     """Return the graph with the common factors of a sum's terms taken out of them."""
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
-        if not old.is_a("sum", k):
-            return old.copied(new, k, values)
+        if not old.is_kind("sum", k):
+            return old.copy_node(new, k, values)
         terms = []
-        for v, value in zip(old.operands[k], values, strict=True):
+        for v, operand in zip(old.operands[k], values, strict=True):
             # A product that others use is computed anyhow: taking it apart saves nothing.
-            apart = uses[abs(v)] == 1 and new.is_a("product", value)
-            terms.append((sign_of(value), new.operands[abs(value)] if apart else (abs(value),)))
+            is_split = uses[abs(v)] == 1 and new.is_kind("product", operand)
+            terms.append(
+                (sign_of(operand), new.operands[abs(operand)] if is_split else (abs(operand),))
+            )
         return _sum_of_products(new, terms)
 
-    return old.rebuilt(roots, rule)
+    return old.rebuild(roots, rule)
 
 
 def _sum_of_products(graph: TermGraph, terms: list[tuple[int, tuple[int, ...]]]) -> int:
@@ -145,33 +147,33 @@ def _sum_of_products(graph: TermGraph, terms: list[tuple[int, tuple[int, ...]]])
         if max(counts.values(), default=0) < 2:
             return graph.sum(sign * graph.product(factors) for sign, factors in terms)
         best = max(counts, key=lambda f: (counts[f], f))
-        rest, quotients = [], []
+        others, quotients = [], []
         for sign, factors in terms:
             if len(factors) > 1 and best in factors:
                 place = factors.index(best)
                 quotients.append((sign, factors[:place] + factors[place + 1 :]))
             else:
-                rest.append((sign, factors))
-        whole = graph.product([best, _sum_of_products(graph, quotients)])
-        terms = [*rest, (sign_of(whole), (abs(whole),))]
+                others.append((sign, factors))
+        factored = graph.product([best, _sum_of_products(graph, quotients)])
+        terms = [*others, (sign_of(factored), (abs(factored),))]
 
 
-def _shared(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
+def _share_pairs(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
     """Return the graph with the pairs that several sums or products hold as nodes of their own."""
     order = graph.order(roots)
     for kind in ("sum", "product"):
-        _name_pairs(graph, kind, [k for k in order if graph.is_a(kind, k)])
-    return graph.rebuilt(roots, graph.copied)
+        _name_pairs(graph, kind, [k for k in order if graph.is_kind(kind, k)])
+    return graph.rebuild(roots, graph.copy_node)
 
 
 def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
-    """Put a node in the place of each pair that several of the owners hold, most frequent first."""
+    """Replace each pair that several of the owners hold by a node, most frequent first."""
     lists = {k: list(graph.operands[k]) for k in owners}
     holders: dict[tuple[int, int], dict[int, None]] = defaultdict(dict)
     for k, values in lists.items():
         for a, b in combinations(values, 2):
             holders[_pair(a, b)][k] = None
-    heap = [(-len(found), pair) for pair, found in holders.items() if len(found) > 1]
+    heap = [(-len(holding), pair) for pair, holding in holders.items() if len(holding) > 1]
     heapq.heapify(heap)
     while heap:
         count, pair = heapq.heappop(heap)
@@ -182,31 +184,31 @@ def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
             if len(signs) > 1:
                 heapq.heappush(heap, (-len(signs), pair))
             continue
-        if all(graph.is_a("inverse", v) for v in pair):
+        if all(graph.is_kind("inverse", v) for v in pair):
             continue  # 1/(a b) is one more operation than a division by each
         name = next((k for k in signs if len(lists[k]) == 2), None)
         if name is None:
             name = graph.add(kind, *pair)
             lists[name] = list(pair)
-        own = _sign_of(pair, lists[name])
+        name_sign = _sign_of(pair, lists[name])
         for k, sign in signs.items():
             if k == name:
                 continue
             for v in pair:
                 lists[k].remove(sign * v)
-            value = sign * own * name
+            pair_value = sign * name_sign * name
             for v in lists[k]:
-                found = holders[_pair(v, value)]
-                found[k] = None
-                if len(found) > 1:
-                    heapq.heappush(heap, (-len(found), _pair(v, value)))
-            lists[k].append(value)
+                holding = holders[_pair(v, pair_value)]
+                holding[k] = None
+                if len(holding) > 1:
+                    heapq.heappush(heap, (-len(holding), _pair(v, pair_value)))
+            lists[k].append(pair_value)
     for k, values in lists.items():
         graph.replace(k, kind, *values)
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:
-    """Return two values in a normal form, the same for their negatives."""
+    """Return two values in a canonical form, equal for their negatives."""
     a, b = (a, b) if abs(a) < abs(b) else (b, a)
     return (a, b) if a > 0 else (-a, -b)
 

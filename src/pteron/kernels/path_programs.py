@@ -14,9 +14,9 @@ import casadi as ca
 
 from pteron.equations.closing import held_spheres
 from pteron.equations.machine import Machine
-from pteron.equations.pose_paths import Closed, OnPath, numbers, rows, stepped
-from pteron.kernels.choice import Adaptive, adaptive
-from pteron.kernels.kept import Program
+from pteron.equations.pose_paths import Closed, PathState, advance_path, numbers, rows
+from pteron.kernels.choice import TieredKernel, tiered_kernel
+from pteron.kernels.program_cache import Program
 from pteron.kernels.programs import bare
 from pteron.manipulator import Manipulator
 
@@ -25,59 +25,61 @@ Parts = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @lru_cache(maxsize=8)
-def path_kernel(closed: Closed, start: Parts | None) -> Adaptive:
+def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
     """Return the kernel of a step along a path from one machine to another.
 
-    It takes and returns where the path is, see `OnPath`. A start machine is fixed in the kernel, as
-    complex constants; the machine that the path leads to is then an input and real. With start None
-    both are inputs and complex: real parts first.
+    It maps a path's `PathState` to the next one. A start machine is fixed in the kernel, as complex
+    constants; the target machine is then an input and real. With start None both are inputs and
+    complex: real parts first.
     """
     count = closed.numbers
 
     def build() -> Program:
-        at = ca.SX.sym("at", closed.on_path)
-        ends, given = [], {"at": at}
-        for name, known in (("start", start), ("target", None)):
-            if known is not None:
-                ends.append(numbers(*(ca.SX(list(part)) for part in known)))
+        at = ca.SX.sym("at", closed.path_state_size)
+        ends, inputs = [], {"at": at}
+        for name, fixed in (("start", start), ("target", None)):
+            if fixed is not None:
+                ends.append(numbers(*(ca.SX(list(part)) for part in fixed)))
                 continue
             real = start is not None
-            given[name] = ca.SX.sym(name, count if real else 2 * count)
-            ends.append(numbers(given[name][:count], None if real else given[name][count:]))
-        after, left = stepped(closed, ends[0], ends[1], OnPath.of(at, closed))
-        return Program.of_named(
-            "path_step", given, {"after": after.vector(), "left": left}
-        ).optimised()
+            inputs[name] = ca.SX.sym(name, count if real else 2 * count)
+            ends.append(numbers(inputs[name][:count], None if real else inputs[name][count:]))
+        after, correction = advance_path(
+            closed, ends[0], ends[1], PathState.from_vector(at, closed)
+        )
+        return Program.from_symbols(
+            "path_step", inputs, {"after": after.vector(), "left": correction}
+        ).optimise()
 
-    return adaptive(("path_step", *closed, start), build)
+    return tiered_kernel(("path_step", *closed, start), build)
 
 
 @lru_cache(maxsize=8)
-def rows_kernel(closed: Closed) -> Adaptive:
+def rows_kernel(closed: Closed) -> TieredKernel:
     """Return the kernel of the residuals of a machine's closures at a real z, and their slopes."""
 
     def build() -> Program:
         z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", closed.numbers)
         slopes, missed = rows(closed, numbers(machine), numbers(z))
-        return Program.of_named(
+        return Program.from_symbols(
             "path_rows", {"z": z, "machine": machine}, {"rows": slopes, "missed": missed}
-        ).optimised()
+        ).optimise()
 
-    return adaptive(("path_rows", *closed), build)
+    return tiered_kernel(("path_rows", *closed), build)
 
 
-def spheres_kernel(robot: Manipulator) -> Adaptive:
+def spheres_kernel(robot: Manipulator) -> TieredKernel:
     """Return the kernel of the spheres on which joints hold platform points; see `closing`."""
     return _spheres(bare(robot))
 
 
 @lru_cache(maxsize=64)
-def _spheres(robot: Manipulator) -> Adaptive:
+def _spheres(robot: Manipulator) -> TieredKernel:
     def build() -> Program:
         joints = ca.SX.sym("joints", robot.joint_count)
-        centers, squares = held_spheres(Machine.of(robot), joints)
-        return Program.of_named(
+        centers, squares = held_spheres(Machine.numeric(robot), joints)
+        return Program.from_symbols(
             "held_spheres", {"joints": joints}, {"centers": centers, "squares": squares}
-        ).optimised()
+        ).optimise()
 
-    return adaptive(("held_spheres", robot), build)
+    return tiered_kernel(("held_spheres", robot), build)

@@ -1,6 +1,6 @@
 """The table of functions of poses and rates that can be compiled.
 
-Each has its inputs, its equations, and the conditions on the pose under which its result counts.
+Each has its inputs, its equations, and the conditions on the pose under which its result is valid.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from pteron.equations.edges import edges
 from pteron.equations.machine import Machine
 from pteron.equations.singular_distance import type_ii_distances
 from pteron.kernels.entries import (
-    BENT,
     MOTION,
-    MOVED,
+    NEEDS_ANGLES,
+    NEEDS_CONSTANT_ROWS,
+    NEEDS_REACH,
+    NEEDS_TYPE_I,
     POSE,
     RATE,
-    REACHED,
-    ROWS,
     TABLE,
     TYPE_II,
     Entry,
     Outputs,
     Symbols,
-    of_state,
-    row,
-    stacked,
+    as_vector,
+    equation_entry,
     state,
+    state_entry,
 )
 
 
 def _inverse_kinematics(m: Machine, pose: Expression) -> Expression:
-    # A slider's equation has a value out of reach too; `beyond_reach` makes it NaN there.
-    return kinematics.inverse_position(m, pose) + kinematics.beyond_reach(m, pose)
+    # A slider's equation has a value out of reach too; `reach_validity` makes it NaN there.
+    return kinematics.inverse_position(m, pose) + kinematics.reach_validity(m, pose)
 
 
 def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
@@ -49,9 +49,9 @@ def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
 
 
 def _closure_rows(m: Machine, v: Symbols) -> Outputs:
-    found = closing.closure_rows(m, v["joints"])
-    rows = {name: (part, part.shape) for name, part in found._asdict().items()}
-    return {**rows, "origin": found.origin, "size": found.size}
+    closures = closing.closure_rows(m, v["joints"])
+    rows = {name: (part, part.shape) for name, part in closures._asdict().items()}
+    return {**rows, "origin": closures.origin, "size": closures.size}
 
 
 def _direct_step(m: Machine, joints: Expression, pose: Expression) -> Any:
@@ -59,19 +59,21 @@ def _direct_step(m: Machine, joints: Expression, pose: Expression) -> Any:
 
 
 def _followed_step(m: Machine, joints: Expression, pose: Expression) -> Any:
-    found = closing.followed_step(m, joints, pose, TYPE_II)
-    return found.pose, found.measure
+    step = closing.converged_step(m, joints, pose, TYPE_II)
+    return step.pose, step.measure
 
 
-def _of_legs(value: Callable[[Any], Expression]) -> Callable[[Machine, Expression], Expression]:
-    """Return the equation of a value of each leg's reach at a pose."""
-    return lambda m, pose: ca.vertcat(*map(value, kinematics.reach(m, pose)))
+def _leg_equation(
+    quantity: Callable[[Any], Expression],
+) -> Callable[[Machine, Expression], Expression]:
+    """Return the equation of a quantity of each leg's reach at a pose."""
+    return lambda m, pose: ca.vertcat(*map(quantity, kinematics.reach(m, pose)))
 
 
 def _reach(m: Machine, pose: Expression) -> Any:
-    found = kinematics.reach(m, pose)
+    reaches = kinematics.reach(m, pose)
     names = ("margin", "type_i", "spread")
-    return [ca.vertcat(*(getattr(leg, name) for leg in found)) for name in names]
+    return [ca.vertcat(*(getattr(leg, name) for leg in reaches)) for name in names]
 
 
 def _room(m: Machine, pose: Expression) -> Expression:
@@ -115,41 +117,53 @@ _STEP = ("joints", "pose")
 _OF_JOINTS = ("pose", "joint_rates", "joint_accelerations")
 
 TABLE |= {
-    "inverse_kinematics": row(_inverse_kinematics, POSE, "joints", REACHED),
-    "joint_coordinates": row(kinematics.inverse_position, POSE, "joints"),
-    "link_vectors": of_state(kinematics.link_vectors, POSE, "l_u l_l", REACHED),
+    "inverse_kinematics": equation_entry(_inverse_kinematics, POSE, "joints", NEEDS_REACH),
+    "joint_coordinates": equation_entry(kinematics.inverse_position, POSE, "joints"),
+    "link_vectors": state_entry(kinematics.link_vectors, POSE, "l_u l_l", NEEDS_REACH),
     "direct_kinematics": Entry(("joints",), partial(_poses, reached=True)),
     "closure_poses": Entry(("joints",), partial(_poses, reached=False)),
     "closure_rows": Entry(("joints",), _closure_rows),
-    "newton_step": row(closing.newton_step, _STEP, "stepped missed"),
-    "direct_step": row(_direct_step, _STEP, "found type_ii bent"),
-    "followed_step": row(_followed_step, _STEP, "found type_ii"),
-    "reach": row(_reach, POSE, "margin type_i spread"),
-    "passive_room": row(kinematics.passive_margins, POSE, "shares metres"),
-    "room": row(_room, POSE, "room"),
-    "joint_points": of_state(kinematics.chain_points, POSE, "points", REACHED),
-    "platform_points": row(platform_points, POSE, "points"),
-    "discriminants": row(_of_legs(lambda leg: leg.discriminant), POSE, "discriminants"),
+    "newton_step": equation_entry(closing.newton_step, _STEP, "stepped missed"),
+    "direct_step": equation_entry(_direct_step, _STEP, "found type_ii bent"),
+    "followed_step": equation_entry(_followed_step, _STEP, "found type_ii"),
+    "reach": equation_entry(_reach, POSE, "margin type_i spread"),
+    "passive_room": equation_entry(kinematics.passive_margins, POSE, "shares metres"),
+    "room": equation_entry(_room, POSE, "room"),
+    "joint_points": state_entry(kinematics.chain_points, POSE, "points", NEEDS_REACH),
+    "platform_points": equation_entry(platform_points, POSE, "points"),
+    "discriminants": equation_entry(
+        _leg_equation(lambda leg: leg.discriminant), POSE, "discriminants"
+    ),
     # Finite and smooth out of reach too, where it is negative.
-    "squared_type_i": row(_of_legs(lambda leg: leg.discriminant / leg.scale), POSE, "squares"),
+    "squared_type_i": equation_entry(
+        _leg_equation(lambda leg: leg.discriminant / leg.scale), POSE, "squares"
+    ),
     "type_ii": Entry(POSE, _type_ii),
-    "type_ii_distances": Entry(POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), BENT),
-    "clearances": row(lambda *at: stacked(clearances(*at)), POSE, "distances", REACHED),
-    "least_clearances": row(lambda *at: stacked(least_clearances(*at)), POSE, "distances", REACHED),
+    "type_ii_distances": Entry(
+        POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), NEEDS_TYPE_I
+    ),
+    "clearances": equation_entry(
+        lambda *at: as_vector(clearances(*at)), POSE, "distances", NEEDS_REACH
+    ),
+    "least_clearances": equation_entry(
+        lambda *at: as_vector(least_clearances(*at)), POSE, "distances", NEEDS_REACH
+    ),
     "constraint": Entry(
-        POSE, lambda m, v: {"constraint": constraint_measure(m, state(m, v))}, REACHED
+        POSE, lambda m, v: {"constraint": constraint_measure(m, state(m, v))}, NEEDS_REACH
     ),
-    "jacobian": of_state(kinematics.jacobian, POSE, "jacobian", ROWS),
-    "twist_jacobian": of_state(kinematics.twist_jacobian, POSE, "rows", ROWS),
-    "twist": row(_twist, RATE, "twist"),
-    "velocity_of_twist": row(_velocity_of_twist, ("pose", "twist"), "velocity rest", ("angles",)),
-    "link_jacobians": of_state(kinematics.link_jacobians, POSE, "upper lower", BENT),
-    "joint_screws": of_state(
-        lambda at: [s.T for s in kinematics.joint_screws(at)], POSE, "screws", BENT
+    "jacobian": state_entry(kinematics.jacobian, POSE, "jacobian", NEEDS_CONSTANT_ROWS),
+    "twist_jacobian": state_entry(kinematics.twist_jacobian, POSE, "rows", NEEDS_CONSTANT_ROWS),
+    "twist": equation_entry(_twist, RATE, "twist"),
+    "velocity_of_twist": equation_entry(
+        _velocity_of_twist, ("pose", "twist"), "velocity rest", ("angles",)
     ),
-    "joint_rates": Entry(RATE, _joint_motion, BENT),
-    "joint_accelerations": Entry(MOTION, _joint_motion, BENT),
-    "platform_motion": row(
-        kinematics.platform_rates, _OF_JOINTS, "velocity acceleration", (*MOVED, "type II")
+    "link_jacobians": state_entry(kinematics.link_jacobians, POSE, "upper lower", NEEDS_TYPE_I),
+    "joint_screws": state_entry(
+        lambda at: [s.T for s in kinematics.joint_screws(at)], POSE, "screws", NEEDS_TYPE_I
+    ),
+    "joint_rates": Entry(RATE, _joint_motion, NEEDS_TYPE_I),
+    "joint_accelerations": Entry(MOTION, _joint_motion, NEEDS_TYPE_I),
+    "platform_motion": equation_entry(
+        kinematics.platform_rates, _OF_JOINTS, "velocity acceleration", (*NEEDS_ANGLES, "type II")
     ),
 }

@@ -2,8 +2,8 @@
 
 A program depends on the machine's geometry and gravity alone: inertial parameters and drives are
 inputs, so that machines of one geometry share it (in a `general_program` geometry and gravity are
-an input too). On request a last output, `status`, is 1 where the result counts and 0 where it does
-not; in exported code it is the other way round, 0 where all is well.
+an input too). On request a last output, `status`, is 1 where the result is valid and 0 where not;
+in exported code it is the other way round, 0 where it is valid.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ from pteron.kernels.functions import (
     Output,
     Symbols,
 )
-from pteron.kernels.kept import Program, kept, shape_of
 from pteron.kernels.kernel import Port, count_operations
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
+from pteron.kernels.program_cache import Program, cached_program, shape_of
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _HUGE = 1e75
 """Inputs or outputs beyond this count as not finite: their squares might overflow."""
 
 _TINY = 1e-300
-"""A leg reaches a pose where its discriminant is above minus this: at the edge, 0, too."""
+"""Tolerance of the discriminant of reach: a pose at the edge, where it is 0, is in reach."""
 
 REDUCIBLE = (
     *("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward"),
@@ -112,7 +112,7 @@ def program(
     like = ALIKE.get()
     if like is not None and columns is None:
         return _general(like, _Form(what, wrench, guarded, plain=True))
-    return _known(bare(robot), _Form(what, wrench, guarded, plain, named), columns)
+    return _cached_program(bare(robot), _Form(what, wrench, guarded, plain, named), columns)
 
 
 @contextmanager
@@ -134,11 +134,11 @@ def alike(robot: RobotLike) -> Iterator[None]:
     [0.183 0.183 0.183]
     [0.006 0.006 0.006]
     """
-    given = ALIKE.set(bare(robot))
+    token = ALIKE.set(bare(robot))
     try:
         yield
     finally:
-        ALIKE.reset(given)
+        ALIKE.reset(token)
 
 
 def layout_of(robot: RobotLike) -> Manipulator:
@@ -146,27 +146,29 @@ def layout_of(robot: RobotLike) -> Manipulator:
     return ALIKE.get() or bare(robot)
 
 
-def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
+def specialised(plain_program: Program, numbers: dict[str, NDArray[np.float64]]) -> Program:
     """Return a plain program with numbers in place of some of its inputs, after the pass."""
-    symbols = given.function.sx_in()
+    symbols = plain_program.function.sx_in()
     folded = [
-        ca.SX(ca.DM(values[port.name])) if port.name in values else symbol
-        for port, symbol in zip(given.inputs, symbols, strict=True)
+        ca.SX(ca.DM(numbers[port.name])) if port.name in numbers else symbol
+        for port, symbol in zip(plain_program.inputs, symbols, strict=True)
     ]
-    pairs = zip(symbols, given.inputs, strict=True)
-    left = [(symbol, port) for symbol, port in pairs if port.name not in values]
-    results = ca.cse([ca.densify(output) for output in given.function.call(folded)])
-    symbols, inputs = [symbol for symbol, _ in left], [port for _, port in left]
-    return Program.of(given.name, symbols, inputs, results, given.outputs).optimised()
+    pairs = zip(symbols, plain_program.inputs, strict=True)
+    remaining = [(symbol, port) for symbol, port in pairs if port.name not in numbers]
+    results = ca.cse([ca.densify(element) for element in plain_program.function.call(folded)])
+    symbols, inputs = [symbol for symbol, _ in remaining], [port for _, port in remaining]
+    return Program.from_expressions(
+        plain_program.name, symbols, inputs, results, plain_program.outputs
+    ).optimise()
 
 
 def bare(robot: RobotLike) -> Manipulator:
     """Return the machine with unit inertia and no drives: those of one geometry share programs."""
-    return _bare(as_manipulator(robot))
+    return _cached_geometry_only(as_manipulator(robot))
 
 
 @lru_cache(maxsize=256)
-def _bare(robot: Manipulator) -> Manipulator:
+def _cached_geometry_only(robot: Manipulator) -> Manipulator:
     ones = ("m", "I", "Ixx", "Iyy", "Izz")
 
     def plain(body: Any) -> Any:
@@ -195,12 +197,12 @@ class _Form(NamedTuple):
 
 
 @lru_cache(maxsize=512)
-def _known(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
-    return kept((robot, form, columns), partial(_built, robot, form, columns))
+def _cached_program(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
+    return cached_program((robot, form, columns), partial(_build_program, robot, form, columns))
 
 
-def _built(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
-    machine = Machine.of(robot)
+def _build_program(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
+    machine = Machine.numeric(robot)
     if columns is None:
         return _program(machine, form=form)
     selection = ca.SX(len(machine.parameters), len(columns))
@@ -211,34 +213,34 @@ def _built(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
         return _program(machine, form=form, constants={"selection": selection})
     base = ca.SX.sym("base_parameters", len(columns))
     # A mass on a platform point may be the leg's or the platform's, whichever costs less.
-    given, extra = ca.mtimes(selection, base), {"base_parameters": base}
+    inertial, extra = ca.mtimes(selection, base), {"base_parameters": base}
     forms = [
         _program(
-            machine, form=form, constants={"parameters": given, "carried": carried}, extra=extra
+            machine, form=form, constants={"parameters": inertial, "carried": carried}, extra=extra
         )
         for carried in (True, False)
     ]
-    return min(forms, key=lambda one: count_operations(one.function))
+    return min(forms, key=lambda candidate: count_operations(candidate.function))
 
 
 def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -> Program:
-    """Return the program of `equations.sticking.moved`: accelerations under the drives' forces.
+    """Return the program of `equations.sticking.stick_slip_rates`.
 
-    `kind` says which parts the drives have. If `general`, geometry and gravity are an input too.
+    `kind` has the features of the drives. If `general`, geometry and gravity are an input too.
     """
     layout = bare(robot)
     key = ("motion", layout, kind, *(["general"] if general else []))
-    return kept(key, partial(_motion, layout, kind, general))
+    return cached_program(key, partial(_motion, layout, kind, general))
 
 
 def _motion(robot: Manipulator, kind: DriveKind, general: bool) -> Program:
     n = robot.joint_count
-    names = [*(("side", "hold") if kind.dry else ()), *(name for name, _ in kind.more)]
+    names = [*(("side", "hold") if kind.dry else ()), *(name for name, _ in kind.extra_states)]
     extra = {name: ca.SX.sym(name, n) for name in names}
     extra |= {"brake": ca.SX.sym("brake")} if kind.dry else {}
     extra |= {"pace": ca.SX.sym("pace")} if any(kind.lugre) else {}
     extra["actuators"] = ca.SX.sym("actuators", actuator_count(kind))
-    machine, vector = Machine.symbols(robot) if general else (Machine.of(robot), None)
+    machine, vector = Machine.symbolic(robot) if general else (Machine.numeric(robot), None)
     form = _Form("driven_motion", wrench=True, guarded=True)
     return _program(machine, vector, form=form, constants={"kind": kind}, extra=extra)
 
@@ -254,7 +256,9 @@ def general_program(robot: RobotLike, what: str) -> Program:
 @lru_cache(maxsize=256)
 def _general(robot: Manipulator, form: _Form) -> Program:
     # The form is plain: exact arithmetic evaluates the equations as they are written.
-    return kept(("general", robot, form), lambda: _program(*Machine.symbols(robot), form=form))
+    return cached_program(
+        ("general", robot, form), lambda: _program(*Machine.symbolic(robot), form=form)
+    )
 
 
 def _program(
@@ -266,46 +270,35 @@ def _program(
     form: _Form,
 ) -> Program:
     """Return a function of the table; `constants` stand for inputs, `extra` are more inputs."""
-    what, entry = form.what, TABLE[form.what]
-    asked = [name for name in entry.inputs if name not in (constants or {})]
-    asked += ["wrench"] if form.wrench else []
-    selected = (constants or {}).get("selection", ca.SX.eye(0)).shape[1]
-    sizes = {
-        "parameters": len(machine.parameters),
-        "wrench": machine.wrench_size,
-        "twist": 6,
-        "mass": 1,
-        "center": 3,
-        "inertia": inertia_count(machine.robot.platform.inertia.kinds),
-        "drives": len(Drives._fields) * machine.freedom,
-        **control.input_sizes(what, machine.freedom, selected),
-    }
-    given = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked}
-    given |= extra or {}
-    symbols = {name: given[name] for name in sorted(given, key=_shared_last)}
+    what, definition = form.what, TABLE[form.what]
+    symbols = _input_symbols(machine, form, constants or {}, extra or {})
     known = symbols | (constants or {})
     if what in _FORCES and not form.named and vector is None:
-        seen = machine.in_platform_axes(symbols["pose"])
+        seen = machine.move_to_platform_frame(symbols["pose"])
         if seen is not None:
             machine, axes = seen
             if form.wrench:
                 parts = ca.vertsplit(symbols["wrench"], 3)
                 known["wrench"] = ca.vertcat(*(ca.mtimes(axes.T, part) for part in parts))
-    built = entry.build(machine, known)
-    forms = [{name: _shaped(output) for name, output in built.items()}]
+    built = definition.build(machine, known)
+    forms = [{name: _with_shape(unshaped) for name, unshaped in built.items()}]
     if form.guarded:
         results = [expression for expression, _ in forms[0].values()]
-        statuses = _statuses(machine, entry, symbols, results)
+        statuses = _statuses(machine, definition, symbols, results)
         forms = [{**forms[0], "status": (status, ())} for status in statuses]
     if vector is not None:
         symbols = {"geometry": vector, **symbols}
     # A matrix goes out transposed: CasADi stores columns, NumPy rows.
-    dense = ([ca.densify(expression).T for expression, _ in one.values()] for one in forms)
+    dense = (
+        [ca.densify(expression).T for expression, _ in candidate.values()] for candidate in forms
+    )
     names = list(symbols), list(forms[0])
-    functions = (ca.Function(what, list(symbols.values()), ca.cse(one), *names) for one in dense)
+    functions = (
+        ca.Function(what, list(symbols.values()), ca.cse(candidate), *names) for candidate in dense
+    )
     function = min(functions, key=count_operations)
     if not form.plain:
-        function = optimised(function)
+        function = optimise_function(function)
     columns = machine.robot.column_names
     inputs = tuple(
         Port(name, symbol.shape[:1], name in _SHARED, columns.get(name, ()))
@@ -315,25 +308,47 @@ def _program(
     return Program(what, function, inputs, ports)
 
 
+def _input_symbols(
+    machine: Machine, form: _Form, constants: Symbols, extra: dict[str, Expression]
+) -> dict[str, Expression]:
+    """Return the inputs of a function as symbols by name, shared ones last."""
+    names = [name for name in TABLE[form.what].inputs if name not in constants]
+    names += ["wrench"] if form.wrench else []
+    selected = constants.get("selection", ca.SX.eye(0)).shape[1]
+    sizes = {
+        "parameters": len(machine.parameters),
+        "wrench": machine.wrench_size,
+        "twist": 6,
+        "mass": 1,
+        "center": 3,
+        "inertia": inertia_count(machine.robot.platform.inertia.kinds),
+        "drives": len(Drives._fields) * machine.freedom,
+        **control.input_sizes(form.what, machine.freedom, selected),
+    }
+    symbols = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in names}
+    symbols |= extra
+    return {name: symbols[name] for name in sorted(symbols, key=_shared_last)}
+
+
 def _shared_last(name: str) -> int:
     return _SHARED.index(name) if name in _SHARED else -1
 
 
-def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
+def _with_shape(unshaped: Output) -> tuple[Expression, tuple[int, ...]]:
     """Return an output's expression and its shape; parts are stacked one below another."""
-    if isinstance(output, tuple):
-        return output
-    if isinstance(output, list):
-        return ca.vertcat(*output), (len(output), *output[0].shape)
-    return output, shape_of(output)
+    if isinstance(unshaped, tuple):
+        return unshaped
+    if isinstance(unshaped, list):
+        return ca.vertcat(*unshaped), (len(unshaped), *unshaped[0].shape)
+    return unshaped, shape_of(unshaped)
 
 
 def _statuses(
-    machine: Machine, entry: Entry, symbols: dict[str, Expression], results: list[Expression]
+    machine: Machine, definition: Entry, symbols: dict[str, Expression], results: list[Expression]
 ) -> list[Expression]:
-    """Return 1 where the result counts, else 0, for NaN too, in one or more equivalent forms.
+    """Return candidate expressions of the validity flag (1 valid, 0 invalid or NaN).
 
-    The form that shares most with the results is the cheapest.
+    The one that shares most subexpressions with the results is the cheapest.
     """
     states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
     sums = [
@@ -346,20 +361,20 @@ def _statuses(
         for groups in (states, results)
     ]
     status = ca.SX(1)
-    for total in sums if entry.needs == ("reach",) else sums[:1]:
+    for total in sums if definition.needs == ("reach",) else sums[:1]:
         status = ca.if_else(total < _HUGE, status, 0)
-    if {"reach", "rows"} & set(entry.needs):
-        found = kinematics.reach(machine, symbols["pose"])
-        for leg, at in zip(machine.legs, found, strict=True):
-            if "reach" in entry.needs or not leg.row_is_constant:
-                least = -_TINY if entry.needs == ("reach",) else TYPE_I**2 * at.scale
+    if {"reach", "rows"} & set(definition.needs):
+        reaches = kinematics.reach(machine, symbols["pose"])
+        for leg, at in zip(machine.legs, reaches, strict=True):
+            if "reach" in definition.needs or not leg.row_is_constant:
+                least = -_TINY if definition.needs == ("reach",) else TYPE_I**2 * at.scale
                 status = ca.if_else(least < at.discriminant, status, 0)  # Remark 2
-    if "angles" in entry.needs:
-        rest = ca.SX.zeros(machine.freedom)
-        measure = machine.platform.motion(symbols["pose"], rest, rest).angle_measure
+    if "angles" in definition.needs:
+        zero_rates = ca.SX.zeros(machine.freedom)
+        measure = machine.platform.motion(symbols["pose"], zero_rates, zero_rates).angle_measure
         if not measure.is_constant():
             status = ca.if_else(measure * measure > ANGLES**2, status, 0)
-    if "type II" not in entry.needs:
+    if "type II" not in definition.needs:
         return [status]
     state = machine.state(symbols["pose"])
     return [
@@ -368,5 +383,5 @@ def _statuses(
     ]
 
 
-def _is_nan(value: Expression) -> bool:
-    return bool(value.is_constant()) and bool(np.isnan(float(value)))
+def _is_nan(expression: Expression) -> bool:
+    return bool(expression.is_constant()) and bool(np.isnan(float(expression)))

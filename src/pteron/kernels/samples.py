@@ -14,9 +14,9 @@ import numpy as np
 
 from pteron.equations.sticking import STUCK
 from pteron.equations.transmissions import DriveKind
-from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array
 from pteron.kernels.loop_code import PARTS, ROUNDS
+from pteron.kernels.program_cache import Program
 from pteron.kernels.vm import OneState, VirtualMachine
 
 Ask = Callable[[int, int, Array], Array]
@@ -39,23 +39,25 @@ class Evaluated:
         self._one = OneState(self._kernel)
         self._rows = [array.reshape(-1) for array in self._one.inputs]
 
-    def __call__(self, given: Mapping[str, Array], arrays: Mapping[str, Array]) -> dict[str, Array]:
+    def __call__(
+        self, inputs_by_name: Mapping[str, Array], arrays: Mapping[str, Array]
+    ) -> dict[str, Array]:
         """Return the outputs (B, size) of inputs (B, size); the machine's numbers are `arrays`."""
-        batch = len(next(iter(given.values())))
+        batch = len(next(iter(inputs_by_name.values())))
         ports = self.program.inputs
-        values = [
-            arrays[key][:, 0] if port.shared else given[key]
+        columns = [
+            arrays[key][:, 0] if port.shared else inputs_by_name[key]
             for key, port in zip(self._keys, ports, strict=True)
         ]
         if batch == 1:
-            for row, value in zip(self._rows, values, strict=True):
-                row[:] = value[0]
+            for row, numbers in zip(self._rows, columns, strict=True):
+                row[:] = numbers[0]
             self._one.evaluate()
             outputs = [array.reshape(1, -1).copy() for array in self._one.outputs]
         else:
             inputs = [
-                np.ascontiguousarray(np.broadcast_to(value, (batch, port.size)))
-                for value, port in zip(values, ports, strict=True)
+                np.ascontiguousarray(np.broadcast_to(numbers, (batch, port.size)))
+                for numbers, port in zip(columns, ports, strict=True)
             ]
             outputs = [np.empty((batch, port.size)) for port in self.program.outputs]
             self._kernel._run(batch, inputs, outputs)
@@ -64,62 +66,62 @@ class Evaluated:
 
 
 class Plant:
-    """The plant of some machines: which joints stick, and steps under forces that stay."""
+    """The plant of some machines: the sticking joints, and steps under constant forces."""
 
     def __init__(self, program: Program, kind: DriveKind) -> None:
         self._program = Evaluated("plant", program)
         self._kind, self._dry, self.elastic = kind, kind.dry, kind.elastic
         self.split = kind.parts
 
-    def _moved(self, held: dict[str, Array], arrays: Mapping[str, Array]) -> dict[str, Array]:
-        """Return what happens in a state, with the friction that holds joints where some stick."""
-        found = self._program(held, arrays)
-        stuck = {name: found.pop(name) for name in STUCK if name in found}
+    def _evaluate(self, state: dict[str, Array], arrays: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the motion of a state, including the friction that holds sticking joints."""
+        motion = self._program(state, arrays)
+        stuck = {name: motion.pop(name) for name in STUCK if name in motion}
         if stuck:
-            sticks = (held["side"] == 0.0).any(axis=1)
-            for name, values in stuck.items():
-                found[STUCK[name]][sticks] = values[sticks]
-        return found
+            sticks = (state["side"] == 0.0).any(axis=1)
+            for name, stuck_values in stuck.items():
+                motion[STUCK[name]][sticks] = stuck_values[sticks]
+        return motion
 
     def begin(
-        self, held: dict[str, Array], arrays: Mapping[str, Array], side: Array, step: float
+        self, state: dict[str, Array], arrays: Mapping[str, Array], side: Array, step: float
     ) -> dict[str, Array]:
-        """Return what happens in a state, and put the sides and what sticks into `held`."""
-        held["pace"] = np.full((len(side), 1), 1.0 / step)
+        """Return the motion of a state; find the sliding sides and write them into `state`."""
+        state["pace"] = np.full((len(side), 1), 1.0 / step)
         if not self._dry:
-            return self._moved(held, arrays)
+            return self._evaluate(state, arrays)
         batch, count = side.shape
-        held |= {"side": side.copy(), "hold": np.zeros_like(side)}
-        held["brake"] = np.full((batch, 1), 1.0 / step)
-        found = self._moved(held, arrays)
+        state |= {"side": side.copy(), "hold": np.zeros_like(side)}
+        state["brake"] = np.full((batch, 1), 1.0 / step)
+        motion = self._evaluate(state, arrays)
         best, chances = np.full(batch, count + 1), np.full(batch, 3)
         for _ in range(ROUNDS):
-            now = held["side"]
-            ahead = found["rates"] + step * found["growth"]
-            against = now * ahead < 0.0
-            beyond = np.abs(found["friction"]) > found["breakaway"]
-            if not (against | beyond).any():
+            sides = state["side"]
+            ahead = motion["rates"] + step * motion["growth"]
+            reverses = sides * ahead < 0.0
+            exceeds = np.abs(motion["friction"]) > motion["breakaway"]
+            if not (reverses | exceeds).any():
                 break
-            better = np.where(beyond, np.where(found["friction"] > 0.0, -1.0, 1.0), now)
-            better = np.where(against, 0.0, better)
-            for k in np.flatnonzero((against | beyond).any(axis=1)):
-                changed = np.flatnonzero(better[k] != now[k])
+            new_sides = np.where(exceeds, np.where(motion["friction"] > 0.0, -1.0, 1.0), sides)
+            new_sides = np.where(reverses, 0.0, new_sides)
+            for k in np.flatnonzero((reverses | exceeds).any(axis=1)):
+                changed = np.flatnonzero(new_sides[k] != sides[k])
                 fewer = len(changed) < best[k]
                 at_once = fewer or chances[k] > 0
                 chances[k] = 3 if fewer else chances[k] - 1
                 best[k] = min(best[k], len(changed))
                 chosen = changed if at_once else changed[-1:]
-                now[k, chosen] = better[k, chosen]
-            found = self._moved(held, arrays)
-        held["hold"] = -(held["brake"] * found["rates"])
-        held["brake"] = np.zeros((batch, 1))
-        return found
+                sides[k, chosen] = new_sides[k, chosen]
+            motion = self._evaluate(state, arrays)
+        state["hold"] = -(state["brake"] * motion["rates"])
+        state["brake"] = np.zeros((batch, 1))
+        return motion
 
     def go(
         self,
         steps: int,
         step: float,
-        held: dict[str, Array],
+        state: dict[str, Array],
         arrays: Mapping[str, Array],
         alive: Array,
     ) -> None:
@@ -135,15 +137,15 @@ class Plant:
                 strict=True,
             )
             for stage, (ahead, weight) in enumerate(stages):
-                held |= self.split(at)
+                state |= self.split(at)
                 if stage == 0:
-                    found = self.begin(held, arrays, side, step)
-                    side[:] = held.get("side", side)
+                    motion = self.begin(state, arrays, side, step)
+                    side[:] = state.get("side", side)
                 else:
-                    found = self._moved(held, arrays)
-                good &= found["status"][:, 0] != 0.0
-                rates = [(held | found)[name] for _, name in self._kind.more]
-                growth = np.hstack([held["velocity"], found["acceleration"], *rates])
+                    motion = self._evaluate(state, arrays)
+                good &= motion["status"][:, 0] != 0.0
+                rates = [(state | motion)[name] for _, name in self._kind.extra_states]
+                growth = np.hstack([state["velocity"], motion["acceleration"], *rates])
                 total = total + weight * growth
                 at = old + ahead * growth
             y[:] = np.where(good[:, None], old + total, old)
@@ -169,119 +171,143 @@ def run_samples(
     ask: Ask | None,
 ) -> None:
     """Run some samples of machines; see `LoopCode.run`."""
-    own: dict[str, Any] = {name: value[:, 0] for name, value in arrays.items()}
-    y, side, memory, fault, done = (
-        own[name] for name in ("state", "side", "memory", "fault", "done")
+    numbers: dict[str, Any] = {name: array[:, 0] for name, array in arrays.items()}
+    y, side, memory, fault, done, seen = (
+        numbers[name] for name in ("state", "side", "memory", "fault", "done", "seen")
     )
-    seen, batch = own["seen"], len(y)
-    late_parts, look, whole, behind, first, end = counts[PARTS:]
+    late_parts, look, late_samples, behind, first, end = counts[PARTS:]
     parts = [part for part in range(PARTS) if counts[part]] or [0]
-    queue, slots = arrays["queue"], whole + 2
+    queue, slots = arrays["queue"], late_samples + 2
     alive = (fault[:, 0] == 0.0).astype(float)
-
-    def at(name: str, s: int) -> Array:
-        values = arrays[name]
-        row: Array = values[:, s if values.shape[1] > 1 else 0]
-        return np.broadcast_to(row, (batch, values.shape[2]))
-
-    def record(**values: Array) -> None:
-        for name, value in values.items():
-            if name in arrays:
-                arrays[name][:, s] = value
-
     for s in range(samples):
         number = first + s
         state = plant.split(y)
-        found = sensed(state, arrays)
-        joints, rates = found["joints"], found["rates"]
-        looked, there = (found, state) if look == parts[-1] else (None, plant.split(seen))
-        if looked is None:
-            looked = sensed(there, arrays)
-        heard = _measured(looked, there, plant.elastic, own, at, s, times[PARTS])
-        told = arrays["told"]
-        told[:, number % (behind + 1) if number else slice(None)] = (
-            heard if number else heard[:, None]
+        joint_motion = sensed(state, arrays)
+        joints, rates = joint_motion["joints"], joint_motion["rates"]
+        seen_state = state if look == parts[-1] else plant.split(seen)
+        seen_motion = joint_motion if look == parts[-1] else sensed(seen_state, arrays)
+        period = times[PARTS]
+        reported = _encoder_readings(seen_motion, seen_state, plant.elastic, arrays, s, period)
+        delayed = _delay(arrays["told"], reported, number, behind)
+        measured = _controller_readings(delayed, numbers["at_motor"])
+        commands = _commands(law, ask, arrays, s, number, measured)
+        limited = np.clip(commands, -numbers["most"], numbers["most"])
+        queue[:, number % slots if number else slice(None)] = (
+            limited if number else limited[:, None]
         )
-        measured = _of_controller(told[:, (number + 1) % (behind + 1)].copy(), own["at_motor"])
-        if law is not None:
-            wanted = np.split(at("reference", s), 3, axis=1)
-            given = dict(zip(("pose", "velocity", "acceleration"), wanted, strict=True))
-            given |= dict(zip(READINGS, measured, strict=True)) | {"memory": memory}
-            wants = law(given, arrays)
-            memory[:] = wants.get("next_memory", memory)
-            asked = wants["forces"]
-            if "status" in wants:
-                asked = np.where(wants["status"] != 0.0, asked, np.nan)
-        elif ask is not None:
-            asked = np.array([ask(k, number, np.hstack(measured[:2])[k]) for k in range(batch)])
-        else:
-            asked = at("given", s)
-        cut = np.clip(asked, -own["most"], own["most"])
-        queue[:, number % slots if number else slice(None)] = cut if number else cut[:, None]
-        late, held = queue[:, (number + 1) % slots].copy(), queue[:, (number + 2) % slots].copy()
-        now = late if late_parts else held
-        loads = {"forces": now, "wrench": at("wrench", s)}
+        late, current = (queue[:, (number + k) % slots].copy() for k in (1, 2))
+        applied = late if late_parts else current
+        loads = {"forces": applied, "wrench": _row(arrays, "wrench", s)}
         if "acceleration" in arrays:
-            given = {**state, **loads}
-            found = plant.begin(given, arrays, side, times[parts[0]])
-            growth = np.where(found["status"] != 0.0, found["acceleration"], np.nan)
-            if "side" in given and "motor" not in given:
-                growth[~(given["side"].any(axis=1) | state["velocity"].any(axis=1))] = 0.0
-            record(acceleration=growth)
-        record(states=y, joints=joints, rates=rates)
-        record(forces=now, asked=asked, memories=memory)
+            arrays["acceleration"][:, s] = _acceleration(
+                plant, {**state, **loads}, arrays, side, times[parts[0]]
+            )
+        recorded = {"states": y, "joints": joints, "rates": rates, "forces": applied}
+        recorded |= {"asked": commands, "memories": memory}
+        for name in recorded.keys() & arrays.keys():
+            arrays[name][:, s] = recorded[name]
         done += alive[:, None]
-        lost = (alive != 0.0) & ~np.isfinite(asked).all(axis=1)
+        lost = (alive != 0.0) & ~np.isfinite(commands).all(axis=1)
         fault[lost], alive[lost] = 1.0, 0.0
         if not alive.any() or (end and s == samples - 1):
             return
         for part in parts:
-            forces = late if part < late_parts else held
+            forces = late if part < late_parts else current
             plant.go(counts[part], times[part], {**loads, "forces": forces}, arrays, alive)
             if part == look:
                 seen[:] = y
         fault[(alive == 0.0) & (fault[:, 0] == 0.0)] = 2.0
 
 
-def _measured(
-    looked: Mapping[str, Array],
+def _row(arrays: Mapping[str, Array], name: str, s: int) -> Array:
+    """Return the rows (B, size) of an array (B or 1, T or 1, size) at sample s."""
+    array = arrays[name]
+    row: Array = array[:, s if array.shape[1] > 1 else 0]
+    return np.broadcast_to(row, (len(arrays["state"]), array.shape[2]))
+
+
+def _delay(line: Array, reported: Array, number: int, behind: int) -> Array:
+    """Put readings (B, E) into a delay line and return those of `behind` samples before."""
+    line[:, number % (behind + 1) if number else slice(None)] = (
+        reported if number else reported[:, None]
+    )
+    return line[:, (number + 1) % (behind + 1)].copy()
+
+
+def _commands(
+    law: Evaluated | None,
+    ask: Ask | None,
+    arrays: Mapping[str, Array],
+    s: int,
+    number: int,
+    measured: Sequence[Array],
+) -> Array:
+    """Return the controller's forces (B, n), NaN where its law is not valid; update its memory."""
+    if law is not None:
+        desired = np.split(_row(arrays, "reference", s), 3, axis=1)
+        inputs = dict(zip(("pose", "velocity", "acceleration"), desired, strict=True))
+        memory = arrays["memory"][:, 0]
+        inputs |= dict(zip(READINGS, measured, strict=True)) | {"memory": memory}
+        outputs = law(inputs, arrays)
+        memory[:] = outputs.get("next_memory", memory)
+        if "status" in outputs:
+            return np.where(outputs["status"] != 0.0, outputs["forces"], np.nan)
+        return outputs["forces"]
+    if ask is not None:
+        readings = np.hstack(measured[:2])
+        return np.array([ask(k, number, readings[k]) for k in range(len(readings))])
+    return _row(arrays, "given", s)
+
+
+def _acceleration(
+    plant: Plant, state: dict[str, Array], arrays: Mapping[str, Array], side: Array, step: float
+) -> Array:
+    """Return the acceleration (B, m) of a state, NaN where it is not valid, 0 at rest."""
+    motion = plant.begin(state, arrays, side, step)
+    acceleration = np.where(motion["status"] != 0.0, motion["acceleration"], np.nan)
+    if "side" in state and "motor" not in state:
+        acceleration[~(state["side"].any(axis=1) | state["velocity"].any(axis=1))] = 0.0
+    return acceleration
+
+
+def _encoder_readings(
+    motion: Mapping[str, Array],
     state: Mapping[str, Array],
     elastic: Sequence[bool],
-    own: Mapping[str, Any],
-    at: Callable[[str, int], Array],
+    arrays: Mapping[str, Array],
     s: int,
     period: float,
 ) -> Array:
-    """Return coordinates and rates (B, 2 E) as the encoders tell them, and count on in `encoders`.
+    """Return the encoders' coordinates and rates (B, 2 E), and update their state `encoders`.
 
     Where a transmission bends, motors have encoders too, after those of all joints.
     """
-    read = [looked["joints"], looked["rates"]]
+    exact = [motion["joints"], motion["rates"]]
     if "motor" in state:
-        read = [
-            np.hstack([one, np.where(elastic, state[name], one)])
-            for name, one in zip(("motor", "motor_rate"), read, strict=True)
+        exact = [
+            np.hstack([joint_part, np.where(elastic, state[name], joint_part)])
+            for name, joint_part in zip(("motor", "motor_rate"), exact, strict=True)
         ]
-    joints, rates = read
-    steps, noises = own["steps"], own["noises"]
+    joints, rates = exact
+    steps, noises = arrays["steps"][:, 0], arrays["noises"][:, 0]
     if not (steps.any() or noises.any()):
-        return np.hstack(read)
-    last, turns, reading, filtered = np.split(own["encoders"], 4, axis=1)
-    turns -= own["round"] * np.rint((joints - last) / _TURN)
+        return np.hstack(exact)
+    last, turns, reading, filtered = np.split(arrays["encoders"][:, 0], 4, axis=1)
+    turns -= arrays["round"][:, 0] * np.rint((joints - last) / _TURN)
     last[:] = joints
-    gone = _TURN * turns
-    told = joints + gone + noises * at("noise", s)
+    offset = _TURN * turns
+    reported = joints + offset + noises * _row(arrays, "noise", s)
     widths = np.where(steps > 0.0, steps, 1.0)
-    told = np.where(steps > 0.0, steps * np.rint(told / widths), told)
-    filtered += own["share"] * ((told - reading) / period - filtered)
-    reading[:] = told
-    return np.hstack([told - gone, np.where(steps + noises > 0.0, filtered, rates)])
+    reported = np.where(steps > 0.0, steps * np.rint(reported / widths), reported)
+    filtered += arrays["share"][:, 0] * ((reported - reading) / period - filtered)
+    reading[:] = reported
+    return np.hstack([reported - offset, np.where(steps + noises > 0.0, filtered, rates)])
 
 
-def _of_controller(heard: Array, at_motor: Array) -> tuple[Array, ...]:
-    """Return `READINGS` of what the encoders tell."""
+def _controller_readings(reported: Array, at_motor: Array) -> tuple[Array, ...]:
+    """Return `READINGS`, (B, n) each, from the encoders' coordinates and rates."""
     n = at_motor.shape[1] // 2
-    parts = np.split(heard, heard.shape[1] // n, axis=1)
+    parts = np.split(reported, reported.shape[1] // n, axis=1)
     if len(parts) == len(READINGS[:2]):
         return (*parts, *parts)
     joints, motors, rates, motor_rates = parts

@@ -15,12 +15,12 @@ from pteron.equations.transmissions import actuator_numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
 from pteron.kernels.fields import Exact
-from pteron.kernels.hoisting import hoisted
+from pteron.kernels.hoisting import hoist_invariants
 from pteron.kernels.intervals import Boxed
 from pteron.kernels.jax import Traced
-from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
+from pteron.kernels.program_cache import Program
 from pteron.kernels.programs import Columns, general_program, program, specialised
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
@@ -48,7 +48,7 @@ FIXED: dict[str, Callable[[Manipulator], Array]] = {
 """The inputs that have a machine's own values unless a call gives others."""
 
 _TRANSPARENT = ("jax", "exact")
-"""Targets whose numbers may be traced or fractions, and go into the code as they are given."""
+"""Targets whose numbers may be traced or fractions, and enter the code unconverted."""
 
 _DOUBLE = ("vm", "numba", "exact", "intervals")
 """Targets that compute in double precision alone."""
@@ -149,14 +149,14 @@ def compile(
     if threads < 1:
         raise ModelError(f"threads: {threads} given, 1 or more expected")
     if base is None:
-        return _compiled(robot, what, target, None, None, wrench, grade, dtype, threads)
+        return _cached_kernel(robot, what, target, None, None, wrench, grade, dtype, threads)
     if grade == "general":
         raise ModelError('base: a choice for one machine; use grade "specialised" or "parametric"')
     if not same_layout(base.robot, robot):
         raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
     columns = columns_of(base)
-    values = tuple(base.values(robot).tolist())
-    return _compiled(robot, what, target, columns, values, wrench, grade, dtype, threads)
+    base_values = tuple(base.values(robot).tolist())
+    return _cached_kernel(robot, what, target, columns, base_values, wrench, grade, dtype, threads)
 
 
 OTHER_LAYOUT = (
@@ -171,7 +171,7 @@ def columns_of(base: Selects) -> Columns:
 
 
 @lru_cache(maxsize=512)
-def _compiled(
+def _cached_kernel(
     robot: Manipulator,
     what: str,
     target: str,
@@ -190,40 +190,40 @@ def _compiled(
             fixed[port.name] = FIXED[port.name](robot)
         elif port.name == "base_parameters":
             fixed[port.name] = np.array(base_values)
-    made: dict[str, ca.Function] = {}
+    derived: dict[str, ca.Function] = {}
     if folded:
         built, fixed = specialised(built, fixed), {}
     elif base_values is not None and target not in _TRANSPARENT and "base_parameters" in fixed:
-        # What depends on base parameters alone is worked out once.
-        built, made["base_parameters"] = hoisted(built, "base_parameters")
-        fixed["base_parameters"] = np.array(made["base_parameters"](base_values)).ravel()
+        # Operations on base parameters alone are evaluated once.
+        built, derived["base_parameters"] = hoist_invariants(built, "base_parameters")
+        fixed["base_parameters"] = np.array(derived["base_parameters"](base_values)).ravel()
     elif grade == "general":
         if wrench:
             raise ModelError('wrench: not with grade "general"; use "specialised" or "parametric"')
         built = general_program(robot, what)
         fixed["geometry"] = np.array(numbers(robot))
-    for value in fixed.values():
-        value.setflags(write=False)  # the kernel is shared by all who ask for it
-    kernel = _made(TARGETS[target], built, fixed, dtype, threads)
-    kernel.made.update(made)
+    for array in fixed.values():
+        array.setflags(write=False)  # the kernel is shared by all who ask for it
+    kernel = _instantiate_kernel(TARGETS[target], built, fixed, dtype, threads)
+    kernel.made.update(derived)
     return kernel
 
 
-def _made(
+def _instantiate_kernel(
     kind: type[Kernel], built: Program, fixed: dict[str, Array], dtype: str, threads: int
 ) -> Kernel:
     # Fixed inputs come last, so that a call may append them to what it is given.
     order = sorted(range(len(built.inputs)), key=lambda k: built.inputs[k].name in fixed)
     if order != sorted(order):
         symbols, inputs = built.function.sx_in(), [built.inputs[k] for k in order]
-        found, given = built.function.call(symbols), [symbols[k] for k in order]
-        built = Program.of(built.name, given, inputs, found, built.outputs)
+        outputs, reordered = built.function.call(symbols), [symbols[k] for k in order]
+        built = Program.from_expressions(built.name, reordered, inputs, outputs, built.outputs)
     return kind(built.name, built.function, built.inputs, built.outputs, fixed, dtype, threads)
 
 
-def same_layout(one: RobotLike, other: RobotLike) -> bool:
+def same_layout(robot: RobotLike, other: RobotLike) -> bool:
     """Return whether two machines have the same base parameters: layout and gravity are equal."""
-    return _layout(as_manipulator(one)) == _layout(as_manipulator(other))
+    return _layout(as_manipulator(robot)) == _layout(as_manipulator(other))
 
 
 def _layout(robot: Manipulator) -> tuple[Any, ...]:
@@ -237,5 +237,5 @@ def _layout(robot: Manipulator) -> tuple[Any, ...]:
         for leg in robot.legs
     ]
     platform = robot.platform
-    own = platform.motion, platform.frame, platform.angle_order, platform.second_axis
-    return (*own, robot.gravity, *legs)
+    platform_data = platform.motion, platform.frame, platform.angle_order, platform.second_axis
+    return (*platform_data, robot.gravity, *legs)

@@ -37,7 +37,7 @@ class TermGraph:
         self._orders: dict[tuple[int, ...], list[int]] = {}
 
     def add(self, *node: Any) -> int:
-        """Return the number of a node, which is new or there already."""
+        """Return the number of a node, added if it is new."""
         number = self.numbers.get(node)
         if number is None:
             number = self.numbers[node] = len(self.nodes)
@@ -58,17 +58,17 @@ class TermGraph:
         """Return the value of a number."""
         return -self.add("constant", -c) if c < 0 else self.add("constant", c)
 
-    def constant_of(self, value: int) -> float | None:
+    def constant_of(self, operand: int) -> float | None:
         """Return the number that a value is, None where it depends on inputs or is not finite."""
-        c = self._constants.get(abs(value))
-        return c if c is None or value > 0 else -c
+        c = self._constants.get(abs(operand))
+        return c if c is None or operand > 0 else -c
 
-    def sum(self, values: Iterable[int]) -> int:
+    def sum(self, operands: Iterable[int]) -> int:
         """Return the value of a sum."""
-        terms = list(values)
+        terms = list(operands)
         sizes = set(map(abs, terms))
         if len(sizes) < len(terms) or not self._constants.keys().isdisjoint(sizes):
-            terms = self._collected(terms)
+            terms = self._collect_terms(terms)
         if len(terms) == 1:
             return terms[0]
         terms.sort(key=abs)
@@ -76,12 +76,12 @@ class TermGraph:
             return self.add("sum", *terms)
         return -self.add("sum", *[-term for term in terms])
 
-    def _collected(self, values: list[int]) -> list[int]:
-        """Return a sum's terms, those that are equal as one, and its constants as one."""
+    def _collect_terms(self, operands: list[int]) -> list[int]:
+        """Return a sum's terms with like terms and constants collected."""
         constant = 0.0
         counts: dict[int, int] = {}
-        for value in values:
-            k, sign = (value, 1) if value > 0 else (-value, -1)
+        for operand in operands:
+            k, sign = (operand, 1) if operand > 0 else (-operand, -1)
             c = self._constants.get(k)
             if c is None:
                 counts[k] = counts.get(k, 0) + sign
@@ -97,14 +97,14 @@ class TermGraph:
             terms.append(self.constant(constant))
         return terms
 
-    def product(self, values: Iterable[int]) -> int:
+    def product(self, operands: Iterable[int]) -> int:
         """Return the value of a product."""
-        given = list(values)
-        factors = sorted(map(abs, given))
-        turned = sum([value < 0 for value in given]) % 2
+        operand_list = list(operands)
+        factors = sorted(map(abs, operand_list))
+        turned = sum([operand < 0 for operand in operand_list]) % 2
         if not self._constants.keys().isdisjoint(factors):
             constant = -1.0 if turned else 1.0
-            for k in map(abs, given):
+            for k in map(abs, operand_list):
                 constant *= self._constants.get(k, 1.0)
             factors = [k for k in factors if k not in self._constants]
             if constant == 0.0 or not factors:
@@ -124,22 +124,24 @@ class TermGraph:
             return self.reciprocal(b) * int(c)
         return self.product([a, self.inverse(b)])
 
-    def reciprocal(self, value: int) -> int:
+    def reciprocal(self, operand: int) -> int:
         """Return 1/x as an operation of its own."""
-        c = self.constant_of(value)
-        return self.constant(1.0 / c) if c else sign_of(value) * self.add("reciprocal", abs(value))
+        c = self.constant_of(operand)
+        return (
+            self.constant(1.0 / c) if c else sign_of(operand) * self.add("reciprocal", abs(operand))
+        )
 
-    def inverse(self, value: int) -> int:
+    def inverse(self, operand: int) -> int:
         """Return 1/x as a factor: the reciprocal where there is one, or else a division."""
-        c = self.constant_of(value)
+        c = self.constant_of(operand)
         if c:
             return self.constant(1.0 / c)
-        there = self.numbers.get(("reciprocal", abs(value)))
-        return sign_of(value) * (there or self.add("inverse", abs(value)))
+        there = self.numbers.get(("reciprocal", abs(operand)))
+        return sign_of(operand) * (there or self.add("inverse", abs(operand)))
 
-    def is_a(self, kind: str, value: int) -> bool:
+    def is_kind(self, kind: str, operand: int) -> bool:
         """Return whether a value is a sum, a product, ..., or the negative of one."""
-        return self.kinds[abs(value)] == kind
+        return self.kinds[abs(operand)] == kind
 
     def order(self, roots: Iterable[int]) -> list[int]:
         """Return the nodes that the roots depend on, operands first."""
@@ -159,8 +161,8 @@ class TermGraph:
                     stack += waiting
                 else:
                     order[last] = None
-        self._orders[start] = found = list(order)
-        return found
+        self._orders[start] = ordered = list(order)
+        return ordered
 
     def uses(self, roots: Iterable[int]) -> Counter[int]:
         """Return the number of times that each node is an operand or a root."""
@@ -168,23 +170,23 @@ class TermGraph:
         operands = chain.from_iterable([self.operands[k] for k in self.order(roots)])
         return Counter(map(abs, chain(roots, operands)))
 
-    def rebuilt(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
+    def rebuild(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
         """Return a graph made from this one by a rule, node by node."""
         new = TermGraph()
-        values: dict[int, int] = {}
+        new_values: dict[int, int] = {}
         for k in self.order(roots):
-            values[k] = value = rule(new, k, [values[v] for v in self.operands[k]])
-            values[-k] = -value
-        return new, [values[v] for v in roots]
+            new_values[k] = new_value = rule(new, k, [new_values[v] for v in self.operands[k]])
+            new_values[-k] = -new_value
+        return new, [new_values[v] for v in roots]
 
-    def copied(self, new: TermGraph, k: int, values: list[int]) -> int:
-        """Return the value in a new graph that differs in the operands alone: the plainest rule."""
+    def copy_node(self, new: TermGraph, k: int, operands: list[int]) -> int:
+        """Return the copy of a node in a new graph, with new operands (the identity rule)."""
         kind = self.kinds[k]
         if kind in ("sum", "product"):
-            return new.sum(values) if kind == "sum" else new.product(values)
+            return new.sum(operands) if kind == "sum" else new.product(operands)
         if kind in ("inverse", "reciprocal"):
-            return new.inverse(values[0]) if kind == "inverse" else new.reciprocal(values[0])
-        return new.add(kind, *values) if values else new.add(*self.nodes[k])
+            return new.inverse(operands[0]) if kind == "inverse" else new.reciprocal(operands[0])
+        return new.add(kind, *operands) if operands else new.add(*self.nodes[k])
 
 
 def sign_of(value: float) -> int:

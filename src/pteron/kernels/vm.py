@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.bodies.motion import Expression
-from pteron.kernels.exponential import straight
-from pteron.kernels.graph import INPUT, Graph, Node, expression, graph_of, rewritten
+from pteron.kernels.exponential import with_lowered_exponentials
+from pteron.kernels.graph import INPUT, Graph, Node, expression, graph_of, rewrite_operations
 from pteron.kernels.kernel import Array, ArrayKernel, Port, as_array
-from pteron.kernels.sincos import LIMIT, near
+from pteron.kernels.sincos import LIMIT, reduced_sincos
 
 LENGTH = 1024
 """States of a block."""
@@ -44,16 +44,16 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "not": np.logical_not,
     "and": np.logical_and,
     "or": np.logical_or,
-    "select": lambda held, value, out: np.copyto(out, np.where(held != 0.0, value, 0.0)),
+    "select": lambda test, chosen, out: np.copyto(out, np.where(test != 0.0, chosen, 0.0)),
 }
-"""Operations whose last argument is where the result goes."""
+"""Operations whose last argument receives the result."""
 
 _THREAD = threading.local()
 """Each thread's rows of a block's length, which all functions fill in turn."""
 
 
-class Sweep:
-    """A function, its sines and cosines lowered, for batches; it serves the thread that makes it.
+class BatchInterpreter:
+    """A batch interpreter of a function with lowered sines, for the thread that constructs it.
 
     Parameters
     ----------
@@ -74,8 +74,9 @@ class Sweep:
             if node.operation == INPUT:
                 self._inputs.append((*node.arguments, place))
             elif node.arguments:
-                made = _OPERATIONS.get(node.operation) or _by_casadi(node, place.shape)
-                self._steps[node.shared].append((made, *(places[i] for i in node.arguments), place))
+                operation = _OPERATIONS.get(node.operation) or _casadi_operation(node, place.shape)
+                operands = (places[i] for i in node.arguments)
+                self._steps[node.shared].append((operation, *operands, place))
         self._outputs = [
             (i, j, places[k]) for i, nodes in enumerate(graph.outputs) for j, k in enumerate(nodes)
         ]
@@ -100,10 +101,10 @@ class Sweep:
 
 
 def _places(graph: Graph) -> dict[int, Array]:
-    """Return the place of the value of each node that the outputs depend on.
+    """Return the storage of each node on which the outputs depend.
 
-    A value that is shared has a place of its own, another a row, which serves again after its last
-    use; a row of an input is not written to before.
+    A shared value has its own scalar, others a row, which is reused after its last use; rows of
+    inputs are not reused before.
     """
     count = len(graph.nodes)
     last = {k: count for nodes in graph.outputs for k in nodes}
@@ -131,27 +132,27 @@ def _places(graph: Graph) -> dict[int, Array]:
     return places
 
 
-def _by_casadi(node: Node, shape: tuple[int, ...]) -> Callable[..., None]:
-    """Return an operation that CasADi does, element by element."""
+def _casadi_operation(node: Node, shape: tuple[int, ...]) -> Callable[..., None]:
+    """Return an operation that CasADi evaluates element by element."""
     symbols = [ca.SX.sym("value") for _ in node.arguments]
-    one = ca.Function("one", symbols, [expression(node, symbols)])
-    buffer, evaluate = one.map(int(np.prod(shape))).buffer()
-    held = [np.zeros(shape) for _ in symbols]
-    for i, row in enumerate(held):
+    scalar_function = ca.Function("one", symbols, [expression(node, symbols)])
+    buffer, evaluate = scalar_function.map(int(np.prod(shape))).buffer()
+    rows = [np.zeros(shape) for _ in symbols]
+    for i, row in enumerate(rows):
         buffer.set_arg(i, row.reshape(-1).data)
-    # A sine or cosine is needed beyond the limit only: see `_lowered`.
+    # A sine or cosine is needed beyond the limit only: see `_with_lowered_sines`.
     lowered = node.operation in ("sin", "cos")
 
-    def made(*given: Array) -> None:
-        *arguments, out = given
+    def operation(*arrays: Array) -> None:
+        *arguments, out = arrays
         if lowered and np.abs(arguments[0]).max() <= LIMIT:
             return
-        for row, value in zip(held, arguments, strict=True):
-            row[...] = value
+        for row, array in zip(rows, arguments, strict=True):
+            row[...] = array
         buffer.set_res(0, out.reshape(-1).data)
         evaluate()
 
-    return made
+    return operation
 
 
 _FLOAT = np.dtype(float)
@@ -168,50 +169,50 @@ class VirtualMachine(ArrayKernel):
     """A kernel that CasADi's virtual machine executes."""
 
     @cached_property
-    def _lowered(self) -> ca.Function:
-        return _lowered(straight(self.function))
+    def _lowered_function(self) -> ca.Function:
+        return _with_lowered_sines(with_lowered_exponentials(self.function))
 
     @cached_property
-    def _held(self) -> threading.local:
+    def _thread_memory(self) -> threading.local:
         return threading.local()
 
-    def checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+    def evaluate_checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         """Evaluate the kernel; plain arrays of one state take less than half the time of others."""
-        found = None if fixed else self._of_one_state(values)
-        return super().checked(*values, **fixed) if found is None else found
+        outputs = None if fixed else self._evaluate_one_state(values)
+        return super().evaluate_checked(*values, **fixed) if outputs is None else outputs
 
-    def _of_one_state(self, values: Sequence[Any]) -> Any:
+    def _evaluate_one_state(self, values: Sequence[Any]) -> Any:
         """Return the outputs for plain arrays of one state; None where something else is given."""
         if len(values) != len(self.inputs):
             return None
-        for value, port in zip(values, self.inputs, strict=True):
-            plain = type(value) is np.ndarray and value.dtype == _FLOAT
-            if not plain or value.shape != port.shape:
+        for number, port in zip(values, self.inputs, strict=True):
+            is_plain = type(number) is np.ndarray and number.dtype == _FLOAT
+            if not is_plain or number.shape != port.shape:
                 return None
-        held: OneState | None = getattr(self._held, "state", None)
-        if held is None:
-            held = self._held.state = OneState(self)
-        for mine, value in zip(held.inputs, values, strict=True):
-            mine[...] = value
-        held.evaluate()
-        found = tuple([output.copy() for output in held.outputs])
-        return found[0] if len(found) == 1 else found
+        memory: OneState | None = getattr(self._thread_memory, "state", None)
+        if memory is None:
+            memory = self._thread_memory.state = OneState(self)
+        for mine, number in zip(memory.inputs, values, strict=True):
+            mine[...] = number
+        memory.evaluate()
+        copies = tuple([array.copy() for array in memory.outputs])
+        return copies[0] if len(copies) == 1 else copies
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         shared = tuple(i for i, port in enumerate(self.ports) if port.shared)
-        function = self._lowered
-        rest = batch % LENGTH
-        start = batch - rest if rest < _MANY else batch
+        function = self._lowered_function
+        remainder = batch % LENGTH
+        start = batch - remainder if remainder < _MANY else batch
         if start:
-            held = vars(self._held)
-            if "sweep" not in held:
-                held["sweep"] = Sweep(function, self.ports)
-            held["sweep"].run(start, inputs, outputs)
+            memory = vars(self._thread_memory)
+            if "sweep" not in memory:
+                memory["sweep"] = BatchInterpreter(function, self.ports)
+            memory["sweep"].run(start, inputs, outputs)
         for size in _CALLS:
             stop = batch - (batch - start) % size
             if start < stop:
-                mapped = _mapped(function, shared, size) if size > 1 else function
-                _sweep(mapped, inputs, outputs, range(start, stop, size), size)
+                mapped = _map_states(function, shared, size) if size > 1 else function
+                _evaluate_calls(mapped, inputs, outputs, range(start, stop, size), size)
             start = stop
 
 
@@ -219,7 +220,7 @@ class OneState:
     """A thread's memory for one state, which CasADi reads and fills in place."""
 
     def __init__(self, kernel: VirtualMachine) -> None:
-        self._buffer, self.evaluate = kernel._lowered.buffer()
+        self._buffer, self.evaluate = kernel._lowered_function.buffer()
         self.inputs: list[Array] = []
         self._fixed: list[Array] = []
         for i, port in enumerate(kernel.ports):
@@ -235,22 +236,24 @@ class OneState:
 
 
 @lru_cache(maxsize=256)
-def _lowered(function: ca.Function) -> ca.Function:
+def _with_lowered_sines(function: ca.Function) -> ca.Function:
     """Return the function with the sines and cosines of `sincos`."""
-    rules = {"sin": partial(_close, 0, ca.sin), "cos": partial(_close, 1, ca.cos)}
-    return rewritten(function, rules)
+    rules = {"sin": partial(_sine_or_cosine, 0, ca.sin), "cos": partial(_sine_or_cosine, 1, ca.cos)}
+    return rewrite_operations(function, rules)
 
 
-def _close(place: int, exact: Callable[[Expression], Expression], angle: Expression) -> Expression:
-    return ca.if_else(ca.fabs(angle) <= LIMIT, near()(angle)[place], exact(angle))
+def _sine_or_cosine(
+    place: int, exact: Callable[[Expression], Expression], angle: Expression
+) -> Expression:
+    return ca.if_else(ca.fabs(angle) <= LIMIT, reduced_sincos()(angle)[place], exact(angle))
 
 
 @lru_cache(maxsize=512)
-def _mapped(function: ca.Function, shared: tuple[int, ...], size: int) -> ca.Function:
+def _map_states(function: ca.Function, shared: tuple[int, ...], size: int) -> ca.Function:
     return function.map(f"{function.name()}_block", "serial", size, list(shared), [])
 
 
-def _sweep(
+def _evaluate_calls(
     function: ca.Function,
     inputs: Sequence[Array],
     outputs: Sequence[Array],
@@ -258,13 +261,13 @@ def _sweep(
     step: int,
 ) -> None:
     buffer, evaluate = function.buffer()
-    for i, value in enumerate(inputs):
-        if value.ndim == 1:
-            buffer.set_arg(i, value.data)
-    batched = [(i, value) for i, value in enumerate(inputs) if value.ndim == 2]
+    for i, array in enumerate(inputs):
+        if array.ndim == 1:
+            buffer.set_arg(i, array.data)
+    batched = [(i, array) for i, array in enumerate(inputs) if array.ndim == 2]
     for start in starts:
-        for i, value in batched:
-            buffer.set_arg(i, value[start : start + step].data)
-        for i, value in enumerate(outputs):
-            buffer.set_res(i, value[start : start + step].data)
+        for i, array in batched:
+            buffer.set_arg(i, array[start : start + step].data)
+        for i, array in enumerate(outputs):
+            buffer.set_res(i, array[start : start + step].data)
         evaluate()

@@ -22,7 +22,7 @@ from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
-from pteron.kinematics.sampling import drawn_poses, type_ii_sizes
+from pteron.kinematics.sampling import draw_poses, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -132,15 +132,15 @@ def _architecture(robot: Manipulator) -> Architecture:
             )
         moving = self_motions_of_rams(robot)
         return Architecture(False, "", "one pose", most, holds, constraint, moving)
-    told = closure_of(robot).vanishes() or balance_of_rams(robot)
-    proof: Proof = "closed form" if told else "numerical"
+    closed_form_reason = closure_of(robot).vanishes() or balance_of_rams(robot)
+    proof: Proof = "closed form" if closed_form_reason else "numerical"
     if _vanishes_exactly(robot):
         proof = "exact arithmetic"
     return Architecture(True, _reason(robot), proof, most, holds, constraint)
 
 
 def is_singular_everywhere(robot: RobotLike) -> bool:
-    """Say whether det J vanishes at every pose; `architecture` says why.
+    """Return whether det J vanishes at every pose; `architecture` has the reason.
 
     Examples are layouts where the rows of all legs lie in a plane, and P-R-R-R layouts with
     fourfold symmetry about k.
@@ -158,7 +158,7 @@ def is_singular_everywhere(robot: RobotLike) -> bool:
 
 
 def expect_regular(robot: Manipulator) -> None:
-    """Refuse a machine that is singular at every pose, with the reason."""
+    """Raise, with the reason, for a machine that is singular at every pose."""
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
 
@@ -180,8 +180,8 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
     rows = numeric(robot, "jacobian")(poses)[0]
     rows = rows / np.where(robot.platform.angular, np.linalg.norm(points, axis=1).max() or 1.0, 1.0)
     rows = rows[np.isfinite(rows).all(axis=(1, 2))]
-    values = np.linalg.svd(rows / np.linalg.norm(rows, axis=-1, keepdims=True), compute_uv=False)
-    return bool((values[:, -1] <= _VANISHING * values[:, 0]).all())
+    sigmas = np.linalg.svd(rows / np.linalg.norm(rows, axis=-1, keepdims=True), compute_uv=False)
+    return bool((sigmas[:, -1] <= _VANISHING * sigmas[:, 0]).all())
 
 
 @lru_cache(maxsize=64)
@@ -190,13 +190,13 @@ def _poses(robot: Manipulator) -> Array:
     try:
         # Limits, most of all those of short rams, leave few poses of a platform that tilts.
         limits, rng = not robot.platform.tilts, np.random.default_rng(0)
-        return drawn_poses(robot, _SAMPLES, rng, type_i=1e-3, limits=limits)
+        return draw_poses(robot, _SAMPLES, rng, type_i=1e-3, limits=limits)
     except ModelError:
         return np.empty((0, robot.freedom))
 
 
 def _vanishes_exactly(robot: Manipulator) -> bool:
-    """Say whether the type-II measure is zero at random states modulo primes."""
+    """Return whether the type-II measure is zero at random states modulo primes."""
     measure = general_program(robot, "type_ii").function
     rng = random.Random(0)
     for prime in _PRIMES:
@@ -207,14 +207,14 @@ def _vanishes_exactly(robot: Manipulator) -> bool:
             continue
         if vector is None:
             return False
-        at = Evaluation(measure, field, [vector])
+        evaluate = Evaluation(measure, field, [vector])
         for _ in range(_ATTEMPTS):
             pose = [rng.randrange(prime) for _ in range(robot.freedom)]
             try:
-                value = at(pose)[0][0]
+                measure_value = evaluate(pose)[0][0]
             except (NoSquareRoot, ZeroDivisionError):
                 continue
-            if value:
+            if measure_value:
                 return False
             zeros += 1
             if zeros == _ZEROS:
@@ -232,15 +232,15 @@ def _reason(robot: Manipulator) -> str:
     forces = jacobian[..., :lengths]
     if lengths == 3 and (axis := _always_free(forces)) is not None:
         return (
-            f"the legs' rows all lie across {_rounded(axis)}, along which no actuator holds the "
-            "platform"
+            f"the legs' rows all lie across {_round_components(axis)}, along which no actuator "
+            "holds the platform"
         )
     if _points_are_in_line(robot):
         where = " through P" if robot.platform.center else ""
         where = where if robot.platform.tilts else " along the platform's axis"
         return f"all platform points lie on one line{where}, about which no force then has a moment"
-    if told := balance_of_rams(robot):
-        return told
+    if balance := balance_of_rams(robot):
+        return balance
     if closure_of(robot).orientation is not None and _has_fourfold_symmetry(robot, forces[0]):
         return (
             "the layout has fourfold symmetry about the platform's axis, for which A = B = 0 in "
@@ -250,27 +250,27 @@ def _reason(robot: Manipulator) -> str:
     if len(legs) == 1:
         return f"the row of leg {legs[0]} of J is zero: its joint does not move the platform"
     if len(legs) < robot.joint_count:
-        *rest, last = map(str, legs)
-        return f"the rows of legs {', '.join(rest)} and {last} of J depend on each other"
+        *first_legs, last = map(str, legs)
+        return f"the rows of legs {', '.join(first_legs)} and {last} of J depend on each other"
     if (axis := _always_free(jacobian)) is not None and lengths < robot.freedom:
-        moved = ", ".join(f"{v:.3g}" for v in axis + 0.0)
+        motion_text = ", ".join(f"{v:.3g}" for v in axis + 0.0)
         names = ", ".join(robot.column_names["velocity"])
-        return f"no actuator withholds the platform's motion ({names}) = ({moved})"
+        return f"no actuator withholds the platform's motion ({names}) = ({motion_text})"
     if closure_of(robot).orientation is not None:
         return "A = B = 0 in det J ~ A cos(phi) + B sin(phi)"
     return "det J vanishes at every pose that was looked at"
 
 
 def _points_are_in_line(robot: Manipulator) -> bool:
-    """Say whether the platform turns about an axis through all its points, but for rounding."""
+    """Return whether the platform turns about an axis through all its points, up to rounding."""
     platform = robot.platform
     if not robot.wraps.any() or (platform.tilts and len(platform.angles) < 3):
         return False
     points = np.array([leg.platform_point for leg in robot.legs])
     size = max(float(np.abs(points).max()), 1e-9)
     if platform.tilts:
-        beside = points if platform.center else points - points.mean(axis=0)
-        return bool(np.linalg.svd(beside, compute_uv=False)[1] <= 1e-9 * size)
+        centred = points if platform.center else points - points.mean(axis=0)
+        return bool(np.linalg.svd(centred, compute_uv=False)[1] <= 1e-9 * size)
     return bool(np.ptp(points[:, :2], axis=0).max() <= 1e-9 * size)
 
 
@@ -278,14 +278,14 @@ def _always_free(rows: Array) -> Array | None:
     """Return the direction (m,) that rows (K, n, m) are perpendicular to at all poses, if any."""
     sizes = np.linalg.norm(rows, axis=-1, keepdims=True)
     stacked = (rows / np.where(sizes > 0.0, sizes, 1.0)).reshape(-1, rows.shape[-1])
-    _, values, axes = np.linalg.svd(stacked)
-    if len(values) == rows.shape[-1] and values[-1] > _VANISHING * values[0]:
+    _, sigmas, axes = np.linalg.svd(stacked)
+    if len(sigmas) == rows.shape[-1] and sigmas[-1] > _VANISHING * sigmas[0]:
         return None
     axis = axes[-1] * np.sign(axes[-1][np.abs(axes[-1]).argmax()])
     return np.where(np.abs(axis) < 1e-9, 0.0, axis)
 
 
-def _rounded(axis: Array) -> list[float]:
+def _round_components(axis: Array) -> list[float]:
     return [round(float(v), 3) + 0.0 for v in axis]
 
 
@@ -297,16 +297,16 @@ def _dependent_legs(rows: Array) -> list[int]:
 
 
 def _has_fourfold_symmetry(robot: Manipulator, bars: Array) -> bool:
-    """Say whether a quarter turn about k takes each leg's row (n, 3) and point to another's."""
+    """Return whether a quarter turn about k maps each leg's row (n, 3) and point to another's."""
     x0, y0, k = (np.array(axis) for axis in robot.platform.frame)
     quarter = np.outer(y0, x0) - np.outer(x0, y0) + np.outer(k, k)
     points = np.array([leg.platform_point[:2] for leg in robot.legs])
     lines = np.array([np.outer(bar, bar) for bar in bars])
-    turned = quarter @ lines @ quarter.T
-    moved = points @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    rotated_lines = quarter @ lines @ quarter.T
+    rotated_points = points @ np.array([[0.0, 1.0], [-1.0, 0.0]])
     sizes = np.abs(lines).max(), max(np.abs(points).max(), 1e-300)
-    same = (np.abs(turned[:, None] - lines).max(axis=(-2, -1)) <= 1e-9 * sizes[0]) & (
-        np.abs(moved[:, None] - points).max(axis=-1) <= 1e-9 * sizes[1]
+    same = (np.abs(rotated_lines[:, None] - lines).max(axis=(-2, -1)) <= 1e-9 * sizes[0]) & (
+        np.abs(rotated_points[:, None] - points).max(axis=-1) <= 1e-9 * sizes[1]
     )
     return bool(same.any(axis=1).all())
 

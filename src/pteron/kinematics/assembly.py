@@ -32,14 +32,14 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import place
 from pteron.kinematics.tilting_assembly import tilting_poses
 from pteron.manipulator import Manipulator
-from pteron.platforms.coordinates import within_a_turn
+from pteron.platforms.coordinates import wrap_angle
 
 _BATCH = 4096
 """Rows of joint coordinates solved at a time."""
 
 
 _HUGE = 1e30
-"""Size of numbers in the rows beyond which joints have no pose, so that det G stays finite."""
+"""Largest number in the rows of joints that have a pose, so that det G stays finite."""
 
 _COINCIDING = 1e-10
 """Least size of a row after Gram-Schmidt on those before it, from a size of about 1: ten digits of
@@ -53,28 +53,28 @@ _MARGIN = 5e-3
 """Imaginary part, rad, up to which a zero of det G may be real: a fourfold one loses 3/4 of its
 digits."""
 
-_NEAR = 0.1
-"""Greatest miss of a closure, as a share of the terms, that is worth Newton's steps."""
+_LARGEST_RESIDUAL = 0.1
+"""Largest relative residual of a closure from which Newton's method starts."""
 
 _ROUNDING = 1e-13
-"""Greatest miss of a pose: as much as two modes that meet have within 1e-7 of their places."""
+"""Tolerance of a pose's residual: that of two coinciding modes within 1e-7 of their positions."""
 
 _STEPS = 20
-"""Newton's steps at most: they end where a pose misses no less than before."""
+"""Maximum number of Newton steps: they end where the residual no longer decreases."""
 
 _SPAN = np.pi
 """Scale of a sliding platform's angle, rad: phi = `_SPAN` tan(alpha)."""
 
-_SAME = 1e-6
-"""Two poses within this, in rad and sizes of the machine, may be one, found twice."""
+_DUPLICATE = 1e-6
+"""Distance of two poses, in rad and sizes of the machine, that may be duplicates."""
 
-_APART, _LEAST = 6.0, 2e-16
-"""Factor and floor of the miss that tells two modes apart. At the middle between two modes the
-closures are missed by about a quarter of the square of their distance: this must be so many times
-what both poses miss, and no less than rounding. It separates modes to some 1e-7 of the size."""
+_SEPARATION, _LEAST = 6.0, 2e-16
+"""Factor and floor of the residual that separates two modes. Midway between two modes the residual
+is about a quarter of their squared distance: it must be this many times the residuals of both
+poses, and above rounding. It separates modes to some 1e-7 of the size."""
 
-_ALIKE = 1e-9
-"""Difference of coordinates, m or rad, that does not decide the order of two poses."""
+_EQUAL = 1e-9
+"""Tolerance of equal coordinates, m or rad, in the order of poses."""
 
 
 def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
@@ -84,11 +84,11 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
     """
     shape = joints.shape[:-1]
     flat = joints.reshape(-1, joints.shape[-1])
-    found = np.empty((len(flat), most, robot.freedom))
+    poses_by_state = np.empty((len(flat), most, robot.freedom))
     for start in range(0, len(flat), _BATCH):
         part = slice(start, start + _BATCH)
         if not robot.platform.tilts:
-            found[part] = _poses(robot, flat[part], most)
+            poses_by_state[part] = _poses(robot, flat[part], most)
             continue
         which, poses, moving = tilting_poses(robot, flat[part])
         if moving.any():
@@ -101,8 +101,8 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
                 measure=0.0,
                 index=index,
             )
-        found[part] = in_order(_table(poses, which, most, len(moving)))[:, :most]
-    return found.reshape(*shape, most, robot.freedom)
+        poses_by_state[part] = sort_poses(_table(poses, which, most, len(moving)))[:, :most]
+    return poses_by_state.reshape(*shape, most, robot.freedom)
 
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
@@ -110,33 +110,33 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
     rows = np.stack([zeroth, first, second], axis=-1)
     rows[~(np.abs(rows) < _HUGE).all(axis=(-3, -2, -1))] = 0.0
-    rows = _apart(rows)
+    rows = _orthonormal_rows(rows)
     which, phi = _angles(rows, slides)
-    which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
+    which, points, phi = _points(_rows_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])
-    which, poses, missed = _polished(robot, joints, which, starts)
+    which, poses, residuals = _refine_poses(robot, joints, which, starts)
     around = robot.platform.angular & (not slides)
-    poses[:, around] = within_a_turn(poses[:, around])
-    same = _found_twice(robot, joints, which, poses, missed, size)
+    poses[:, around] = wrap_angle(poses[:, around])
+    same = _are_duplicates(robot, joints, which, poses, residuals, size)
     which, poses = which[~same], poses[~same]
-    return in_order(_table(poses, which, most, len(joints)))[:, :most]
+    return sort_poses(_table(poses, which, most, len(joints)))[:, :most]
 
 
-def _apart(rows: Array) -> Array:
-    """Return rows (B, n, d + 2, 3) that span the same at each phi, and are orthonormal as numbers.
+def _orthonormal_rows(rows: Array) -> Array:
+    """Return orthonormal rows (B, n, d + 2, 3) with the same span at each phi.
 
-    0 where one is a sum of others, so that the platform can move with the joints held. Two spheres
-    that move alike may all but coincide, as where two rods of a Par4's side are parallel: only
-    their difference, well scaled, tells where they meet.
+    0 where they are linearly dependent, so that the platform can move with the joints held. Two
+    spheres with equal motion may nearly coincide, as where two rods of a Par4's side are parallel:
+    their well-scaled difference determines where they meet.
     """
-    across, r = np.linalg.qr(rows.reshape(*rows.shape[:2], -1).swapaxes(-1, -2))
-    apart = np.abs(np.diagonal(r, axis1=-2, axis2=-1)).min(axis=-1) > _COINCIDING
-    found = across.swapaxes(-1, -2).reshape(rows.shape)
-    return np.where(apart[:, None, None, None], found, 0.0)
+    q, r = np.linalg.qr(rows.reshape(*rows.shape[:2], -1).swapaxes(-1, -2))
+    is_independent = np.abs(np.diagonal(r, axis1=-2, axis2=-1)).min(axis=-1) > _COINCIDING
+    orthonormal = q.swapaxes(-1, -2).reshape(rows.shape)
+    return np.where(is_independent[:, None, None, None], orthonormal, 0.0)
 
 
 def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
-    """Return where det G vanishes: which state (K,) and phi (K,), the real part if it has others.
+    """Return the zeros of det G: the state (K,) and phi (K,), the real part of nearly real ones.
 
     `rows` (B, n, d + 2, 3) are those of 1, f_1 and f_2.
     """
@@ -144,12 +144,12 @@ def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
     n = rows.shape[1]
     # alpha = start + atan(t), with the largest determinant found at infinity.
     tried = np.pi * np.arange(4 * n) / (4 * n)
-    sizes = np.abs(np.linalg.det(_along(form[:, None], tried)))
+    sizes = np.abs(np.linalg.det(_form_at(form[:, None], tried)))
     able = np.flatnonzero(sizes.max(axis=-1) > _VANISHING)
     form, start = form[able], tried[sizes[able].argmax(axis=-1)] - 0.5 * np.pi
     # low + t middle + t^2 high
-    low, high = _along(form, start), _along(form, start + 0.5 * np.pi)
-    middle = 2.0 * _along(form, start + 0.25 * np.pi) - low - high
+    low, high = _form_at(form, start), _form_at(form, start + 0.5 * np.pi)
+    middle = 2.0 * _form_at(form, start + 0.25 * np.pi) - low - high
     companion = np.zeros((len(form), 2 * n, 2 * n))
     companion[:, :n, n:] = np.eye(n)
     companion[:, n:, :n] = -np.linalg.solve(high, low)
@@ -166,23 +166,23 @@ def _form(rows: Array, slides: bool) -> Array:
     phi = 2 alpha where the platform turns; where it slides phi = `_SPAN` s / c, and G is taken c^2
     times.
     """
-    low = _gram(_at(rows, 0.0, slides))
+    low = _gram(_rows_at(rows, 0.0, slides))
     if slides:
-        ahead, behind = (_gram(_at(rows, side * _SPAN, slides)) for side in (1.0, -1.0))
+        ahead, behind = (_gram(_rows_at(rows, side * _SPAN, slides)) for side in (1.0, -1.0))
         high, middle = 0.5 * (ahead + behind) - low, 0.5 * (ahead - behind)
     else:
-        high = _gram(_at(rows, np.pi, slides))
-        middle = 2.0 * _gram(_at(rows, 0.5 * np.pi, slides)) - low - high
+        high = _gram(_rows_at(rows, np.pi, slides))
+        middle = 2.0 * _gram(_rows_at(rows, 0.5 * np.pi, slides)) - low - high
     return np.stack([low, middle, high], axis=-1)
 
 
-def _along(form: Array, alpha: Array) -> Array:
+def _form_at(form: Array, alpha: Array) -> Array:
     c, s = np.cos(alpha)[..., None, None], np.sin(alpha)[..., None, None]
     total: Array = form[..., 0] * (c * c) + form[..., 1] * (c * s) + form[..., 2] * (s * s)
     return total
 
 
-def _at(rows: Array, phi: Array | float, slides: bool) -> Array:
+def _rows_at(rows: Array, phi: Array | float, slides: bool) -> Array:
     first, second = (phi, phi**2) if slides else (np.cos(phi), np.sin(phi))
     first, second = (np.asarray(f)[..., None, None] for f in (first, second))
     return rows[..., 0] + first * rows[..., 1] + second * rows[..., 2]
@@ -224,51 +224,51 @@ def _quadric(x: Array, y: Array) -> Array:
     return np.asarray(0.5 * (x[:, 0] * y[:, -1] + x[:, -1] * y[:, 0]) - inner)
 
 
-def _polished(
+def _refine_poses(
     robot: Manipulator, joints: Array, which: NDArray[np.int64], poses: Array
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return the poses that Newton's steps come to, those that close, and what they miss."""
+    """Return the converged poses of Newton's method, their states and their residuals."""
     step = numeric(robot, "newton_step")
-    found, missed = np.empty_like(poses), np.full(len(poses), _NEAR)
+    converged, residuals = np.empty_like(poses), np.full(len(poses), _LARGEST_RESIDUAL)
     active = np.arange(len(poses))
     for _ in range(_STEPS):
         tried = poses[active]
-        after, misses, _ = step(joints[which[active]], tried)
-        better = misses < missed[active]
+        after, step_residuals, _ = step(joints[which[active]], tried)
+        better = step_residuals < residuals[active]
         active, tried, after = active[better], tried[better], after[better]
         if not len(active):
             break
-        found[active], missed[active], poses[active] = tried, misses[better], after
-    closed = missed <= _ROUNDING
-    return which[closed], found[closed], missed[closed]
+        converged[active], residuals[active], poses[active] = tried, step_residuals[better], after
+    closed = residuals <= _ROUNDING
+    return which[closed], converged[closed], residuals[closed]
 
 
-def _found_twice(
+def _are_duplicates(
     robot: Manipulator,
     joints: Array,
     which: NDArray[np.int64],
     poses: Array,
-    missed: Array,
+    residuals: Array,
     size: Array,
 ) -> NDArray[np.bool_]:
-    """Return which poses (K, m) another before them is, of the same joints."""
+    """Return which poses (K, m) duplicate an earlier one of the same joints."""
     count = np.arange(len(which)) - np.searchsorted(which, which)  # they come in order
-    found = np.zeros(len(which), dtype=bool)
+    is_duplicate = np.zeros(len(which), dtype=bool)
     for back in range(1, int(count.max(initial=0)) + 1):
         later = np.flatnonzero(count >= back)
-        apart = poses[later] - poses[later - back]
+        difference = poses[later] - poses[later - back]
         if not robot.platform.slides:
-            apart[:, -1] = within_a_turn(apart[:, -1])
-        units = np.ones_like(apart)
+            difference[:, -1] = wrap_angle(difference[:, -1])
+        units = np.ones_like(difference)
         units[:, :-1] = size[which[later], None]
-        near = (np.abs(apart) < _SAME * units).all(axis=-1)
-        later, apart = later[near], apart[near]
+        is_close = (np.abs(difference) < _DUPLICATE * units).all(axis=-1)
+        later, difference = later[is_close], difference[is_close]
         _, between, _ = numeric(robot, "newton_step")(
-            joints[which[later]], poses[later] - 0.5 * apart
+            joints[which[later]], poses[later] - 0.5 * difference
         )
-        most = np.maximum(np.maximum(missed[later], missed[later - back]), _LEAST)
-        found[later[between <= _APART * most]] = True
-    return found
+        most = np.maximum(np.maximum(residuals[later], residuals[later - back]), _LEAST)
+        is_duplicate[later[between <= _SEPARATION * most]] = True
+    return is_duplicate
 
 
 def _table(poses: Array, which: NDArray[np.int64], most: int, states: int) -> Array:
@@ -280,17 +280,17 @@ def _table(poses: Array, which: NDArray[np.int64], most: int, states: int) -> Ar
     return table
 
 
-def in_order(poses: Array) -> Array:
+def sort_poses(poses: Array) -> Array:
     """Return poses (..., k, m) ordered by their last coordinate, then by those before; NaN last."""
-    order = np.lexsort([_ranks(poses[..., k]) for k in range(poses.shape[-1])])
+    order = np.lexsort([_dense_ranks(poses[..., k]) for k in range(poses.shape[-1])])
     return np.take_along_axis(poses, order[..., None], axis=-2)
 
 
-def _ranks(values: Array) -> NDArray[np.int64]:
-    """Return the ranks of values (..., k), one for those that differ by rounding alone."""
-    order = np.argsort(values, axis=-1)
-    steps = ~(np.diff(np.take_along_axis(values, order, axis=-1), axis=-1) <= _ALIKE)
-    ranks = np.zeros(values.shape, dtype=np.int64)
+def _dense_ranks(coordinates: Array) -> NDArray[np.int64]:
+    """Return dense ranks of coordinates (..., k); values equal up to rounding share one."""
+    order = np.argsort(coordinates, axis=-1)
+    steps = ~(np.diff(np.take_along_axis(coordinates, order, axis=-1), axis=-1) <= _EQUAL)
+    ranks = np.zeros(coordinates.shape, dtype=np.int64)
     ranks[..., 1:] = np.cumsum(steps, axis=-1)
     np.put_along_axis(ranks, order, ranks.copy(), axis=-1)
     return ranks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import Numbers, OnFailure, PoseLike
 
@@ -48,5 +48,5 @@ def constraint_measure(
     1.0
     """
     robot = as_manipulator(robot)
-    found: Array = evaluated(robot, "constraint", on_failure, pose)
-    return found
+    measures: Array = evaluate_kernel(robot, "constraint", on_failure, pose)
+    return measures

@@ -11,12 +11,12 @@ from pteron.equations.machine import closure_of
 from pteron.errors import UnreachablePose
 from pteron.kernels import Array
 from pteron.kinematics.architecture import expect_regular
-from pteron.kinematics.assembly import every_pose, in_order
-from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
+from pteron.kinematics.assembly import every_pose, sort_poses
+from pteron.kinematics.evaluate import evaluate_kernel, evaluate_unchecked, finite_rows, place
 from pteron.kinematics.unlikely_values import unlikely_values, warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
-from pteron.platforms.coordinates import within_a_turn
+from pteron.platforms.coordinates import wrap_angle
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
 
 _SAME_JOINT = 1e-6
@@ -88,20 +88,20 @@ def direct_kinematics(
     """
     robot = as_manipulator(robot)
     expect_regular(robot)
-    given = checked(robot, joints, "joints", on_failure)
-    poses = _rows(robot, given, all_branches=all_branches)
-    lost = np.isnan(poses).all(axis=(-2, -1))
-    if on_failure == "raise" and lost.any():
-        index = tuple(int(i) for i in np.argwhere(lost)[0])
-        unlikely = unlikely_values(robot, robot.joint_names, given[index])
+    joint_array = finite_rows(robot, joints, "joints", on_failure)
+    poses = _rows(robot, joint_array, all_branches=all_branches)
+    is_missing = np.isnan(poses).all(axis=(-2, -1))
+    if on_failure == "raise" and is_missing.any():
+        index = tuple(int(i) for i in np.argwhere(is_missing)[0])
+        unlikely = unlikely_values(robot, robot.joint_names, joint_array[index])
         raise UnreachablePose(
             f"{place('joints', index)}: no pose has these joint coordinates "
-            f"{'; '.join([str(given[index].tolist()), *unlikely])}",
+            f"{'; '.join([str(joint_array[index].tolist()), *unlikely])}",
             leg=0,
             shortfall=float("nan"),
             index=index,
         )
-    warn_of_unlikely(robot, robot.joint_names, given)
+    warn_of_unlikely(robot, robot.joint_names, joint_array)
     return poses
 
 
@@ -142,9 +142,9 @@ def assembly_mode(
     """
     robot = as_manipulator(robot)
     expect_regular(robot)
-    given = checked(robot, pose, "pose")
-    joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", given)
-    return nearest(robot, _rows(robot, joints, all_branches=all_branches), given)
+    poses = finite_rows(robot, pose, "pose")
+    joints: PerJoint = evaluate_kernel(robot, "inverse_kinematics", "raise", poses)
+    return nearest(robot, _rows(robot, joints, all_branches=all_branches), poses)
 
 
 def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
@@ -177,14 +177,17 @@ def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArra
            [-1, -1, -1]])
     """
     robot = as_manipulator(robot)
-    poses, given = checked(robot, pose, "pose", "nan"), checked(robot, joints, "joints", "nan")
-    found = np.zeros(np.broadcast_shapes(poses.shape, given.shape), dtype=np.int64)
-    own = [leg.elbow for leg in robot.legs]
-    other = [-leg.elbow if -leg.elbow in leg.branches else leg.elbow for leg in robot.legs]
-    for signs in (other, own):
-        back = unchecked(with_elbows(robot, signs), "inverse_kinematics", poses)
-        found = np.where(_same_joints(robot, back, given), signs, found)
-    return found
+    poses, joint_array = (
+        finite_rows(robot, pose, "pose", "nan"),
+        finite_rows(robot, joints, "joints", "nan"),
+    )
+    elbows = np.zeros(np.broadcast_shapes(poses.shape, joint_array.shape), dtype=np.int64)
+    file_signs = [leg.elbow for leg in robot.legs]
+    other_signs = [-leg.elbow if -leg.elbow in leg.branches else leg.elbow for leg in robot.legs]
+    for signs in (other_signs, file_signs):
+        back = evaluate_unchecked(with_elbows(robot, signs), "inverse_kinematics", poses)
+        elbows = np.where(_same_joints(robot, back, joint_array), signs, elbows)
+    return elbows
 
 
 def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = False) -> Poses:
@@ -198,49 +201,49 @@ def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = Fals
     closure = closure_of(robot)
     poses: Poses
     if closure.closed_form:
-        poses = evaluated(robot, "direct_kinematics", "nan", joints)
+        poses = evaluate_kernel(robot, "direct_kinematics", "nan", joints)
     else:
         poses = every_pose(robot, joints, closure.modes)
-    poses[..., robot.wraps] = within_a_turn(poses[..., robot.wraps])
-    back: PerJoint = evaluated(robot, "inverse_kinematics", "nan", poses)
-    lost = np.isnan(back).any(axis=-1)
+    poses[..., robot.wraps] = wrap_angle(poses[..., robot.wraps])
+    back: PerJoint = evaluate_kernel(robot, "inverse_kinematics", "nan", poses)
+    is_missing = np.isnan(back).any(axis=-1)
     if not closure.keeps_modes and not all_branches:
-        lost |= ~_same_joints(robot, back, joints[..., None, :]).all(axis=-1)
-    poses[lost] = np.nan
+        is_missing |= ~_same_joints(robot, back, joints[..., None, :]).all(axis=-1)
+    poses[is_missing] = np.nan
     return poses
 
 
 def mode_of(robot: RobotLike, pose: tuple[float, ...]) -> int:
-    """Return the column of `assembly_modes` that a pose is in."""
+    """Return a pose's column of `assembly_modes`."""
     return _mode_of(as_manipulator(robot), pose)
 
 
 @lru_cache(maxsize=64)
 def _mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
-    joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", np.array(pose))
+    joints: PerJoint = evaluate_kernel(robot, "inverse_kinematics", "raise", np.array(pose))
     return int(nearest(robot, assembly_modes(robot, joints, all_branches=True), np.array(pose)))
 
 
 def nearest(robot: RobotLike, poses: Array, pose: Array) -> NDArray[np.int64]:
-    """Return which of poses (..., k, m) is nearest to a pose (..., m), whole turns left out."""
+    """Return the index of the pose of (..., k, m) nearest to a pose (..., m), modulo full turns."""
     robot = as_manipulator(robot)
-    apart = poses - pose[..., None, :]
+    differences = poses - pose[..., None, :]
     angular = robot.platform.angular
-    distance = np.linalg.norm(apart[..., ~angular], axis=-1)
-    angles = 0.5 * apart[..., angular]
+    distance = np.linalg.norm(differences[..., ~angular], axis=-1)
+    angles = 0.5 * differences[..., angular]
     distance += np.abs(np.where(robot.wraps[angular], np.sin(angles), angles)).sum(axis=-1)
     return np.asarray(np.nan_to_num(distance, nan=np.inf).argmin(axis=-1))
 
 
 def _rows(robot: Manipulator, joints: Array, *, all_branches: bool) -> Poses:
     poses = assembly_modes(robot, joints, all_branches=all_branches)
-    return poses if closure_of(robot).keeps_modes else in_order(poses)
+    return poses if closure_of(robot).keeps_modes else sort_poses(poses)
 
 
-def _same_joints(robot: Manipulator, one: Array, other: Array) -> NDArray[np.bool_]:
-    """Return where joint coordinates (..., n) are the same, whole turns of cranks left out."""
-    apart = np.abs(one - other)
+def _same_joints(robot: Manipulator, joints: Array, other: Array) -> NDArray[np.bool_]:
+    """Return where joint coordinates (..., n) are equal, modulo full turns of cranks."""
+    differences = np.abs(joints - other)
     cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
     turn = 2.0 * np.pi
-    apart = np.where(cranks, np.abs((apart + np.pi) % turn - np.pi), apart)
-    return np.asarray(apart <= _SAME_JOINT)
+    differences = np.where(cranks, np.abs((differences + np.pi) % turn - np.pi), differences)
+    return np.asarray(differences <= _SAME_JOINT)

@@ -1,7 +1,7 @@
-"""`evaluated`: a public function's kernel, called, with an error that names a state that fails.
+"""`evaluate_kernel`: call a public function's kernel, with an error that names a failing state.
 
-The kernel returns its values and, for each state, a status: 1 where they count, 0 where they do
-not. The reason is found only where a state fails.
+The kernel returns its values and, for each state, a status: 1 where they are valid, 0 where not.
+The cause is determined only where a state fails.
 """
 
 from __future__ import annotations
@@ -31,57 +31,59 @@ _MILLIMETRES = 20.0
 """A pose this many leg sizes out of reach was perhaps given in millimetres."""
 
 
-def evaluated(
+def evaluate_kernel(
     robot: RobotLike,
     what: str,
     on_failure: OnFailure,
-    *values: PoseLike,
+    *arguments: PoseLike,
     base: Selects | None = None,
     wrench: bool = False,
 ) -> _Outputs:  # type: ignore[type-var]
-    """Return the outputs of a function of the table `kernels.functions.TABLE`, or its only one."""
-    *results, status = numeric(robot, what, base=base, wrench=wrench).call(*values)
+    """Return the outputs, or the only one, of a function of `kernels.functions.TABLE`."""
+    *results, status = numeric(robot, what, base=base, wrench=wrench).call(*arguments)
     good = status.item() if status.ndim == 0 else status.all()
     if not good or on_failure != "raise":
         expect_choice(on_failure)
         if not good:
             if on_failure == "raise":
-                raise _failure(as_manipulator(robot), what, values, status, wrench)
-            for result in results:
-                result[status == 0.0] = np.nan
-    if type(values[0]) in _TYPED:
+                raise _failure(as_manipulator(robot), what, arguments, status, wrench)
+            for part in results:
+                part[status == 0.0] = np.nan
+    if type(arguments[0]) in _TYPED:
         machine = as_manipulator(robot)
-        warn_of_unlikely(machine, machine.coordinates, np.asarray(values[0], dtype=float))
-    found: Any = results[0] if len(results) == 1 else tuple(results)
-    return found  # type: ignore[no-any-return]
+        warn_of_unlikely(machine, machine.coordinates, np.asarray(arguments[0], dtype=float))
+    outputs: Any = results[0] if len(results) == 1 else tuple(results)
+    return outputs  # type: ignore[no-any-return]
 
 
-def unchecked(robot: RobotLike, what: str, *values: PoseLike, base: Selects | None = None) -> Any:
-    """Return the outputs of a function without a check: NaN or arbitrary in a bad state."""
-    *results, _ = numeric(robot, what, base=base)(*values)
+def evaluate_unchecked(
+    robot: RobotLike, what: str, *arguments: PoseLike, base: Selects | None = None
+) -> Any:
+    """Return the outputs of a function without checks: NaN or arbitrary in an invalid state."""
+    *results, _ = numeric(robot, what, base=base)(*arguments)
     return results[0] if len(results) == 1 else tuple(results)
 
 
 def expect_choice(on_failure: str) -> None:
-    """Refuse a value other than "raise" or "nan"."""
+    """Raise for a value other than "raise" or "nan"."""
     if on_failure not in ("raise", "nan"):
         raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
 
 
-def checked(
-    robot: Manipulator, value: PoseLike, name: str, on_failure: OnFailure = "raise"
+def finite_rows(
+    robot: Manipulator, raw: PoseLike, name: str, on_failure: OnFailure = "raise"
 ) -> Array:
-    """Return an array (..., m) of finite numbers, or say which element is not one.
+    """Return an array (..., m) of finite numbers; raise with the element that is not finite.
 
-    Under ``on_failure="nan"`` a row with a number that is not finite becomes NaN as a whole.
+    With ``on_failure="nan"`` rows that are not finite become NaN.
     """
     expect_choice(on_failure)
     names = robot.column_names
     columns = names.get(name, names["pose"])
-    array = as_array(value, name, (len(columns),), columns=columns)
+    array = as_array(raw, name, (len(columns),), columns=columns)
     good = np.isfinite(array)
     if good.all():
-        if type(value) in _TYPED and columns is names["pose"]:
+        if type(raw) in _TYPED and columns is names["pose"]:
             warn_of_unlikely(robot, columns, array)
         return array
     if on_failure == "raise":
@@ -89,40 +91,40 @@ def checked(
     return np.where(good.all(axis=-1, keepdims=True), array, np.nan)
 
 
-def checked_one(robot: Manipulator, value: PoseLike, name: str) -> Array:
-    """Return one pose (m,) of finite numbers, as `checked`; a table of one row is one pose too."""
-    array = checked(robot, value, name)
+def finite_pose(robot: Manipulator, raw: PoseLike, name: str) -> Array:
+    """Return one pose (m,) of finite numbers, see `finite_rows`; a table of one row is a pose."""
+    array = finite_rows(robot, raw, name)
     if array.size != robot.freedom:
         raise DataError(f"{name}: {array.size // robot.freedom} poses given, 1 expected")
     return array.reshape(robot.freedom)
 
 
 def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
-    wanted = "a finite number" if not np.isfinite(array[index]) else "a number of sensible size"
-    return DataError(f"{name}{list(index)}: {array[index]} given, {wanted} expected")
+    expected = "a finite number" if not np.isfinite(array[index]) else "a number of sensible size"
+    return DataError(f"{name}{list(index)}: {array[index]} given, {expected} expected")
 
 
 def _failure(
-    robot: Manipulator, what: str, values: tuple[PoseLike, ...], status: Array, wrench: bool
+    robot: Manipulator, what: str, arguments: tuple[PoseLike, ...], status: Array, wrench: bool
 ) -> PteronError:
     """Return the error for the first state that fails."""
     index = tuple(int(i) for i in np.argwhere(status == 0.0)[0])
     ports = [p for p in numeric(robot, what, wrench=wrench).inputs if not p.shared]
-    for port, value in zip(ports, values, strict=True):
-        array = as_array(value, port.name, port.shape, columns=port.columns)
-        whole = np.broadcast_to(array, status.shape + port.shape)[index]
-        bad = np.argwhere(~(np.abs(whole) < 1e70))
+    for port, argument in zip(ports, arguments, strict=True):
+        array = as_array(argument, port.name, port.shape, columns=port.columns)
+        state = np.broadcast_to(array, status.shape + port.shape)[index]
+        bad = np.argwhere(~(np.abs(state) < 1e70))
         if len(bad):
             lead = array.ndim - len(port.shape)
             at = index[len(index) - lead :] if lead else ()
             at = tuple(i if n > 1 else 0 for i, n in zip(at, array.shape, strict=False))
             return _not_finite(port.name, array, (*at, *(int(i) for i in bad[0])))
         if port.name == "pose":
-            pose = whole
+            pose = state
             all_bad = np.broadcast_to(array, status.shape + port.shape)[status == 0.0]
     others = len(all_bad) - 1
     many = f" ({others + 1} such poses in the batch)" if others else ""
-    return _bad_pose(robot, pose, needs_of(what), index, many, far=_some_far(robot, all_bad))
+    return _bad_pose(robot, pose, needs_of(what), index, many, far=_is_any_far(robot, all_bad))
 
 
 def singular_angles(
@@ -156,10 +158,10 @@ def place(name: str, index: tuple[int, ...]) -> str:
     return f"{name}[{', '.join(map(str, index))}]" if index else name
 
 
-def _some_far(robot: Manipulator, poses: Array) -> bool:
-    """Say whether one of the poses (K, m) is so far out that millimetres are likelier.
+def _is_any_far(robot: Manipulator, poses: Array) -> bool:
+    """Return whether any of the poses (K, m) is so far out of reach that it is probably in mm.
 
-    The first one that fails may be near: a motion in millimetres may begin at zero.
+    The first failing pose may be near: a motion in millimetres may begin at zero.
     """
     misses = -numeric(robot, "reach")(poses)[0]
     return bool((misses > _MILLIMETRES * np.array([leg.size for leg in robot.legs])).any())
@@ -177,8 +179,8 @@ def _bad_pose(
     where = place("pose", index)
     margin, type_i, spread, _ = numeric(robot, "reach")(pose)
     if "rows" in needs:
-        rest = [leg.row_is_constant for leg in closure_of(robot).legs]
-        type_i[rest] = 1.0
+        constant_rows = [leg.row_is_constant for leg in closure_of(robot).legs]
+        type_i[constant_rows] = 1.0
     if np.isnan(margin).any():
         return no_place(index, many)
     if np.isnan(type_i).any():
@@ -199,14 +201,14 @@ def _bad_pose(
     for i, leg in enumerate(robot.legs):
         undetermined = bool(spread[i] <= _COINCIDENT * leg.size)
         if type_i[i] <= TYPE_I and (needs != ("reach",) or undetermined):
-            told = (
+            cause = (
                 "its two ends coincide, so that its elbow may be anywhere"
                 if undetermined
                 else f"{leg.singular_text} (type I; measure {type_i[i]:.1e}, less than six "
                 f"digits are left below {TYPE_I:.0e})"
             )
             return SingularPose(
-                f"{where}: singular for leg {i + 1}: {told}; move away from the edge of its reach"
+                f"{where}: singular for leg {i + 1}: {cause}; move away from the edge of its reach"
                 f"{many}",
                 kind="elbow" if undetermined else "I",
                 measure=float(type_i[i]),

@@ -6,7 +6,7 @@ import numpy as np
 
 from pteron.errors import DataError, UnreachablePose
 from pteron.kernels import Array, Kernel, numeric
-from pteron.kinematics.evaluate import checked, unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PoseLike
 
@@ -56,47 +56,50 @@ def follow(
     True
     """
     robot = as_manipulator(robot)
-    given, pose = checked(robot, joints, "joints", on_failure), checked(robot, start, "start")
-    if given.ndim != 2 or pose.ndim != 1:
+    joint_rows, pose = (
+        finite_rows(robot, joints, "joints", on_failure),
+        finite_rows(robot, start, "start"),
+    )
+    if joint_rows.ndim != 2 or pose.ndim != 1:
         n, m = robot.joint_count, robot.freedom
         raise DataError(
-            f"joints, start: shapes {given.shape} and {pose.shape} given, (N, {n}) and ({m},) "
+            f"joints, start: shapes {joint_rows.shape} and {pose.shape} given, (N, {n}) and ({m},) "
             "expected"
         )
     step = numeric(robot, "followed_step")
-    found = np.full((len(given), robot.freedom), np.nan)
-    before, side = pose, 0.0
-    for k, q in enumerate(given):
-        ahead, measure, _ = step(q, 2.0 * pose - before)
+    poses = np.full((len(joint_rows), robot.freedom), np.nan)
+    previous, side = pose, 0.0
+    for k, q in enumerate(joint_rows):
+        ahead, measure, _ = step(q, 2.0 * pose - previous)
         if not side * measure >= 0.0 or np.isnan(ahead[0]):
-            here = given[k - 1] if k else _joints_of(robot, pose, q)
-            ahead, measure = _halved(step, here, q, pose, side)
+            here = joint_rows[k - 1] if k else _joints_of(robot, pose, q)
+            ahead, measure = _follow_halved_steps(step, here, q, pose, side)
             if np.isnan(ahead[0]):
                 if on_failure == "raise":
-                    raise _ended(given, k)
+                    raise _end_of_mode(joint_rows, k)
                 break
-        before, pose, side = pose, ahead, measure
-        found[k] = pose
+        previous, pose, side = pose, ahead, measure
+        poses[k] = pose
     # Where samples are far apart the last of Newton's steps may leave some digits.
-    refined: Array = step(given, found)[0]
-    return np.where(np.isnan(refined), found, refined)
+    refined: Array = step(joint_rows, poses)[0]
+    return np.where(np.isnan(refined), poses, refined)
 
 
 def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:
-    """Return the joint coordinates of a pose, with those whole turns of cranks that are nearest."""
-    joints: Array = unchecked(robot, "inverse_kinematics", pose)
+    """Return the joint coordinates of a pose, with cranks' full turns nearest to `near`."""
+    joints: Array = evaluate_unchecked(robot, "inverse_kinematics", pose)
     cranks = [leg.goes_round for leg in robot.legs]
     turns = np.where(cranks, np.round((near - joints) / (2.0 * np.pi)), 0.0)
     turned: Array = joints + 2.0 * np.pi * turns
     return turned
 
 
-def _halved(
+def _follow_halved_steps(
     step: Kernel, here: Array, there: Array, pose: Array, side: float
 ) -> tuple[Array, float]:
-    """Return the pose of joints there, from that of joints here, by as many steps as it takes.
+    """Return the pose of joints `there` from that of joints `here`, by adaptive step halving.
 
-    `side` is the sign of the type-II measure, which must not change; with the pose comes its own.
+    `side` is the sign of the type-II measure, which must not change; the measure is returned too.
     """
     done, size = 0.0, 1.0
     while done < 1.0:
@@ -111,10 +114,10 @@ def _halved(
     return pose, side
 
 
-def _ended(joints: Array, k: int) -> UnreachablePose:
-    told = ", ".join(f"{value:.6g}" for value in joints[k])
+def _end_of_mode(joints: Array, k: int) -> UnreachablePose:
+    text = ", ".join(f"{coordinate:.6g}" for coordinate in joints[k])
     return UnreachablePose(
-        f"joints[{k}]: the platform does not follow to the joint coordinates [{told}]: "
+        f"joints[{k}]: the platform does not follow to the joint coordinates [{text}]: "
         "its assembly mode ends before, or the way from the sample before is too long",
         leg=0,
         shortfall=float("nan"),

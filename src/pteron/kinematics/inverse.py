@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import RobotLike
 from pteron.shapes import Matrices, OnFailure, PerJoint, PoseLike, Vectors
 
@@ -41,7 +41,7 @@ def inverse_kinematics(
     >>> pteron.inverse_kinematics(pteron.load("quadrupteron"), [0.01, 0.02, 0.03, 0.0])
     array([0.03, 0.02, 0.01, 0.02])
     """
-    return evaluated(robot, "inverse_kinematics", on_failure, pose)
+    return evaluate_kernel(robot, "inverse_kinematics", on_failure, pose)
 
 
 def link_vectors(
@@ -72,7 +72,7 @@ def link_vectors(
     SingularPose
         If the two ends of a leg coincide, so that its elbow is undetermined.
     """
-    return evaluated(robot, "link_vectors", on_failure, pose)
+    return evaluate_kernel(robot, "link_vectors", on_failure, pose)
 
 
 def jacobian(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
@@ -109,7 +109,7 @@ def jacobian(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise
            [0., 1., 0.],
            [0., 0., 1.]])
     """
-    return evaluated(robot, "jacobian", on_failure, pose)
+    return evaluate_kernel(robot, "jacobian", on_failure, pose)
 
 
 def link_jacobians(
@@ -140,4 +140,4 @@ def link_jacobians(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    return evaluated(robot, "link_jacobians", on_failure, pose)
+    return evaluate_kernel(robot, "link_jacobians", on_failure, pose)

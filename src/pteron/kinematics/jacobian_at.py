@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.kinematics.inverse import jacobian
 from pteron.manipulator import Manipulator
 
@@ -31,8 +31,8 @@ class JacobianAtPose:
 def jacobian_at(robot: Manipulator, pose: Array) -> JacobianAtPose:
     """Return the Jacobian at a pose (m,), and its condition number."""
     matrix = jacobian(robot, pose)
-    found: tuple[Array, Array] = evaluated(robot, "homogeneous_jacobian", "raise", pose)
-    plain, length = found
+    homogeneous: tuple[Array, Array] = evaluate_kernel(robot, "homogeneous_jacobian", "raise", pose)
+    plain, length = homogeneous
     turning = robot.platform.angles and any(
         any(leg.platform_point[:2]) and leg.reach_bound is not None for leg in robot.legs
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import RobotLike
 from pteron.shapes import OnFailure, PerJoint, PoseLike
 
@@ -36,7 +36,7 @@ def joint_screws(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "r
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    return evaluated(robot, "joint_screws", on_failure, pose)
+    return evaluate_kernel(robot, "joint_screws", on_failure, pose)
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,8 @@ def joint_rates(
     >>> pteron.kinematics.joint_rates(robot, [0, 0, 0, 0], [0.1, 0, 0, 0]).actuated
     array([0. , 0. , 0.1, 0. ])
     """
-    found: tuple[Array, ...] = evaluated(robot, "joint_rates", on_failure, pose, velocity)
-    return JointMotion(*found)
+    rates: tuple[Array, ...] = evaluate_kernel(robot, "joint_rates", on_failure, pose, velocity)
+    return JointMotion(*rates)
 
 
 def joint_accelerations(
@@ -131,5 +131,7 @@ def joint_accelerations(
         If a leg is stretched or folded (type I).
     """
     motion = pose, velocity, acceleration
-    found: tuple[Array, ...] = evaluated(robot, "joint_accelerations", on_failure, *motion)
-    return JointMotion(*found)
+    accelerations: tuple[Array, ...] = evaluate_kernel(
+        robot, "joint_accelerations", on_failure, *motion
+    )
+    return JointMotion(*accelerations)

@@ -10,7 +10,7 @@ import casadi as ca
 from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.kernels import numeric
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.legs.leg import Passive
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.renamed import former_attribute
@@ -57,18 +57,20 @@ class LimitedJoint:
 def limited_joints(robot: RobotLike, pose: PoseLike) -> tuple[LimitedJoint, ...]:
     """Return all joints that have limits, actuated and passive, at a pose (m,) in reach."""
     robot = as_manipulator(robot)
-    given = checked_one(robot, pose, "pose")
-    joints = numeric(robot, "joint_coordinates")(given)[0]
-    angles, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(given)))
-    found = [_limited(0, joint) for joint in angles]
+    pose_array = finite_pose(robot, pose, "pose")
+    joints = numeric(robot, "joint_coordinates")(pose_array)[0]
+    angles, *legs = passive_joints(Machine.numeric(robot), ca.SX(ca.DM(pose_array)))
+    joints_with_limits = [_passive_limited_joint(0, joint) for joint in angles]
     for i, (leg, q, passive) in enumerate(zip(robot.legs, joints, legs, strict=True), start=1):
         if leg.limits is not None:
-            own = leg.joint
-            found.append(LimitedJoint(i, own.noun, True, own.unit, float(q), *leg.limits))
-        found += [_limited(i, joint) for joint in passive]
-    return tuple(found)
+            actuated = leg.joint
+            joints_with_limits.append(
+                LimitedJoint(i, actuated.noun, True, actuated.unit, float(q), *leg.limits)
+            )
+        joints_with_limits += [_passive_limited_joint(i, joint) for joint in passive]
+    return tuple(joints_with_limits)
 
 
-def _limited(leg: int, at: Passive) -> LimitedJoint:
+def _passive_limited_joint(leg: int, at: Passive) -> LimitedJoint:
     limits = at.least, at.most, at.only_most
     return LimitedJoint(leg, at.noun, False, at.unit, float(at.value), *limits)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.kernels import Array, numeric
-from pteron.kinematics.sampling import sampled_poses, type_ii_sizes
+from pteron.kinematics.sampling import sample_poses, type_ii_sizes
 from pteron.manipulator import Manipulator
 
 _SAMPLE = 100
@@ -41,16 +41,17 @@ class Floors(NamedTuple):
 def usual_floors(
     robot: Manipulator, type_i: float | None, type_ii: float | None, limits: bool
 ) -> Floors:
-    """Return the floors of poses away from singularities; those given stay as they are.
+    """Return the floors of poses away from singularities, with defaults for those not given.
 
-    One that is not given is 0.1 where at least a tenth of the machine's poses have as much, and
-    else the median of its poses.
+    A default is 0.1 where at least a tenth of the machine's poses exceed it, else their median.
     """
     if type_i is not None and type_ii is not None:
         return Floors(type_i, type_ii)
-    bent, held = _measures(robot, type_i or 0.0, limits)
-    least = _usual(bent) if type_i is None else type_i
-    return Floors(least, _usual(held[bent >= least]) if type_ii is None else type_ii)
+    type_i_measures, type_ii_measures = _measures(robot, type_i or 0.0, limits)
+    least = _usual(type_i_measures) if type_i is None else type_i
+    return Floors(
+        least, _usual(type_ii_measures[type_i_measures >= least]) if type_ii is None else type_ii
+    )
 
 
 def median_floors(robot: Manipulator, limits: bool = True) -> Floors:
@@ -58,20 +59,20 @@ def median_floors(robot: Manipulator, limits: bool = True) -> Floors:
 
     So a quarter of the poses in reach pass both, whatever machine it is.
     """
-    bent, held = _measures(robot, 0.0, limits)
-    least = _median(bent)
-    return Floors(least, _median(held[bent >= least]))
+    type_i_measures, type_ii_measures = _measures(robot, 0.0, limits)
+    least = _median(type_i_measures)
+    return Floors(least, _median(type_ii_measures[type_i_measures >= least]))
 
 
 @lru_cache(maxsize=64)
 def _measures(robot: Manipulator, type_i: float, limits: bool) -> tuple[Array, Array]:
     """Return the type-I measure (K,), the least of all legs, and the type-II measure of poses."""
-    poses = sampled_poses(robot, _SAMPLE, np.random.default_rng(0), type_i, limits=limits)
+    poses = sample_poses(robot, _SAMPLE, np.random.default_rng(0), type_i, limits=limits)
     return numeric(robot, "reach")(poses)[1].min(axis=-1), type_ii_sizes(robot, poses)
 
 
 def _usual(measures: Array) -> float:
-    """Return the usual floor where enough measures pass it, else the median."""
+    """Return the usual floor where enough measures exceed it, else the median."""
     enough = int((measures >= _USUAL).sum()) >= _SHARE * len(measures)
     return _USUAL if enough else _median(measures)
 

@@ -30,7 +30,7 @@ _DIGITS = 12
 
 def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
     """Return the numbers of `equations.machine.numbers` in a prime field, or None if not known."""
-    found: list[int] = []
+    geometry: list[int] = []
     for leg in robot.legs:
         units: list[list[int]] = []
         for quantity in leg.quantities:
@@ -39,33 +39,33 @@ def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
                 if unit is None:
                     return None
                 units.append(unit)
-                found += unit
+                geometry += unit
             else:
-                found += (field.number(_decimal(value)) for value in quantity.value)
+                geometry += (field.number(_decimal(number)) for number in quantity.value)
         vectors = [q.value for q in leg.quantities if q.role in ("direction", "normal")]
         if not _same_right_angles(vectors, units, field):
             return None
         for point in (leg.platform_point, leg.fixed_offset):
-            found += (field.number(_decimal(value)) for value in point)
+            geometry += (field.number(_decimal(number)) for number in point)
     frame = [_unit(axis, field) for axis in robot.platform.frame]
     known = [axis for axis in frame if axis is not None]
     if len(known) < len(frame) or not _same_right_angles(robot.platform.frame, known, field):
         return None
     for axis in known:
-        found += axis
-    for name, values in robot.platform.quantities.items():
+        geometry += axis
+    for name, vector in robot.platform.quantities.items():
         if name.endswith("axis"):
-            unit = _unit(values, field)
+            unit = _unit(vector, field)
             if unit is None:
                 return None
-            found += unit
+            geometry += unit
         else:
-            found += (field.number(_decimal(value)) for value in values)
-    return [*found, *(field.number(_decimal(value)) for value in robot.gravity)]
+            geometry += (field.number(_decimal(number)) for number in vector)
+    return [*geometry, *(field.number(_decimal(number)) for number in robot.gravity)]
 
 
-def _decimal(value: float) -> Fraction:
-    return Fraction(repr(round(float(value), _DIGITS)))
+def _decimal(number: float) -> Fraction:
+    return Fraction(repr(round(float(number), _DIGITS)))
 
 
 def _unit(vector: Sequence[float], field: PrimeField) -> list[int] | None:
@@ -81,36 +81,36 @@ def _unit(vector: Sequence[float], field: PrimeField) -> list[int] | None:
 
 
 def _signed_root(square: Fraction, negative: bool, field: PrimeField) -> int:
-    whole = square.numerator * square.denominator
-    root = reduce(mul, (_prime_root(p, field) for p in _prime_factors(whole)), 1)
+    product = square.numerator * square.denominator
+    root = reduce(mul, (_prime_root(p, field) for p in _prime_factors(product)), 1)
     share = field.divide(root % field.prime, field.number(square.denominator))
     return field.subtract(0, share) if negative else share
 
 
 def _prime_root(p: int, field: PrimeField) -> int:
-    """Return a factor of a root: of a square the number itself, by `_prime_factors` negative."""
+    """Return sqrt(p) in the field; for -p, which stands for p^2 in `_prime_factors`, p itself."""
     return -p if p < 0 else field.square_root(p)
 
 
-def _prime_factors(whole: int) -> list[int]:
-    """Return the primes of a number, each pair of equal ones as one, negative."""
-    found, p = [], 2
-    while p <= isqrt(whole):
-        if whole % (p * p) == 0:
-            found.append(-p)
-            whole //= p * p
-        elif whole % p == 0:
-            found.append(p)
-            whole //= p
+def _prime_factors(number: int) -> list[int]:
+    """Return the prime factors of a number; a squared factor p^2 is given as -p."""
+    factors, p = [], 2
+    while p <= isqrt(number):
+        if number % (p * p) == 0:
+            factors.append(-p)
+            number //= p * p
+        elif number % p == 0:
+            factors.append(p)
+            number //= p
         else:
             p += 1
-    return found + ([whole] if whole > 1 else [])
+    return factors + ([number] if number > 1 else [])
 
 
 def _same_right_angles(
     vectors: Sequence[Sequence[float]], units: Sequence[Sequence[int]], field: PrimeField
 ) -> bool:
-    """Say whether vectors that are perpendicular but for rounding are so in the field."""
+    """Return whether vectors that are perpendicular up to rounding are so in the field."""
     pairs = [(i, j) for i in range(len(units)) for j in range(i)]
     return all(
         sum(a * b for a, b in zip(units[i], units[j], strict=True)) % field.prime == 0

@@ -15,9 +15,9 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.functions import ANGLES
 from pteron.kinematics.evaluate import (
-    checked,
-    evaluated,
+    evaluate_kernel,
     expect_choice,
+    finite_rows,
     no_place,
     place,
     singular_angles,
@@ -58,7 +58,7 @@ def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
     array([0.  , 0.  , 0.12])
     """
     robot = as_manipulator(robot)
-    return robot.platform.at(checked(robot, pose, "pose"))[0]
+    return robot.platform.at(finite_rows(robot, pose, "pose"))[0]
 
 
 def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matrix") -> Array:
@@ -89,11 +89,11 @@ def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matri
     """
     robot = as_manipulator(robot)
     _expect_form(form)
-    matrix = np.swapaxes(robot.platform.at(checked(robot, pose, "pose"))[1], -1, -2)
+    matrix = np.swapaxes(robot.platform.at(finite_rows(robot, pose, "pose"))[1], -1, -2)
     if form == "matrix":
         return np.ascontiguousarray(matrix)
     if form == "tilt-torsion":
-        return _tilt_torsion(_turned(robot) @ matrix)
+        return _tilt_torsion(_frame_at_zero(robot) @ matrix)
     return _quaternion(matrix)
 
 
@@ -141,36 +141,40 @@ def pose_of(
     robot = as_manipulator(robot)
     _expect_form(form)
     expect_choice(on_failure)
-    at = as_array(position, "position", (3,))
-    given = as_array(rotation, "rotation", _SHAPES[form])
-    matrix = _matrix(robot, given, form)
-    lead = np.broadcast_shapes(at.shape[:-1], matrix.shape[:-2])
-    at, matrix = np.broadcast_to(at, (*lead, 3)), np.broadcast_to(matrix, (*lead, 3, 3))
+    positions = as_array(position, "position", (3,))
+    rotations = as_array(rotation, "rotation", _SHAPES[form])
+    matrix = _matrix(robot, rotations, form)
+    lead = np.broadcast_shapes(positions.shape[:-1], matrix.shape[:-2])
+    positions, matrix = (
+        np.broadcast_to(positions, (*lead, 3)),
+        np.broadcast_to(matrix, (*lead, 3, 3)),
+    )
     skewed = np.abs(np.swapaxes(matrix, -1, -2) @ matrix - np.eye(3)).max(axis=(-1, -2))
     skewed = np.where(np.linalg.det(matrix) > 0.0, skewed, np.inf)
-    pose = nearest_pose(robot.platform, at, matrix)
-    found, axes = robot.platform.at(pose)
-    away = np.linalg.norm(found - at, axis=-1)
+    pose = nearest_pose(robot.platform, positions, matrix)
+    nearest_position, axes = robot.platform.at(pose)
+    distance = np.linalg.norm(nearest_position - positions, axis=-1)
     turned = np.linalg.norm(axes @ matrix - np.eye(3), axis=(-1, -2)) / np.sqrt(2.0)
-    good = (skewed <= _ROUNDING) & (away <= _ROUNDING) & (turned <= _ROUNDING)
+    good = (skewed <= _ROUNDING) & (distance <= _ROUNDING) & (turned <= _ROUNDING)
     if good.all():
         return pose
     if on_failure == "nan":
         return np.where(good[..., None], pose, np.nan)
     index = tuple(int(i) for i in np.argwhere(~good)[0])
-    numbers = np.isfinite(at[index]).all() and np.isfinite(matrix[index]).all()
+    numbers = np.isfinite(positions[index]).all() and np.isfinite(matrix[index]).all()
     if not numbers:
         raise DataError(f"{place('position', index)}, rotation: finite numbers expected")
-    if np.isnan(away[index]):
+    if np.isnan(distance[index]):
         raise no_place(index)
     if not skewed[index] <= _ROUNDING:
         raise DataError(
             f"{place('rotation', index)}: no rotation: its columns are no unit vectors at right "
             "angles that turn by the right hand"
         )
+    angle = 2.0 * np.arcsin(min(turned[index] / 2.0, 1.0))
     raise DataError(
         f"{place('position', index)}, rotation: a {robot.platform.motion} platform cannot have "
-        f"them: {_told(away[index], 2.0 * np.arcsin(min(turned[index] / 2.0, 1.0)))} from the "
+        f"them: {_difference_text(distance[index], angle)} from the "
         f"nearest pose, {', '.join(robot.coordinates)} = "
         f"{', '.join(f'{v:.4g}' for v in pose[index] + 0.0)}"
     )
@@ -206,12 +210,12 @@ def twist(
     >>> pteron.twist("stewart", [0, 0, 2.0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0.5]) + 0.0
     array([0.1, 0. , 0. , 0. , 0. , 0.5])
     """
-    found: Array = evaluated(robot, "twist", on_failure, pose, velocity)
-    lost = np.isnan(found).any(axis=-1)
-    if on_failure == "raise" and lost.any():
-        index = tuple(int(i) for i in np.argwhere(lost)[0])
+    twists: Array = evaluate_kernel(robot, "twist", on_failure, pose, velocity)
+    is_missing = np.isnan(twists).any(axis=-1)
+    if on_failure == "raise" and is_missing.any():
+        index = tuple(int(i) for i in np.argwhere(is_missing)[0])
         raise no_place(index)
-    return found
+    return twists
 
 
 def velocity_of(
@@ -255,28 +259,32 @@ def velocity_of(
         raise DataError(
             "twist: phi slides the halves of this platform, of which no twist of P tells"
         )
-    poses = checked(robot, pose, "pose", on_failure)
-    given = as_array(twist, "twist", (6,), columns=())
-    velocity, rest, _ = numeric(robot, "velocity_of_twist")(poses, given)
+    poses = finite_rows(robot, pose, "pose", on_failure)
+    twists = as_array(twist, "twist", (6,), columns=())
+    velocity, infeasible, _ = numeric(robot, "velocity_of_twist")(poses, twists)
     poses = np.broadcast_to(poses, (*velocity.shape[:-1], robot.freedom))
-    beyond = [np.linalg.norm(part, axis=-1) for part in (rest[..., :3], rest[..., 3:])]
-    size = _ROUNDING * np.maximum(1.0, np.abs(given).max(axis=-1))
+    infeasible_sizes = [
+        np.linalg.norm(part, axis=-1) for part in (infeasible[..., :3], infeasible[..., 3:])
+    ]
+    size = _ROUNDING * np.maximum(1.0, np.abs(twists).max(axis=-1))
     known = robot.platform.angle_measures(poses) > ANGLES
-    good = known & (beyond[0] <= size) & (beyond[1] <= size)
+    good = known & (infeasible_sizes[0] <= size) & (infeasible_sizes[1] <= size)
     if good.all():
         return np.asarray(velocity)
     if on_failure == "nan":
         return np.where(good[..., None], velocity, np.nan)
     index = tuple(int(i) for i in np.argwhere(~good)[0])
-    if not np.isfinite(np.broadcast_to(given, (*good.shape, 6))[index]).all():
+    if not np.isfinite(np.broadcast_to(twists, (*good.shape, 6))[index]).all():
         raise DataError(f"{place('twist', index)}: finite numbers expected")
-    if np.isnan(velocity[index]).any() and np.isnan(beyond[0][index]):
+    if np.isnan(velocity[index]).any() and np.isnan(infeasible_sizes[0][index]):
         raise no_place(index)
     if not known[index]:
         raise singular_angles(robot, poses[index], index)
+    speed, turning = (size[index] for size in infeasible_sizes)
+    remainder = _difference_text(speed, turning, "/s")
     raise DataError(
         f"{place('twist', index)}: a {robot.platform.motion} platform cannot move so at this pose: "
-        f"{_told(beyond[0][index], beyond[1][index], '/s')} are left of it"
+        f"{remainder} are left of it"
     )
 
 
@@ -318,7 +326,7 @@ def twist_jacobian(
            [0., 1., 0., 0., 0., 0.],
            [0., 0., 1., 0., 0., 0.]])
     """
-    return evaluated(robot, "twist_jacobian", on_failure, pose)
+    return evaluate_kernel(robot, "twist_jacobian", on_failure, pose)
 
 
 def _expect_form(form: str) -> None:
@@ -326,31 +334,31 @@ def _expect_form(form: str) -> None:
         raise DataError(f"form: {form!r} is none of {', '.join(_SHAPES)}")
 
 
-def _turned(robot: Manipulator) -> Array:
+def _frame_at_zero(robot: Manipulator) -> Array:
     """Return the axes (3, 3) of the platform at angles zero, one a row."""
     return np.array(robot.platform.frame)
 
 
-def _told(length: float, angle: float, per: str = "") -> str:
-    """Return in words by how much something is off, of which rounding is no part."""
+def _difference_text(length: float, angle: float, per: str = "") -> str:
+    """Return a phrase for a difference in length and angle, without parts that are rounding."""
     parts = [(length, f"{length:.3g} m{per}"), (angle, f"{angle:.3g} rad{per}")]
     return " and ".join(text for size, text in parts if size > _ROUNDING)
 
 
-def _matrix(robot: Manipulator, given: Array, form: RotationForm) -> Array:
+def _matrix(robot: Manipulator, rotations: Array, form: RotationForm) -> Array:
     """Return rotations (..., 3, 3) as matrices."""
     if form == "matrix":
-        return given
+        return rotations
     if form == "quaternion":
-        length = np.linalg.norm(given, axis=-1, keepdims=True)
-        x, y, z, w = np.moveaxis(given / np.where(length > 0.0, length, np.nan), -1, 0)
+        length = np.linalg.norm(rotations, axis=-1, keepdims=True)
+        x, y, z, w = np.moveaxis(rotations / np.where(length > 0.0, length, np.nan), -1, 0)
         rows = [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
             [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
             [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
         ]
-        return _stacked(rows)
-    azimuth, tilt, torsion = np.moveaxis(given, -1, 0)
+        return _stack_rows(rows)
+    azimuth, tilt, torsion = np.moveaxis(rotations, -1, 0)
     ca, sa, ct, st = np.cos(azimuth), np.sin(azimuth), np.cos(tilt), np.sin(tilt)
     cg, sg = np.cos(torsion - azimuth), np.sin(torsion - azimuth)
     rows = [
@@ -358,18 +366,18 @@ def _matrix(robot: Manipulator, given: Array, form: RotationForm) -> Array:
         [sa * ct * cg + ca * sg, -sa * ct * sg + ca * cg, sa * st],
         [-st * cg, st * sg, ct],
     ]
-    return _turned(robot).T @ _stacked(rows)
+    return _frame_at_zero(robot).T @ _stack_rows(rows)
 
 
-def _stacked(rows: list[list[Array]]) -> Array:
+def _stack_rows(rows: list[list[Array]]) -> Array:
     return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
 
 
-def _tilt_torsion(turned: Array) -> Array:
+def _tilt_torsion(matrix: Array) -> Array:
     """Return (azimuth, tilt, torsion), (..., 3), of rotations; level ones have azimuth 0."""
-    x, y, z = turned[..., 0, 2], turned[..., 1, 2], turned[..., 2, 2]
-    across, along = turned[..., 1, 0] - turned[..., 0, 1], turned[..., 0, 0] + turned[..., 1, 1]
-    parts = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z), np.arctan2(across, along)
+    x, y, z = matrix[..., 0, 2], matrix[..., 1, 2], matrix[..., 2, 2]
+    sine, cosine = matrix[..., 1, 0] - matrix[..., 0, 1], matrix[..., 0, 0] + matrix[..., 1, 1]
+    parts = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z), np.arctan2(sine, cosine)
     return np.stack(parts, axis=-1)
 
 
@@ -390,5 +398,5 @@ def _quaternion(matrix: Array) -> Array:
         products[..., i, i] = squares[..., i]
     largest = np.where(np.isnan(squares), 0.0, squares).argmax(axis=-1)
     row = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
-    found = row / np.linalg.norm(row, axis=-1, keepdims=True)
-    return np.asarray(np.where(found[..., 3:] < 0.0, -found, found) + 0.0)
+    quaternions = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    return np.asarray(np.where(quaternions[..., 3:] < 0.0, -quaternions, quaternions) + 0.0)

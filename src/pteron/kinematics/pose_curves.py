@@ -22,51 +22,53 @@ _STEPS = 30
 _FLAT = 1e-6
 """Singular value of the closures' derivatives, over the largest, that counts as zero."""
 
-_ALONG = 0.02
+_PROBE_DISTANCE = 0.02
 """Distance, |z| = 1, from a pose to another on a curve. At an isolated pose of multiplicity m the
 residuals there are about its m-th power, far above rounding."""
 
 
-def on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
-    """Return which z (K, d) lead to a pose that lies on a curve of poses of its machine (K, k, 7).
+def lie_on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
+    """Return which z (K, d) converge to a pose on a curve of poses of its machine (K, k, 7).
 
     Where the closures' derivatives lose a rank, other poses are sought at a distance in the free
     direction, to both sides.
     """
     if not len(z):
         return np.zeros(0, dtype=bool)
-    miss = ROUNDING * second_slopes(closed, machines)
-    one = np.eye(closed.size)
-    z, missed = _descended(closed, machines, z, one)
-    z = of_length_one(z)
+    tolerance = ROUNDING * second_slopes(closed, machines)
+    identity = np.eye(closed.size)
+    z, residuals = _levenberg_marquardt(closed, machines, z, identity)
+    z = normalise_rows(z)
     rows, _ = rows_kernel(closed)(z, machines.reshape(len(z), 7 * closed.equations))
     _, sizes, axes = np.linalg.svd(np.concatenate([rows, z[:, None]], axis=1))
-    found = (missed <= miss) & (sizes[:, -1] <= _FLAT * sizes[:, 0])
-    held = np.stack([z, axes[:, -1]], axis=1)
-    across = one - np.swapaxes(held, -1, -2) @ held
-    for side in (_ALONG, -_ALONG):
-        _, missed = _descended(closed, machines, z + side * axes[:, -1], across)
-        found &= missed <= miss
-    return np.asarray(found)
+    is_on_curve = (residuals <= tolerance) & (sizes[:, -1] <= _FLAT * sizes[:, 0])
+    fixed_directions = np.stack([z, axes[:, -1]], axis=1)
+    projectors = identity - np.swapaxes(fixed_directions, -1, -2) @ fixed_directions
+    for side in (_PROBE_DISTANCE, -_PROBE_DISTANCE):
+        _, residuals = _levenberg_marquardt(closed, machines, z + side * axes[:, -1], projectors)
+        is_on_curve &= residuals <= tolerance
+    return np.asarray(is_on_curve)
 
 
-def _descended(closed: Closed, machines: Array, z: Array, across: Array) -> tuple[Array, Array]:
-    """Return the best z (K, d) of Levenberg and Marquardt's steps, and its residuals.
+def _levenberg_marquardt(
+    closed: Closed, machines: Array, z: Array, projectors: Array
+) -> tuple[Array, Array]:
+    """Return the best z (K, d) of Levenberg-Marquardt steps, and the norms of its residuals (K,).
 
     Damped by the square of the residual they reach a curve of poses as fast as Newton's a regular
     pose (Yamashita and Fukushima, On the rate of convergence of the Levenberg-Marquardt method,
-    2001). `across` (d, d) or (K, d, d) projects onto the steps that are allowed.
+    2001). `projectors` (d, d) or (K, d, d) project onto the allowed steps.
     """
     numbers = machines.reshape(len(z), 7 * closed.equations)
     best, least = z, np.full(len(z), np.inf)
     for _ in range(_STEPS):
-        rows, missed = rows_kernel(closed)(z, numbers)
-        size = np.linalg.norm(missed, axis=-1)
+        rows, residuals = rows_kernel(closed)(z, numbers)
+        size = np.linalg.norm(residuals, axis=-1)
         better = size < least
         best, least = np.where(better[:, None], z, best), np.where(better, size, least)
-        u, s, v = np.linalg.svd(rows @ across, full_matrices=False)
+        u, s, v = np.linalg.svd(rows @ projectors, full_matrices=False)
         damping = np.maximum(size, ROUNDING)[:, None] ** 2
-        step = (missed[:, None] @ u) * (s / (s * s + damping))[:, None] @ v
+        step = (residuals[:, None] @ u) * (s / (s * s + damping))[:, None] @ v
         z = z - step[:, 0]
     return best, least
 
@@ -80,6 +82,6 @@ def second_slopes(closed: Closed, machines: Array) -> Array:
     return np.asarray(np.sqrt((bends**2).sum(axis=-1) + closed.moves))
 
 
-def of_length_one(z: Array) -> Array:
+def normalise_rows(z: Array) -> Array:
     """Return z (..., d) divided by their lengths."""
     return np.asarray(z / np.linalg.norm(z, axis=-1, keepdims=True))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pteron.equations.pose_paths import Closed
 from pteron.kernels import Array
 from pteron.kernels.path_programs import path_kernel, rows_kernel
-from pteron.kinematics.pose_curves import ROUNDING, of_length_one, on_curves, second_slopes
+from pteron.kinematics.pose_curves import ROUNDING, lie_on_curves, normalise_rows, second_slopes
 
 Complex = NDArray[np.complex128]
 
@@ -30,16 +30,16 @@ _PATHS = 4096
 _STEPS = 500
 """Greatest number of steps of a path: one in a thousand takes more than a third of it."""
 
-_GONE, _FIRST = 0.1, 0.05
+_BACK, _FIRST = 0.1, 0.05
 """Straight extrapolation before a path's start, and its first step, in the path's parameter."""
 
 _LEAST = 1e-8
-"""Step below which a path is lost: it leads to no pose, or almost meets another path."""
+"""Step below which a path fails: it diverges, or nearly meets another path."""
 
 _TRIALS = 4
 """Greatest number of attempts to follow all paths to a machine, if some are lost."""
 
-_ALIKE = 1e-6
+_DUPLICATE = 1e-6
 """Sine of the angle between two poses z below which they count as one."""
 
 _REAL = 1e-3
@@ -100,54 +100,56 @@ class RealPoses(NamedTuple):
 def real_poses(closed: Closed, machines: Array) -> RealPoses:
     """Return all real poses of machines (B, k, 7).
 
-    See `stepped` for the numbers of a machine; they should be about 1.
+    See `advance_path` for the numbers of a machine; they should be about 1.
     """
     known = generic(closed)
     share = max(_PATHS // len(known.poses), 1)
-    found = [
+    batches = [
         _real_poses(known, machines[start : start + share], start)
         for start in range(0, len(machines), share)
     ]
-    if not found:
+    if not batches:
         return RealPoses(np.empty(0, int), np.empty((0, closed.size)), np.empty(0, bool))
-    return RealPoses(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    return RealPoses(*(np.concatenate(parts) for parts in zip(*batches, strict=True)))
 
 
 def _real_poses(known: Generic, machines: Array, first: int) -> RealPoses:
     rng = np.random.default_rng(1)
-    left, move = np.arange(len(machines)), np.zeros(len(machines), dtype=bool)
+    remaining, move = np.arange(len(machines)), np.zeros(len(machines), dtype=bool)
     which, poses = np.empty(0, dtype=np.int64), np.empty((0, known.closed.size))
     certain = np.empty(0)
     for trial in range(_TRIALS):
         turns = _unit_quaternion(rng), _unit_quaternion(rng)
-        turned = _turned(machines[left], *turns)
-        ends, arrived, converged = followed(known, turned)
-        own, real = _candidates(ends, arrived)
-        real = _polished(known.closed, machines[left[own]], _turned_back(real, *turns))
-        good, radius = _proved(known.closed, machines[left[own]], real)
+        turned = _rotate_machines(machines[remaining], *turns)
+        ends, arrived, converged = follow_paths(known, turned)
+        machine_index, real = _candidates(ends, arrived)
+        real = _polish_poses(
+            known.closed, machines[remaining[machine_index]], _rotate_back(real, *turns)
+        )
+        good, radius = _prove_poses(known.closed, machines[remaining[machine_index]], real)
         counts = np.bincount(which, minlength=len(machines))
-        which = np.concatenate([which, left[own[good]]])
+        which = np.concatenate([which, remaining[machine_index[good]]])
         poses, certain = (
             np.concatenate([poses, real[good]]),
             np.concatenate([certain, radius[good]]),
         )
         order = np.argsort(which, kind="stable")
         which, poses, certain = which[order], poses[order], certain[order]
-        kept = ~_found_twice(which, poses, certain)
-        which, poses, certain = which[kept], poses[kept], certain[kept]
+        is_new = ~_are_duplicates(which, poses, certain)
+        which, poses, certain = which[is_new], poses[is_new], certain[is_new]
         missing = ~(converged.all(axis=-1) & _all_differ(ends))
         if trial:  # paths that are lost in every attempt lead to no pose
-            missing &= (np.bincount(which, minlength=len(machines)) > counts)[left]
+            missing &= (np.bincount(which, minlength=len(machines)) > counts)[remaining]
         else:
             turns = np.abs((ends[..., :4] ** 2).sum(axis=-1)) > _NO_ROTATION
-            own, lost = np.nonzero(~converged & turns)
-            starts = of_length_one(_largest_real(ends[own, lost]).real)
-            move[own[on_curves(known.closed, turned[own], starts)]] = True
-        left = left[missing & ~move[left]]
-        if not len(left):
+            machine_index, lost = np.nonzero(~converged & turns)
+            starts = normalise_rows(_largest_real(ends[machine_index, lost]).real)
+            move[machine_index[lie_on_curves(known.closed, turned[machine_index], starts)]] = True
+        remaining = remaining[missing & ~move[remaining]]
+        if not len(remaining):
             break
-    alone = ~move[which]
-    return RealPoses(which[alone] + first, poses[alone], move)
+    is_isolated = ~move[which]
+    return RealPoses(which[is_isolated] + first, poses[is_isolated], move)
 
 
 _Step = Callable[[Array, Array], tuple[Array, Array]]
@@ -164,7 +166,7 @@ def _any_step(known: Generic) -> _Step:
     return lambda at, target: kernel(at, start, target)
 
 
-def followed(
+def follow_paths(
     known: Generic, targets: Array | Complex
 ) -> tuple[Complex, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the ends z (B, N, d) of the paths to machines (B, k, 7).
@@ -178,23 +180,23 @@ def followed(
     parts = _parts(machines.astype(complex)) if general else machines.real
     target = np.repeat(parts, count, axis=0)
     z = np.tile(_parts(known.poses), (len(targets), 1))
-    at, arrived = _arrived(step, target, z, d)
-    ends, converged = _refined(step, target, at)
+    at, arrived = _track_paths(step, target, z, d)
+    ends, converged = _refine_ends(step, target, at)
     shape = -1, count
     return (
-        _whole(ends, d).reshape(*shape, d),
+        _complex(ends, d).reshape(*shape, d),
         arrived.reshape(shape),
         (arrived & converged).reshape(shape),
     )
 
 
-def _arrived(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
+def _track_paths(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
     """Return the ends (K, 2 d) of paths from z to machines, real parts first."""
-    at = _standing(z)
+    at = _initial_states(z)
     at, _ = step(at, target)  # for dz/dt
     at[:, 4 * d : 8 * d] = at[:, : 4 * d]
-    at[:, 4 * d : 6 * d] -= _GONE * at[:, 2 * d : 4 * d]
-    at[:, -3:] = _GONE, 0.0, _FIRST
+    at[:, 4 * d : 6 * d] -= _BACK * at[:, 2 * d : 4 * d]
+    at[:, -3:] = _BACK, 0.0, _FIRST
     ends, arrived = np.zeros_like(z), np.zeros(len(z), dtype=bool)
     rows = np.arange(len(z))
     for k in range(_STEPS):
@@ -210,8 +212,8 @@ def _arrived(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, NDArr
     return ends, arrived
 
 
-def _standing(z: Array) -> Array:
-    """Return paths that stay at z (K, 2 d)."""
+def _initial_states(z: Array) -> Array:
+    """Return initial path states (K, 4 d + 3) at z (K, 2 d)."""
     width = z.shape[1]
     at = np.zeros((len(z), 4 * width + 3))
     at[:, :width] = at[:, 2 * width : 3 * width] = z
@@ -223,22 +225,22 @@ def _parts(z: Complex) -> Array:
     return np.concatenate([z.real, z.imag], axis=-1)
 
 
-def _whole(parts: Array, d: int) -> Complex:
+def _complex(parts: Array, d: int) -> Complex:
     return parts[..., :d] + 1j * parts[..., d : 2 * d]
 
 
 def _all_differ(ends: Complex) -> NDArray[np.bool_]:
-    """Return whether all ends z (B, N, d) of a machine differ: then all poses are found."""
+    """Return whether all ends z (B, N, d) of a machine differ: then the poses are complete."""
     alike = np.abs(ends.conj() @ np.swapaxes(ends, -1, -2)) ** 2
     pairs = np.triu(np.ones(alike.shape[1:], dtype=bool), 1)
-    return np.asarray(~((alike > 1.0 - _ALIKE**2) & pairs).any(axis=(-2, -1)))
+    return np.asarray(~((alike > 1.0 - _DUPLICATE**2) & pairs).any(axis=(-2, -1)))
 
 
 def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
-    """Return the ends z (K, d) of (B, N, d) that may be real, and their machines' numbers (K,)."""
+    """Return the machines' numbers (K,) and ends z (K, d), of (B, N, d), that may be real."""
     turned = _largest_real(ends)
     real = arrived & (np.abs(turned.imag).max(axis=-1) <= _REAL)
-    return np.nonzero(real)[0], of_length_one(turned.real[real])
+    return np.nonzero(real)[0], normalise_rows(turned.real[real])
 
 
 def _largest_real(z: Complex) -> Complex:
@@ -248,56 +250,56 @@ def _largest_real(z: Complex) -> Complex:
         return np.asarray(z * (phase.conj() / np.abs(phase)))
 
 
-def _refined(step: _Step, target: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return ends z (K, 2 d) of paths after Newton's steps, and whether these have converged."""
+def _refine_ends(step: _Step, target: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return ends z (K, 2 d) of paths after Newton's steps, and whether they converged."""
     for _ in range(_REFINING):
-        at = _standing(z)
+        at = _initial_states(z)
         at[:, -2] = 1.0
-        at, left = step(at, target)
+        at, correction = step(at, target)
         z = at[:, : z.shape[1]]
-    return z, left <= _CONVERGED
+    return z, correction <= _CONVERGED
 
 
-def _polished(closed: Closed, machines: Array, z: Array) -> Array:
+def _polish_poses(closed: Closed, machines: Array, z: Array) -> Array:
     """Return real poses z (K, d) after those of Newton's steps that reduce their residuals."""
     numbers = machines.reshape(len(z), 7 * closed.equations)
     best, least = z, np.full(len(z), np.inf)
     for _ in range(_POLISHING):
-        rows, missed = rows_kernel(closed)(z, numbers)
-        size = np.linalg.norm(missed, axis=-1)
+        rows, residuals = rows_kernel(closed)(z, numbers)
+        size = np.linalg.norm(residuals, axis=-1)
         better = size < least
         best, least = np.where(better[:, None], z, best), np.where(better, size, least)
-        inverse = _inverted(np.concatenate([rows, z[:, None]], axis=1))
+        inverse = _invert(np.concatenate([rows, z[:, None]], axis=1))
         with np.errstate(all="ignore"):
-            z = z - (inverse[..., :-1] @ missed[..., None])[..., 0]
+            z = z - (inverse[..., :-1] @ residuals[..., None])[..., 0]
             z = z / np.linalg.norm(z, axis=-1, keepdims=True)
         z = np.where(np.isfinite(z).all(axis=-1, keepdims=True), z, best)
     return best
 
 
-def _proved(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Return which z (K, d) are poses, and within which radius they are the only ones.
+def _prove_poses(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Return which z (K, d) are proved to be poses, and the radius of uniqueness of each.
 
     The proof is Kantorovich's theorem. A pose next to a singularity, where it proves nothing,
     counts if its residuals are rounding alone; the radius is then 0.
     """
     if not len(z):
         return np.zeros(0, dtype=bool), np.zeros(0)
-    rows, missed = rows_kernel(closed)(z, machines.reshape(len(z), 7 * closed.equations))
+    rows, residuals = rows_kernel(closed)(z, machines.reshape(len(z), 7 * closed.equations))
     bend = second_slopes(closed, machines)
     rounding = 16.0 * np.finfo(float).eps * bend
-    whole = np.concatenate([rows, z[:, None]], axis=1)
+    square_rows = np.concatenate([rows, z[:, None]], axis=1)
     with np.errstate(all="ignore"):
-        inverse = np.linalg.norm(_inverted(whole), axis=(-2, -1))
-        newton = inverse * (np.linalg.norm(missed, axis=-1) + rounding)
+        inverse = np.linalg.norm(_invert(square_rows), axis=(-2, -1))
+        newton = inverse * (np.linalg.norm(residuals, axis=-1) + rounding)
         proof = 2.0 * inverse * bend * newton
         radius = np.where(proof <= 1.0, 1.0 / (inverse * bend), 0.0)
-    close = np.linalg.norm(missed, axis=-1) <= ROUNDING * bend
+    close = np.linalg.norm(residuals, axis=-1) <= ROUNDING * bend
     nowhere = np.linalg.norm(z[:, :4], axis=-1) <= _NO_ROTATION
     return (close | (radius > 0.0)) & ~nowhere, radius
 
 
-def _inverted(matrices: Array) -> Array:
+def _invert(matrices: Array) -> Array:
     """Return inverses, infinite where there are none."""
     try:
         return np.asarray(np.linalg.inv(matrices), dtype=float)
@@ -307,19 +309,21 @@ def _inverted(matrices: Array) -> Array:
         return np.where(singular[:, None, None], np.inf, np.linalg.inv(safe))
 
 
-def _found_twice(which: NDArray[np.int64], z: Array, radius: Array) -> NDArray[np.bool_]:
+def _are_duplicates(which: NDArray[np.int64], z: Array, radius: Array) -> NDArray[np.bool_]:
     """Return which poses (K, d), in order, equal an earlier one of the same machine."""
     count = np.arange(len(which)) - np.searchsorted(which, which)
-    found = np.zeros(len(which), dtype=bool)
+    is_duplicate = np.zeros(len(which), dtype=bool)
     for back in range(1, int(count.max(initial=0)) + 1):
         later = np.flatnonzero(count >= back)
-        one, other = z[later - back], z[later]
-        along = (one * other).sum(axis=-1, keepdims=True)
+        earlier, later_z = z[later - back], z[later]
+        cosines = (earlier * later_z).sum(axis=-1, keepdims=True)
         with np.errstate(all="ignore"):
-            apart = np.linalg.norm(other / along - one, axis=-1)
-        proved = radius[later - back] * (radius[later] > 0.0)
-        found[later[apart <= np.where(proved > 0.0, 0.5 * proved, _ALIKE)]] = True
-    return found
+            distances = np.linalg.norm(later_z / cosines - earlier, axis=-1)
+        proved_radius = radius[later - back] * (radius[later] > 0.0)
+        is_duplicate[
+            later[distances <= np.where(proved_radius > 0.0, 0.5 * proved_radius, _DUPLICATE)]
+        ] = True
+    return is_duplicate
 
 
 def _unit_quaternion(rng: np.random.Generator) -> Array:
@@ -327,29 +331,29 @@ def _unit_quaternion(rng: np.random.Generator) -> Array:
     return np.asarray(drawn / np.linalg.norm(drawn))
 
 
-def _turned(machines: Array, base: Array, platform: Array) -> Array:
-    """Return machines (B, k, 7) in other frames."""
+def _rotate_machines(machines: Array, base: Array, platform: Array) -> Array:
+    """Return machines (B, k, 7) in rotated frames."""
     turned = machines.copy()
     for columns, q in ((slice(0, 3), base), (slice(3, 6), platform)):
         turned[..., columns] = machines[..., columns] @ rotation(q).T
     return turned
 
 
-def _turned_back(z: Array, base: Array, platform: Array) -> Array:
-    """Return u* x v and u* y v of poses z = (x, y), whose frames u and v have turned."""
+def _rotate_back(z: Array, base: Array, platform: Array) -> Array:
+    """Return poses z = (x, y) of rotated frames in the original ones, u* x v and u* y v."""
     u, v = base * [1.0, -1.0, -1.0, -1.0], platform
-    matrix = _left(u) @ _right(v)
+    matrix = _left_matrix(u) @ _right_matrix(v)
     return np.concatenate([z[:, k : k + 4] @ matrix.T for k in range(0, z.shape[1], 4)], axis=-1)
 
 
-def _left(q: Array) -> Array:
+def _left_matrix(q: Array) -> Array:
     """Return the matrix (..., 4, 4) of x -> q x."""
     w, i, j, k = np.moveaxis(q, -1, 0)
     rows = [[w, -i, -j, -k], [i, w, -k, j], [j, k, w, -i], [k, -j, i, w]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _right(q: Array) -> Array:
+def _right_matrix(q: Array) -> Array:
     """Return the matrix (..., 4, 4) of x -> x q."""
     w, i, j, k = np.moveaxis(q, -1, 0)
     rows = [[w, -i, -j, -k], [i, w, k, -j], [j, -k, w, i], [k, j, -i, w]]
@@ -359,16 +363,16 @@ def _right(q: Array) -> Array:
 def rotation(x: Array) -> Array:
     """Return the rotation (..., 3, 3) of a quaternion, of any length."""
     conjugate = x * [1.0, -1.0, -1.0, -1.0]
-    whole = _left(x) @ _right(conjugate) / (x * x).sum(axis=-1)[..., None, None]
-    return np.asarray(whole[..., 1:, 1:])
+    product = _left_matrix(x) @ _right_matrix(conjugate) / (x * x).sum(axis=-1)[..., None, None]
+    return np.asarray(product[..., 1:, 1:])
 
 
-def placed(z: Array) -> tuple[Array, Array]:
+def positions_and_rotations(z: Array) -> tuple[Array, Array]:
     """Return P (K, 3), 0 if it is fixed, and the rotation (K, 3, 3) of poses z (K, d)."""
     x, square = z[:, :4], (z[:, :4] ** 2).sum(axis=-1)[:, None]
     place = np.zeros((len(z), 3))
     if z.shape[1] > 4:
         conjugate = x * [1.0, -1.0, -1.0, -1.0]
-        product = (_right(conjugate) @ z[:, 4:, None])[..., 0]
+        product = (_right_matrix(conjugate) @ z[:, 4:, None])[..., 0]
         place = 2.0 * product[:, 1:] / square
     return place, rotation(x)

@@ -20,7 +20,7 @@ ROUNDING = 1e-10
 
 
 def balance_of_rams(robot: Manipulator) -> str:
-    """Return why a hexapod of rams is singular at every pose, or nothing where its figures are not.
+    """Return why a hexapod of rams is singular at every pose; "" where its figures do not show it.
 
     It is proved up to rounding of the points.
     """
@@ -30,22 +30,23 @@ def balance_of_rams(robot: Manipulator) -> str:
     base, top = figures
     if _vanishes(base, 1):
         return "all guide points lie on one line, about which no ram then has a moment"
-    near, far = (_with_one(figure / np.abs(figure).max()) for figure in (base, top))
+    near, far = (_homogeneous_coordinates(figure / np.abs(figure).max()) for figure in (base, top))
     products = (near[:, :, None] * far[:, None, :]).reshape(len(base), -1)
     if not _vanishes(products, 5):
         return ""
     shares = np.linalg.svd(products)[0][:, -1]
     sizes = np.abs(shares)
     first = int((sizes > (1.0 - 1e-6) * sizes.max()).argmax())  # of equal ones, on any processor
-    told = ", ".join(f"{v:.4g}" for v in shares / shares[first] + 0.0)
+    factors_text = ", ".join(f"{v:.4g}" for v in shares / shares[first] + 0.0)
+    figures_text = _similarity_phrase(base, top) or _conics_phrase(base, top)
     return (
-        f"{_alike(base, top) or _on_conics(base, top)}rams that push with ({told}) times their "
-        "lengths leave the platform in balance at every pose"
+        f"{figures_text}rams that push with ({factors_text}) times their lengths "
+        "leave the platform in balance at every pose"
     )
 
 
 def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
-    """Return guide points and platform points (6, 3) of a hexapod of rams, less their means.
+    """Return centred guide points and platform points (6, 3) of a hexapod of rams, m.
 
     None for any other machine, and where all points of a figure coincide.
     """
@@ -74,40 +75,40 @@ def similarity(robot: Manipulator) -> tuple[float, float] | None:
 
 
 def _similar(base: Array, top: Array) -> tuple[Array, float]:
-    """Return the base's figure turned to the platform's, and the best factor between them."""
-    left, _, right = np.linalg.svd(base.T @ top)
-    turned = base @ left @ right
-    return turned, float((turned * top).sum() / (turned * turned).sum())
+    """Return the base's figure rotated to the platform's, and the least-squares scale factor."""
+    u, _, v = np.linalg.svd(base.T @ top)
+    rotated = base @ u @ v
+    return rotated, float((rotated * top).sum() / (rotated * rotated).sum())
 
 
 def _vanishes(rows: Array, rank: int) -> bool:
-    values = np.linalg.svd(rows, compute_uv=False)
-    return bool(values[rank] <= ROUNDING * values[0])
+    sigmas = np.linalg.svd(rows, compute_uv=False)
+    return bool(sigmas[rank] <= ROUNDING * sigmas[0])
 
 
-def _with_one(figure: Array) -> Array:
+def _homogeneous_coordinates(figure: Array) -> Array:
     return np.hstack([np.ones((len(figure), 1)), figure])
 
 
-def _alike(base: Array, top: Array) -> str:
-    """Say how large the platform's figure is beside the base's, if they are similar."""
+def _similarity_phrase(base: Array, top: Array) -> str:
+    """Return a phrase with the scale factor of similar base and platform figures; else ""."""
     turned, factor = _similar(base, top)
     if np.linalg.norm(top - factor * turned) > ROUNDING * np.linalg.norm(top):
         return ""
-    where = " on a conic" if _on_conics(base) else ""
+    where = " on a conic" if _conics_phrase(base) else ""
     return (
         f"the guide points and the platform points are similar figures{where}, the latter "
         f"{factor:.4g} times the former; "
     )
 
 
-def _on_conics(*figures: Array) -> str:
-    """Say so if each figure lies in a plane, on a conic."""
+def _conics_phrase(*figures: Array) -> str:
+    """Return a phrase if each figure lies on a plane conic; else ""."""
     for figure in figures:
         if not _vanishes(figure, 2):
             return ""
         plane = figure @ np.linalg.svd(figure)[2][:2].T
-        homogeneous = _with_one(plane / np.abs(plane).max())
+        homogeneous = _homogeneous_coordinates(plane / np.abs(plane).max())
         squares = homogeneous[:, :, None] * homogeneous[:, None, :]
         if not _vanishes(squares.reshape(len(plane), -1), 5):
             return ""

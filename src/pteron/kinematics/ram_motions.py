@@ -1,7 +1,7 @@
 """Figures of six rams' ends for which a hexapod's platform can move while all rams are held.
 
-Two kinds are told from the figures alone: line-symmetric motions (Borel and Bricard, 1906) and
-translations. Of others `direct_kinematics` looks for those at the joints that it is asked for.
+Two kinds follow from the figures alone: line-symmetric motions (Borel and Bricard, 1906) and
+translations. `direct_kinematics` detects others at its joint coordinates.
 """
 
 from __future__ import annotations
@@ -23,11 +23,13 @@ def self_motions_of_rams(robot: Manipulator) -> tuple[str, ...]:
     figures = ram_figures(robot)
     if figures is None:
         return ()
-    return tuple(text for text in (_exchanged(*figures), _along_a_line(*figures)) if text)
+    return tuple(
+        text for text in (_half_turn_phrase(*figures), _translation_phrase(*figures)) if text
+    )
 
 
-def _exchanged(base: Array, top: Array) -> str:
-    """Say so if a displacement takes platform points to guide points, those of two legs crosswise.
+def _half_turn_phrase(base: Array, top: Array) -> str:
+    """Return a phrase if a displacement maps platform points to guide points of paired legs.
 
     After it and any half turn the two legs are equally long, so that three lengths leave one of the
     four numbers of a half turn free.
@@ -36,9 +38,9 @@ def _exchanged(base: Array, top: Array) -> str:
         if any(k == i or order[k] != i for i, k in enumerate(order)):
             continue
         crossed = top[list(order)]
-        left, _, right = np.linalg.svd(crossed.T @ base)
-        left[:, 2] *= np.linalg.det(left @ right)
-        if np.linalg.norm(crossed @ left @ right - base) <= ROUNDING * np.linalg.norm(base):
+        u, _, v = np.linalg.svd(crossed.T @ base)
+        u[:, 2] *= np.linalg.det(u @ v)
+        if np.linalg.norm(crossed @ u @ v - base) <= ROUNDING * np.linalg.norm(base):
             pairs = ", ".join(f"{i + 1} and {k + 1}" for i, k in enumerate(order) if i < k)
             return (
                 f"where a half turn takes the platform points of legs {pairs} to each other's "
@@ -47,8 +49,8 @@ def _exchanged(base: Array, top: Array) -> str:
     return ""
 
 
-def _along_a_line(base: Array, top: Array) -> str:
-    """Say so if in some orientation R the vectors of all rams differ along one line, or not at all.
+def _translation_phrase(base: Array, top: Array) -> str:
+    """Return a phrase if in some orientation R all rams' vectors differ along at most one line.
 
     P is then on spheres about that line. For v across it and w = R^T v, base v = top w: the null
     space of (base, -top) holds a plane of such pairs, |v| = |w|.

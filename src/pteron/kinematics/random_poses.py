@@ -8,7 +8,7 @@ from pteron.arguments import expect_to_fit
 from pteron.errors import DataError
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.measure_floors import usual_floors
-from pteron.kinematics.sampling import drawn_poses
+from pteron.kinematics.sampling import draw_poses
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import Poses, Seed
 
@@ -78,4 +78,4 @@ def random_poses(
         expect_regular(robot)
     least = usual_floors(robot, type_i, type_ii, limits)
     rng = np.random.default_rng(seed)
-    return drawn_poses(robot, count, rng, *least, limits=limits)
+    return draw_poses(robot, count, rng, *least, limits=limits)

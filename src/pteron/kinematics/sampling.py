@@ -74,7 +74,7 @@ _SELDOM = 0.1
 """Share of poses at which a passive joint keeps its limits, below which a message names it."""
 
 
-def drawn_poses(
+def draw_poses(
     robot: Manipulator,
     count: int,
     rng: np.random.Generator,
@@ -84,14 +84,14 @@ def drawn_poses(
     limits: bool = True,
 ) -> Array:
     """Return poses (count, m) in reach, as `random_poses` does, also if all are singular."""
-    wanted = _Wanted(type_i, type_ii, limits)
-    sample = _search(robot, count, rng, wanted)
+    conditions = _Conditions(type_i, type_ii, limits)
+    sample = _search(robot, count, rng, conditions)
     if len(sample.poses) < count:
-        raise _too_few(robot, count, sample, wanted)
+        raise _too_few(robot, count, sample, conditions)
     return sample.poses[:count]
 
 
-def sampled_poses(
+def sample_poses(
     robot: Manipulator,
     count: int,
     rng: np.random.Generator,
@@ -100,29 +100,33 @@ def sampled_poses(
     limits: bool = True,
 ) -> Array:
     """Return poses (count, m) in reach like `drawn_poses`, or as many (k, m) as are found."""
-    return _search(robot, count, rng, _Wanted(type_i, 0.0, limits)).poses[:count]
+    return _search(robot, count, rng, _Conditions(type_i, 0.0, limits)).poses[:count]
 
 
-def _search(robot: Manipulator, count: int, rng: np.random.Generator, wanted: _Wanted) -> _Sample:
+def _search(
+    robot: Manipulator, count: int, rng: np.random.Generator, conditions: _Conditions
+) -> _Sample:
     """Return a sample of at least `count` usable poses, or of as many as are found."""
     widest = widest_box(robot)
     every = np.ones(robot.freedom, dtype=bool)
-    if wanted.limits and all(leg.limits for leg in robot.legs):
-        led = _led(robot, *widest, rng, wanted)
-        if len(led) >= _SCOUTS:
-            return _drawn(robot, *_box_about(led, 0.05, every, widest), count, rng, wanted)
+    if conditions.limits and all(leg.limits for leg in robot.legs):
+        solved = _solved_poses(robot, *widest, rng, conditions)
+        if len(solved) >= _SCOUTS:
+            return _draw_in_box(
+                robot, *_box_about(solved, 0.05, every, widest), count, rng, conditions
+            )
     scouts = min(count, _SCOUTS)
-    sample = _drawn(robot, *widest, scouts, rng, wanted)
+    sample = _draw_in_box(robot, *widest, scouts, rng, conditions)
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
     if scouts <= len(sample.poses) < count:
         box = _box_about(sample.poses, 0.25, ~robot.platform.angular, widest)
-        return _drawn(robot, *box, count, rng, wanted)
-    if len(sample.poses) >= count or sample.reached > _RARE * sample.tried:
+        return _draw_in_box(robot, *box, count, rng, conditions)
+    if len(sample.poses) >= count or sample.reachable > _RARE * sample.tried:
         return sample
-    walked = _walked(robot, *widest, max(count, _SCOUTS), rng, wanted)
+    walked = _random_walk(robot, *widest, max(count, _SCOUTS), rng, conditions)
     if len(walked) < max(count, _SCOUTS):
         return sample
-    near = _drawn(robot, *_box_about(walked, 0.25, every, widest), count, rng, wanted)
+    near = _draw_in_box(robot, *_box_about(walked, 0.25, every, widest), count, rng, conditions)
     if len(near.poses) < count:
         near.poses = rng.permutation(walked)
     return near
@@ -138,7 +142,7 @@ def _box_about(
     return low, np.where(free, np.minimum(most + margin, widest[1]), widest[1])
 
 
-class _Wanted(NamedTuple):
+class _Conditions(NamedTuple):
     """Conditions on a pose in reach."""
 
     type_i: float
@@ -147,16 +151,18 @@ class _Wanted(NamedTuple):
     limits: bool
     """Whether limits are kept: those of passive joints, and of actuated ones where it tilts."""
 
-    def reached(self, robot: Manipulator, poses: Array, sample: _Sample | None = None) -> Array:
+    def select_reachable(
+        self, robot: Manipulator, poses: Array, sample: _Sample | None = None
+    ) -> Array:
         """Return those of the poses that are in reach and away from singularities.
 
-        A sample is told how many are in reach, and the greatest measures.
+        The number in reach and the greatest measures are recorded in `sample`.
         """
         _, measures, _, _ = numeric(robot, "reach")(poses)
         within, bent = (measures >= 0.0).all(axis=-1), (measures >= self.type_i).all(axis=-1)
         poses = poses[bent]
         if sample is not None:
-            sample.reached += int(within.sum())
+            sample.reachable += int(within.sum())
             least = measures[within].min(axis=-1).max(initial=0.0)
             sample.type_i = max(sample.type_i, float(least))
         if self.type_ii > 0.0 and len(poses):
@@ -166,7 +172,7 @@ class _Wanted(NamedTuple):
                 sample.type_ii = max(sample.type_ii, float(sizes.max()))
         return poses
 
-    def kept(self, robot: Manipulator, poses: Array) -> Array:
+    def keep_within_limits(self, robot: Manipulator, poses: Array) -> Array:
         """Return those of the poses that keep the limits."""
         if self.limits:
             poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
@@ -179,16 +185,16 @@ class _Wanted(NamedTuple):
 
 @dataclass
 class _Sample:
-    """Usable poses drawn from a box, and what the others lacked."""
+    """Usable poses drawn from a box, and statistics of the rejected ones."""
 
     poses: Array
     """(k, m)."""
     tried: int = 0
     """Poses drawn."""
-    reached: int = 0
+    reachable: int = 0
     """Those in reach of all legs."""
-    apart: int = 0
-    """Those of them with the measures that are wanted."""
+    regular: int = 0
+    """Poses in reach with the required measures."""
     type_i: float = 0.0
     """Greatest type-I measure, the least of all legs, of the poses in reach."""
     type_ii: float = 0.0
@@ -217,15 +223,15 @@ def joint_limits(robot: Manipulator) -> Array:
     return np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
 
 
-def _led(
-    robot: Manipulator, low: Array, high: Array, rng: np.random.Generator, wanted: _Wanted
+def _solved_poses(
+    robot: Manipulator, low: Array, high: Array, rng: np.random.Generator, conditions: _Conditions
 ) -> Array:
-    """Return usable poses that Newton's method leads from a box to random joint coordinates.
+    """Return usable poses, solved by Newton's method for random joint coordinates from a box.
 
-    Short rams and short cranks leave so little of the box that next to no pose of it is in reach.
-    None is led where the platform does not tilt, or a joint has no range (`_joint_ranges`).
+    With short rams or cranks hardly any pose of the box is in reach. Empty where the platform does
+    not tilt, or a joint has no range (`_joint_ranges`).
     """
-    ranges = _joint_ranges(robot, limits=wanted.limits)
+    ranges = _joint_ranges(robot, limits=conditions.limits)
     if ranges is None:
         return np.empty((0, robot.freedom))
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
@@ -233,7 +239,7 @@ def _led(
     for _ in range(_LEADING):
         poses = numeric(robot, "newton_step")(joints, poses)[0]
     poses = poses[((low <= poses) & (poses <= high)).all(axis=-1)]
-    return wanted.kept(robot, wanted.reached(robot, poses))
+    return conditions.keep_within_limits(robot, conditions.select_reachable(robot, poses))
 
 
 def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
@@ -250,13 +256,13 @@ def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
     return None if np.isinf(low).any() else np.array([low, high])
 
 
-def _drawn(
+def _draw_in_box(
     robot: Manipulator,
     low: Array,
     high: Array,
     count: int,
     rng: np.random.Generator,
-    wanted: _Wanted,
+    conditions: _Conditions,
 ) -> _Sample:
     """Return at least `count` usable poses drawn from a box, or as many as are found."""
     usable = [np.empty((0, robot.freedom))]
@@ -266,16 +272,16 @@ def _drawn(
     for k in range(1, attempts + 1):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
         poses = 0.5 * (low + high) + 0.5 * (high - low) * poses
-        poses = wanted.reached(robot, poses, sample)
+        poses = conditions.select_reachable(robot, poses, sample)
         sample.tried += _BATCH
-        sample.apart += len(poses)
+        sample.regular += len(poses)
         if len(sample.seen) < _SEEN:
             sample.seen = np.concatenate([sample.seen, poses])
-        usable.append(wanted.kept(robot, poses))
+        usable.append(conditions.keep_within_limits(robot, poses))
         total += len(usable[-1])
         if k >= _SPARSE and barren < _BARREN and total < count * k / attempts:
             # At this rate the box would not give enough.
-            usable.append(_led(robot, low, high, rng, wanted))
+            usable.append(_solved_poses(robot, low, high, rng, conditions))
             total += len(usable[-1])
             barren = 0 if len(usable[-1]) else barren + 1
         # A quarter of the attempts tells, where many poses are wanted, that they will not be found.
@@ -286,13 +292,13 @@ def _drawn(
     return sample
 
 
-def _walked(
+def _random_walk(
     robot: Manipulator,
     low: Array,
     high: Array,
     count: int,
     rng: np.random.Generator,
-    wanted: _Wanted,
+    conditions: _Conditions,
 ) -> Array:
     """Return at least `count` usable poses (k, m) that a random walk finds, or as many as it does.
 
@@ -315,7 +321,9 @@ def _walked(
             both = np.concatenate([kin, poses])
             kin = both[np.argsort(-_least_margins(robot, both), kind="stable")[:_PARENTS]]
         if spread > _SPREAD:
-            usable.append(wanted.kept(robot, wanted.reached(robot, poses)))
+            usable.append(
+                conditions.keep_within_limits(robot, conditions.select_reachable(robot, poses))
+            )
             if sum(map(len, usable)) >= count:
                 break
         step *= 1.5 if share > _INSIDE[1] else 1.0 if share >= _INSIDE[0] else 0.7
@@ -331,69 +339,75 @@ def _least_margins(robot: Manipulator, poses: Array) -> Array:
     return np.asarray(np.nan_to_num(margins, nan=-np.inf))
 
 
-def _too_few(robot: Manipulator, count: int, sample: _Sample, wanted: _Wanted) -> ModelError:
-    """Return the error for a sample with too few usable poses: it names what they lack."""
+def _too_few(
+    robot: Manipulator, count: int, sample: _Sample, conditions: _Conditions
+) -> ModelError:
+    """Return the error for a sample with too few usable poses, with the condition that fails."""
     total = len(sample.poses)
-    if sample.apart >= count:
+    if sample.regular >= count:
         text = (
-            f"only {total} of {sample.apart} random poses in reach of all legs keep the limits of "
-            f"{'joints' if robot.platform.tilts else 'passive joints'}: "
-            f"{_seldom_kept(robot, sample.seen)}; widen these limits"
+            f"only {total} of {sample.regular} random poses in reach of all legs keep the limits "
+            f"of {'joints' if robot.platform.tilts else 'passive joints'}: "
+            f"{_rarely_kept_limits_phrase(robot, sample.seen)}; widen these limits"
         )
-    elif not (sample.reached or total):
+    elif not (sample.reachable or total):
         text = (
             f"none of {sample.tried} random poses is in reach of all legs: `pteron check` says "
             "whether any pose is"
         )
-    elif sample.reached < count:
+    elif sample.reachable < count:
         text = (
-            f"only {max(sample.reached, total)} of {sample.tried} random poses are in reach of all "
-            f"legs, and {count} are wanted; ask for fewer"
+            f"only {max(sample.reachable, total)} of {sample.tried} random poses are in reach of "
+            f"all legs, and {count} are wanted; ask for fewer"
         )
     else:
-        text = _below_floors(robot, sample, wanted)
+        text = _too_small_measures_phrase(robot, sample, conditions)
     return ModelError(text, subject=robot.name)
 
 
-def _below_floors(robot: Manipulator, sample: _Sample, wanted: _Wanted) -> str:
-    """Return the words for poses in reach of which too few have the measures that are wanted."""
-    head = f"only {sample.apart} of {sample.reached} random poses in reach of all legs have "
-    if sample.type_i < wanted.type_i or wanted.type_ii <= 0.0:
+def _too_small_measures_phrase(robot: Manipulator, sample: _Sample, conditions: _Conditions) -> str:
+    """Return the message for poses in reach of which too few have the required measures."""
+    head = f"only {sample.regular} of {sample.reachable} random poses in reach of all legs have "
+    if sample.type_i < conditions.type_i or conditions.type_ii <= 0.0:
         return (
-            f"{head}type-I measures of at least {wanted.type_i:g}; the greatest that was met, "
+            f"{head}type-I measures of at least {conditions.type_i:g}; the greatest that was met, "
             f"the least of all legs, is {sample.type_i:.3g}: ask for less (type_i)"
         )
     keys = alternatives(jacobian_keys(robot))
-    also = f"type-I measures of at least {wanted.type_i:g} and " if wanted.type_i > 0.0 else ""
+    also = (
+        f"type-I measures of at least {conditions.type_i:g} and " if conditions.type_i > 0.0 else ""
+    )
     return (
-        f"{head}{also}a type-II measure of at least {wanted.type_ii:g}; the greatest that was met "
-        f"is {sample.type_ii:.3g}: ask for less (type_ii), or change what the Jacobian depends on, "
-        f"the legs' {keys}"
+        f"{head}{also}a type-II measure of at least {conditions.type_ii:g}; the greatest that was "
+        f"met is {sample.type_ii:.3g}: ask for less (type_ii), or change what the Jacobian depends "
+        f"on, the legs' {keys}"
     )
 
 
-def _seldom_kept(robot: Manipulator, poses: Array) -> str:
-    """Return which passive joints seldom keep their limits at given poses, and how often."""
-    pose, machine = ca.SX.sym("pose", robot.freedom), Machine.of(robot)
+def _rarely_kept_limits_phrase(robot: Manipulator, poses: Array) -> str:
+    """Return a list, as text, of the passive joints that rarely keep their limits at poses."""
+    pose, machine = ca.SX.sym("pose", robot.freedom), Machine.numeric(robot)
     angles, *legs = passive_joints(machine, pose)
     if robot.platform.tilts:
-        for leg, motion, own in zip(robot.legs, machine.state(pose).legs, legs, strict=True):
+        for leg, motion, leg_joints in zip(robot.legs, machine.state(pose).legs, legs, strict=True):
             if leg.limits is not None:
-                own.append(
+                leg_joints.append(
                     Passive(leg.joint.noun, leg.joint.unit, motion.coordinate, *leg.limits, 1.0)
                 )
-    found = [("", joint) for joint in angles]
-    found += [(f"leg {i}: ", joint) for i, leg in enumerate(legs, start=1) for joint in leg]
-    value = ca.Function("value", [pose], [ca.vertcat(*(joint.value for _, joint in found))])
-    low, high = np.array([(joint.least, joint.most) for _, joint in found]).T
-    values = np.asarray(value(poses.T)).T
-    kept = ((low <= values) & (values <= high)).mean(axis=0)
-    told = [
+    limited = [("", joint) for joint in angles]
+    limited += [(f"leg {i}: ", joint) for i, leg in enumerate(legs, start=1) for joint in leg]
+    coordinate_function = ca.Function(
+        "value", [pose], [ca.vertcat(*(joint.value for _, joint in limited))]
+    )
+    low, high = np.array([(joint.least, joint.most) for _, joint in limited]).T
+    coordinates = np.asarray(coordinate_function(poses.T)).T
+    shares = ((low <= coordinates) & (coordinates <= high)).mean(axis=0)
+    phrases = [
         f"{leg}{joint.noun} at {100.0 * share:.2g} %"
-        for share, (leg, joint) in sorted(zip(kept, found, strict=True), key=itemgetter(0))
-        if share <= max(_SELDOM, kept.min())
+        for share, (leg, joint) in sorted(zip(shares, limited, strict=True), key=itemgetter(0))
+        if share <= max(_SELDOM, shares.min())
     ]
-    return ", ".join(told)
+    return ", ".join(phrases)
 
 
 def search_ball(robot: Manipulator) -> tuple[Array, float]:
@@ -409,9 +423,9 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
             continue
         offset = np.array(leg.fixed_offset)
         line = np.zeros(3) if bound.line is None else np.array(bound.line)
-        across = np.eye(3) - np.outer(line, line)
-        normal += across
-        right += across @ (np.array(bound.point) - offset)
+        projector = np.eye(3) - np.outer(line, line)
+        normal += projector
+        right += projector @ (np.array(bound.point) - offset)
         reach = max(reach, float(np.linalg.norm(leg.platform_point)) + bound.radius)
     directions = robot.platform.directions
     normal, right = directions @ normal @ directions.T, directions @ right
@@ -423,7 +437,7 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
 def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
     """Return the size (...) of the type-II measure of poses (..., m), 0 where it is not finite.
 
-    So a pose out of reach, or where a leg loses its force, passes no floor.
+    A pose out of reach, or where a leg loses its force, thus fails every floor.
     """
     sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
     return np.where(np.isfinite(sizes), sizes, 0.0)

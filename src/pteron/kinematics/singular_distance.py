@@ -1,4 +1,4 @@
-"""How far a machine's coordinates are from ones that make a pose, or every pose, singular.
+"""The distance of a machine's coordinates to those that make a pose, or every pose, singular.
 
 To first order the least singular value of the unit rows (`unit_rows`) changes by u^T dA v, with u
 and v its vectors. The least change, the same for every coordinate of a point and every length, that
@@ -12,7 +12,7 @@ import numpy as np
 
 from pteron.equations.variations import Variation, variations, varied_numbers
 from pteron.kernels import Array, general_program
-from pteron.kinematics.unit_rows import motion_frame, normalised, unit_rows
+from pteron.kinematics.unit_rows import motion_frame, normalise_rows, unit_rows
 from pteron.manipulator import Manipulator
 
 _STEP = 1e-6
@@ -30,12 +30,12 @@ def coordinate_distances(robot: Manipulator, poses: Array) -> Array:
     good = np.isfinite(unit.rows).all(axis=(1, 2))
     if not good.any():
         return distances
-    left, values, right = np.linalg.svd(unit.rows[good])
+    u, sigmas, v = np.linalg.svd(unit.rows[good])
     slopes = _slopes(robot, poses[good])
-    changes = np.einsum("kn,bknm,km->bk", left[:, :, -1], slopes, right[:, -1])
+    changes = np.einsum("kn,bknm,km->bk", u[:, :, -1], slopes, v[:, -1])
     total = np.abs(changes).sum(axis=0)
     with np.errstate(divide="ignore"):
-        distances[good] = values[:, -1] / total
+        distances[good] = sigmas[:, -1] / total
     return distances
 
 
@@ -46,7 +46,7 @@ def _slopes(robot: Manipulator, poses: Array) -> Array:
     step = _STEP * length
     amounts = step * np.concatenate([np.eye(len(changes)), -np.eye(len(changes))])
     rows = _rows_of(robot, changes, amounts, poses)
-    rows = np.stack([normalised(of_one, arm, length)[0] for of_one in rows])
+    rows = np.stack([normalise_rows(machine_rows, arm, length)[0] for machine_rows in rows])
     ahead, behind = np.split(np.nan_to_num(rows) @ motion, 2)
     return np.asarray((ahead - behind) / (2.0 * step))
 

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, bare, numeric
-from pteron.kernels.bisection import bisected
-from pteron.kernels.kept import kept_result
+from pteron.kernels.bisection import bisect_condition
+from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
-from pteron.kinematics.sampling import drawn_poses, type_ii_sizes
+from pteron.kinematics.sampling import draw_poses, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -54,7 +54,7 @@ def best_type_ii(robot: Manipulator) -> float:
     Limits do not count: it is a measure of the geometry, which another limit leaves as it is.
     """
     key = "best_type_ii", bare(robot)
-    return kept_result(key, ("kinematics",), lambda: _best_type_ii(robot))
+    return cached_result(key, ("kinematics",), lambda: _best_type_ii(robot))
 
 
 def _best_type_ii(robot: Manipulator) -> float:
@@ -64,7 +64,7 @@ def _best_type_ii(robot: Manipulator) -> float:
 
     if is_singular_everywhere(robot):
         return 1.0  # no share of rounding
-    drawn = drawn_poses(robot, _DRAWN, np.random.default_rng(0), limits=False)
+    drawn = draw_poses(robot, _DRAWN, np.random.default_rng(0), limits=False)
     sizes = measure(drawn)
     improved = [
         -scipy.optimize.minimize(
@@ -114,37 +114,39 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
     """
     robot = as_manipulator(robot)
     expect_regular(robot)
-    given = None
+    position_array = None
     if position is not None:
         names = robot.platform.lengths
-        given = as_array(position, "position", (len(names),), columns=names)
-        if given.ndim > 1 or not np.isfinite(given).all():
-            raise DataError(f"position: {given.tolist()} given, one row of finite numbers expected")
+        position_array = as_array(position, "position", (len(names),), columns=names)
+        if position_array.ndim > 1 or not np.isfinite(position_array).all():
+            raise DataError(
+                f"position: {position_array.tolist()} given, one row of finite numbers expected"
+            )
     orientation = closure_of(robot).orientation
     if orientation is not None:
-        a, b = (float(value) for value in orientation)
-        one = np.arctan2(b, a) + np.pi / 2
-        return np.sort(_wrapped(np.array([one, one - np.pi])))
-    if given is None or not robot.platform.angles or robot.platform.tilts:
+        a, b = (float(coefficient) for coefficient in orientation)
+        angle = np.arctan2(b, a) + np.pi / 2
+        return np.sort(_wrap_angles(np.array([angle, angle - np.pi])))
+    if position_array is None or not robot.platform.angles or robot.platform.tilts:
         return np.empty(0)
-    return _sign_changes(robot, given)
+    return _sign_changes(robot, position_array)
 
 
 def _sign_changes(robot: Manipulator, position: Array) -> Array:
     """Return the angles at which the type-II measure at a position changes its sign, in reach."""
 
     def measure(angles: Array) -> Array:
-        at = np.broadcast_to(position, (*angles.shape, len(position)))
-        poses = np.concatenate([at, angles[:, None]], axis=-1)
+        positions = np.broadcast_to(position, (*angles.shape, len(position)))
+        poses = np.concatenate([positions, angles[:, None]], axis=-1)
         return np.asarray(numeric(robot, "type_ii")(poses)[0])
 
     # Round angles, where many machines are singular, lie between the samples. The last is the first
     # again, but for a platform that slides.
     count = _ANGLES if robot.platform.slides else _ANGLES + 1
     angles = np.pi * ((2.0 * np.arange(count) + 1.0) / _ANGLES - 1.0)
-    values = measure(angles)
-    negative, known = values < 0.0, ~np.isnan(values)
-    if known.any() and (np.abs(values[known]) <= _VANISHING).all():
+    measures = measure(angles)
+    negative, known = measures < 0.0, ~np.isnan(measures)
+    if known.any() and (np.abs(measures[known]) <= _VANISHING).all():
         raise SingularPose(
             f"{robot.name}: singular in every orientation (type II) that is in reach at position "
             f"{position.tolist()}; choose another position",
@@ -154,11 +156,11 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
         )
     first = np.flatnonzero((negative[1:] != negative[:-1]) & known[1:] & known[:-1])
     low, high, side = angles[first], angles[first + 1], negative[first]
-    low, _ = bisected(lambda angle: (measure(angle) < 0.0) == side, low, high, _HALVINGS)
-    found = np.abs(measure(low)) <= _ZERO  # else a gap in the reach lies between two samples
-    return np.sort(_wrapped(low[found]))
+    low, _ = bisect_condition(lambda angle: (measure(angle) < 0.0) == side, low, high, _HALVINGS)
+    is_zero = np.abs(measure(low)) <= _ZERO  # else a gap in the reach lies between two samples
+    return np.sort(_wrap_angles(low[is_zero]))
 
 
-def _wrapped(angles: Array) -> Array:
+def _wrap_angles(angles: Array) -> Array:
     """Return angles in (-pi, pi]."""
     return np.asarray(np.pi - (np.pi - angles) % (2.0 * np.pi))

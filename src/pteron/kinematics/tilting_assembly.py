@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pteron.equations.pose_paths import Closed
 from pteron.kernels import Array
 from pteron.kernels.path_programs import spheres_kernel
-from pteron.kinematics.pose_paths import generic, placed, real_poses
+from pteron.kinematics.pose_paths import generic, positions_and_rotations, real_poses
 from pteron.manipulator import Manipulator
 from pteron.platforms.nearest_pose import nearest_pose
 
@@ -26,11 +26,11 @@ _ANOTHER = 1e-6
 def tilting_poses(
     robot: Manipulator, joints: Array
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.bool_]]:
-    """Return which row of joint coordinates (B, n) each pose is of, in order, and the poses (K, m).
+    """Return the row of joint coordinates (B, n) of each pose, ascending, and the poses (K, m).
 
-    With them comes whether the platform can move while a row's joints are held (B,); none of its
-    poses is then listed. Those of a tripod with the yaw on the other side of the one that it has
-    are left out.
+    The third result is whether the platform can move while a row's joints are held (B,), a
+    self-motion, of which no poses are listed. Poses of a tripod on the other side of its yaw are
+    excluded.
     """
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(
@@ -68,14 +68,14 @@ def tilting_poses(
     machines[:, in_metres, 6] /= size[:, None] ** 2
     machines[:, closed.spheres :, 6] /= size[:, None]
     which, z, move = real_poses(closed, machines)
-    place, turned = placed(z)
+    place, turned = positions_and_rotations(z)
     place = size[which, None] * place + base[which] - turned @ top
     rotation = turned @ frame.T
     poses = nearest_pose(platform, place, rotation)
-    found, axes = platform.at(poses)
-    away = np.abs(found - place).max(axis=-1) / size[which]
-    away += np.abs(np.swapaxes(axes, -1, -2) - rotation).max(axis=(-2, -1))
-    own_side = away < _ANOTHER
+    positions, axes = platform.at(poses)
+    distance = np.abs(positions - place).max(axis=-1) / size[which]
+    distance += np.abs(np.swapaxes(axes, -1, -2) - rotation).max(axis=(-2, -1))
+    own_side = distance < _ANOTHER
     moving = np.zeros(len(joints), dtype=bool)
     moving[good] = move
     return good[which[own_side]], poses[own_side], moving

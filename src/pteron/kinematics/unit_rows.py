@@ -1,9 +1,9 @@
-"""The legs' rows in one unit: how well drives hold the platform, whatever the machine's best.
+"""The legs' rows in one unit: an absolute measure of how well the drives hold the platform.
 
-Row i is the wrench of a unit force (N) that leg i puts on the platform, with its moment about the
-middle of the platform points over a length L, m. Its least singular value is the least total of
-leg forces (root sum of squares) that any load of unit size leaves: its inverse is how many times
-greater leg forces are than the load, and errors of the platform than errors along the legs.
+Row i is the wrench of a unit force (N) of leg i on the platform, with its moment about the middle
+of the platform points over a length L, m. The inverse of the least singular value is the largest
+ratio of leg forces (root sum of squares) to the load, and of errors of the platform to errors along
+the legs.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def unit_rows(robot: Manipulator, poses: Array) -> UnitRows:
     """Return the unit rows of the legs at poses (K, m)."""
     twists: Array = numeric(robot, "twist_jacobian")(poses)[0]
     motion, arm, length = motion_frame(robot, poses)
-    rows, sizes = normalised(twists, arm, length)
+    rows, sizes = normalise_rows(twists, arm, length)
     return UnitRows(rows @ motion, sizes, motion, length)
 
 
@@ -54,18 +54,20 @@ def motion_frame(robot: Manipulator, poses: Array) -> tuple[Array, Array, float]
     twists = [
         numeric(robot, "twist")(poses, np.broadcast_to(step, poses.shape))[0] for step in steps
     ]
-    moved = np.stack(twists, axis=-1)
-    moved = np.nan_to_num(moved)
-    moved[:, :3] += np.cross(moved[:, 3:], arm[:, :, None], axis=1)
-    moved[:, 3:] *= length
+    twist_columns = np.stack(twists, axis=-1)
+    twist_columns = np.nan_to_num(twist_columns)
+    twist_columns[:, :3] += np.cross(twist_columns[:, 3:], arm[:, :, None], axis=1)
+    twist_columns[:, 3:] *= length
     # A step of an angle counts as one of its own length, so that none is lost to rounding.
-    moved /= np.maximum(np.linalg.norm(moved, axis=1, keepdims=True), np.finfo(float).tiny)
-    directions = np.linalg.svd(moved, full_matrices=False)[0]
+    twist_columns /= np.maximum(
+        np.linalg.norm(twist_columns, axis=1, keepdims=True), np.finfo(float).tiny
+    )
+    directions = np.linalg.svd(twist_columns, full_matrices=False)[0]
     return directions, arm, length
 
 
-def normalised(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:
-    """Return rows (K, n, 6) of unit forces against (v, L omega), and what they were divided by.
+def normalise_rows(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:
+    """Return rows (K, n, 6) of unit forces in (v, L omega), and their divisors (K, n).
 
     A leg that turns the platform alone has a unit couple, force times L.
     """
@@ -79,7 +81,7 @@ def normalised(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:
 def least_singular_values(robot: Manipulator, poses: Array) -> Array:
     """Return the least singular value (K,) of the unit rows at poses; NaN out of reach."""
     rows = unit_rows(robot, poses).rows
-    values = np.full(len(rows), np.nan)
+    least = np.full(len(rows), np.nan)
     good = np.isfinite(rows).all(axis=(1, 2))
-    values[good] = np.linalg.svd(rows[good], compute_uv=False)[:, -1]
-    return values
+    least[good] = np.linalg.svd(rows[good], compute_uv=False)[:, -1]
+    return least

@@ -1,4 +1,4 @@
-"""Tests for values that are possible but likely in another unit, millimetres or degrees."""
+"""Tests for valid coordinates that are probably in another unit, millimetres or degrees."""
 
 from __future__ import annotations
 
@@ -23,36 +23,40 @@ def unlikely_length(robot: Manipulator) -> float:
     )
 
 
-def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -> tuple[str, ...]:
-    """Return a line on each value of poses or joint coordinates that is likely in another unit.
+def unlikely_values(
+    robot: Manipulator, columns: Sequence[str], coordinates: Array
+) -> tuple[str, ...]:
+    """Return a warning for each column of poses or joints that is probably in another unit.
 
-    Values (..., C), m and rad, are those of the columns, such as ``x``, ``phi`` or ``rho1``;
-    columns of other names are not looked at.
+    `coordinates` (..., C), m and rad, are those of the columns, such as ``x``, ``phi`` or ``rho1``;
+    columns of other names are ignored.
     """
     length, limits = unlikely_length(robot), robot.platform.angle_limits
     # Angles of a platform that tilts repeat beyond half a turn.
     least = np.pi if robot.platform.tilts else 2.0 * np.pi
     turns = {name: _turn(limits.get(name), least) for name in robot.platform.angles}
-    far, angles = dict.fromkeys(COORDINATES, length) | turns, set(turns)
+    thresholds, angles = dict.fromkeys(COORDINATES, length) | turns, set(turns)
     for name, leg in zip(robot.joint_names, robot.legs, strict=True):
-        far[name] = length
+        thresholds[name] = length
         if leg.joint.unit == "rad":
             least = 2.0 * np.pi if leg.limits else _WOUND
-            far[name] = max((_turn(leg.limits, least), *turns.values()))
+            thresholds[name] = max((_turn(leg.limits, least), *turns.values()))
             angles.add(name)
-    found = []
+    lines = []
     for turning, question in (
         (False, "are these mm? m are expected"),
         (True, "are these degrees? rad are expected"),
     ):
         chosen = [
-            k for k, name in enumerate(columns) if name in far and turning is (name in angles)
+            k
+            for k, name in enumerate(columns)
+            if name in thresholds and turning is (name in angles)
         ]
-        sizes = np.nan_to_num(np.abs(values[..., chosen]), nan=0.0, posinf=0.0)
-        if (sizes > [far[columns[k]] for k in chosen]).any():
+        sizes = np.nan_to_num(np.abs(coordinates[..., chosen]), nan=0.0, posinf=0.0)
+        if (sizes > [thresholds[columns[k]] for k in chosen]).any():
             names = ", ".join(columns[k] for k in chosen)
-            found.append(f"{names} up to {float(sizes.max()):g}: {question}")
-    return tuple(found)
+            lines.append(f"{names} up to {float(sizes.max()):g}: {question}")
+    return tuple(lines)
 
 
 def _turn(limits: tuple[float, float] | None, least: float) -> float:
@@ -61,8 +65,8 @@ def _turn(limits: tuple[float, float] | None, least: float) -> float:
 
 
 def warn_of_unlikely(
-    robot: Manipulator, columns: Sequence[str], values: Array, source: str = ""
+    robot: Manipulator, columns: Sequence[str], coordinates: Array, source: str = ""
 ) -> None:
-    """Issue a warning, `UnlikelyValue`, of what is likely in another unit."""
-    for text in unlikely_values(robot, columns, values):
+    """Warn, with `UnlikelyValue`, about coordinates that are probably in another unit."""
+    for text in unlikely_values(robot, columns, coordinates):
         warn_unlikely(f"{source}{text}")

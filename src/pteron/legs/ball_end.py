@@ -8,12 +8,12 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression, HeldPlane, RotationMotion
 from pteron.bodies.vectors import Vector
-from pteron.legs.cones import Cone, within_cone
+from pteron.legs.cones import Cone, cone_limit
 from pteron.legs.leg import Joint, LegMotion, Passive
 
 
 def every_axis() -> tuple[Vector, ...]:
-    """Return the axes about which a ball joint lets the platform turn."""
+    """Return three axes that span the rotations of a ball joint."""
     return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -33,7 +33,7 @@ def ball_cone(
     """
     link = motion.links[1]
     assert link is not None
-    return within_cone("link at the platform", cone, socket, -link, length)
+    return cone_limit("link at the platform", cone, socket, -link, length)
 
 
 def ball_joint(

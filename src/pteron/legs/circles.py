@@ -18,7 +18,7 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector, cross
 
 _ROUNDING = 1e-15
-"""Difference of an axis' component from 0, 1 or -1 that counts as rounding."""
+"""Tolerance of an axis' component that is 0, 1 or -1: rounding."""
 
 
 def edges_of_reach(lu: Expression, ll: Expression, n2: Expression) -> tuple[Expression, Expression]:
@@ -65,7 +65,7 @@ def first_moment(
 
 
 def pole(direction: Sequence[float]) -> tuple[int, int]:
-    """Return the largest component of a unit vector and its sign, which `plane_axis` asks for."""
+    """Return the index of a unit vector's largest component and its sign, for `plane_axis`."""
     i = max(range(3), key=lambda j: abs(direction[j]))
     return i, 1 if direction[i] > 0 else -1
 
@@ -87,10 +87,10 @@ def plane_of(d: Expression, a: Expression) -> Expression:
     plane = ca.horzcat(a, ca.cross(d, a))
     if not plane.is_constant():
         return plane
-    # What is 0, 1 or -1 but for rounding is taken for it: products with it cost nothing.
-    values = np.array(ca.evalf(plane))
-    whole = np.round(values)
-    return ca.SX(ca.DM(np.where(np.abs(values - whole) < _ROUNDING, whole, values)))
+    # Entries equal to 0, 1 or -1 up to rounding are rounded: products with these cost nothing.
+    entries = np.array(ca.evalf(plane))
+    rounded = np.round(entries)
+    return ca.SX(ca.DM(np.where(np.abs(entries - rounded) < _ROUNDING, rounded, entries)))
 
 
 @lru_cache(maxsize=256)

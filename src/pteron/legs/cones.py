@@ -38,31 +38,31 @@ class Cone:
             )
 
 
-def between(a: Expression, b: Expression) -> Expression:
+def angle_between(a: Expression, b: Expression) -> Expression:
     """Return the angle between two vectors, 0 to pi."""
     return ca.atan2(ca.norm_2(ca.cross(a, b)), ca.dot(a, b))
 
 
-def within_cone(
+def cone_limit(
     noun: str, cone: Cone | None, socket: Expression, rod: Expression, length: float
 ) -> list[Passive]:
-    """Return the angle of a rod, seen from its joint, against a cone; none without a cone.
+    """Return the limit on the angle of a rod, seen from its joint, to a cone's axis; if any.
 
     The columns of `socket` (3, 3) are the axes of the body that carries the socket.
     """
     if cone is None:
         return []
-    angle = between(ca.mtimes(socket, ca.SX(list(cone.axis))), rod)
-    # Nothing is too near to the axis: a limit below zero is never met.
+    angle = angle_between(ca.mtimes(socket, ca.SX(list(cone.axis))), rod)
+    # The angle has no lower limit: one below zero is never reached.
     return [Passive(noun, "rad", angle, -cone.angle, cone.angle, length, True)]
 
 
-def within(
+def joint_limit(
     noun: str,
     unit: str,
     value: Expression,
     limits: tuple[float, float] | None,
     lever: float,
 ) -> list[Passive]:
-    """Return a value against its limits; none without limits."""
+    """Return a passive joint with its limits; an empty list without limits."""
     return [] if limits is None else [Passive(noun, unit, value, *limits, lever)]

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import casadi as ca
 import numpy as np
 
-from pteron.bodies.agreement import TIME, differing, rate_of
+from pteron.bodies.agreement import TIME, mismatched_names, rate_of
 from pteron.bodies.motion import (
     Expression,
     PointMotion,
@@ -29,16 +29,18 @@ from pteron.legs.leg import Circle, LegEquations, LegMotion, Plane, Sphere
 from pteron.legs.protocol import breaches, point_in_reach
 
 
-class _Moved:
+class _LegInMotion:
     """A leg whose platform point and rotation move at random in t, with random inertia."""
 
     def __init__(self, leg: LegKind, axes: Sequence[Vector], seed: int) -> None:
         rng = np.random.default_rng(seed)
         c, normal = point_in_reach(leg, seed), leg.plane_normal
         assert c is not None  # `breaches` has found one
-        across = np.eye(3) - (0.0 if normal is None else np.outer(normal, normal))
+        projector = np.eye(3) - (0.0 if normal is None else np.outer(normal, normal))
         size = leg.size or 1.0
-        dc, ddc, self.gravity = (ca.SX(ca.DM(size * across @ rng.normal(size=3))) for _ in range(3))
+        dc, ddc, self.gravity = (
+            ca.SX(ca.DM(size * projector @ rng.normal(size=3))) for _ in range(3)
+        )
         self.leg = leg
         t = TIME
         self.point = PointMotion(ca.SX(ca.DM(c)) + dc * t + ddc * t**2 / 2, dc + ddc * t, ddc)
@@ -54,23 +56,23 @@ class _Moved:
         self.equations: LegEquations = leg.equations()
         self.motion: LegMotion = self.equations.motion(self.point, self.rotation)
         kinds = self.equations.kinds
-        values = {b: ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kinds[b])))) for b in kinds}
-        self.inertia = {b: moments_of(kinds[b], ca.vertsplit(v)) for b, v in values.items()}
+        parameters = {b: ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kinds[b])))) for b in kinds}
+        self.inertia = {b: moments_of(kinds[b], ca.vertsplit(v)) for b, v in parameters.items()}
 
 
 def faults(
     leg: LegKind, axis: Vector | None = None, seed: int = 0, *, tilts: bool = False
 ) -> tuple[str, ...]:
-    """Return where a leg breaks the protocol, a line each; none where it keeps it.
+    """Return the breaches of the protocol by a leg, one line each; () where it conforms.
 
     Parameters
     ----------
     leg : LegKind
         A leg of the kind, in numbers.
     axis : unit vector, optional
-        That of a platform that turns against the leg; None for one that does not.
+        Axis of a platform that turns against the leg; None for one that does not.
     seed : int
-        Where the motion that is tried comes from.
+        Seed of the random motion.
     tilts : bool
         Whether the platform turns about any axis.
 
@@ -82,13 +84,13 @@ def faults(
     ()
     """
     axes: Sequence[Vector] = every_axis() if tilts else [axis] if axis is not None else []
-    if found := breaches(leg, axes):
-        return found
-    at = _Moved(leg, axes, seed)
-    return (*_joints(at), *_bodies(at), *_forces(at), *_locus(at))
+    if protocol_breaches := breaches(leg, axes):
+        return protocol_breaches
+    at = _LegInMotion(leg, axes, seed)
+    return (*_joint_faults(at), *_body_faults(at), *_force_faults(at), *_locus_faults(at))
 
 
-def _joints(at: _Moved) -> Iterator[str]:
+def _joint_faults(at: _LegInMotion) -> Iterator[str]:
     motion = at.motion
     row = motion.row / motion.divisor
     pairs = {
@@ -101,26 +103,29 @@ def _joints(at: _Moved) -> Iterator[str]:
     }
     twist = ca.SX(6, 1)
     for k, joint in enumerate(motion.chain, start=1):
-        of = f"joint {k} of the chain: "
-        pairs[f"{of}row times (c', omega) is not rate"] = ca.mtimes(joint.row, at.twist), joint.rate
-        pairs[f"{of}acceleration is not the derivative of rate"] = (
+        prefix = f"joint {k} of the chain: "
+        pairs[f"{prefix}row times (c', omega) is not rate"] = (
+            ca.mtimes(joint.row, at.twist),
+            joint.rate,
+        )
+        pairs[f"{prefix}acceleration is not the derivative of rate"] = (
             joint.acceleration,
             rate_of(joint.rate),
         )
         twist += joint.rate * _screw(joint.kind, joint.axis, joint.point, at.point.position)
     carried = "chain: the joints' screws times their rates do not add up to (c', omega)"
     pairs[carried] = twist, at.twist
-    yield from differing(pairs)
+    yield from mismatched_names(pairs)
 
 
 def _screw(kind: str, axis: Expression, point: Expression, c: Expression) -> Expression:
-    """Return the velocity of what is at c, and the angular velocity, per unit of a joint's rate."""
+    """Return the velocity at c and the angular velocity (6, 1), per unit of a joint's rate."""
     if kind == "P":
         return ca.vertcat(axis, ca.SX(3, 1))
     return ca.vertcat(ca.cross(axis, c - point), axis)
 
 
-def _bodies(at: _Moved) -> Iterator[str]:
+def _body_faults(at: _LegInMotion) -> Iterator[str]:
     for letter, body in at.motion.bodies.items():
         velocity = ca.mtimes(body.velocity_row, at.twist)
         turning = ca.mtimes(body.turning_row, at.twist)
@@ -139,26 +144,26 @@ def _bodies(at: _Moved) -> Iterator[str]:
                     ca.cross(turning, axis),
                 )
                 pairs[f"dd{name}: not the second derivative of {name}"] = second, rate_of(first)
-        yield from (f'body "{letter}": {fault}' for fault in differing(pairs))
+        yield from (f'body "{letter}": {fault}' for fault in mismatched_names(pairs))
 
 
-def _forces(at: _Moved) -> Iterator[str]:
-    given = at.point, at.rotation, at.gravity, at.inertia
-    needs, plain = at.equations.needs(*given), at.equations.needs_of_bodies(*given)
-    whole = needs.point + at.equations.riding(at.point, at.gravity, needs.mass).point
-    joint = needs.joint + at.equations.riding(at.point, at.gravity, needs.mass).joint
+def _force_faults(at: _LegInMotion) -> Iterator[str]:
+    state = at.point, at.rotation, at.gravity, at.inertia
+    needs, body_needs = at.equations.needs(*state), at.equations.needs_of_bodies(*state)
+    point_needs = needs.point + at.equations.riding(at.point, at.gravity, needs.mass).point
+    joint_needs = needs.joint + at.equations.riding(at.point, at.gravity, needs.mass).joint
     row = at.motion.row / at.motion.divisor
     energy = ca.SX(0)
     for letter, body in at.motion.bodies.items():
         moments = at.inertia[letter]
         energy += 0.5 * ca.bilin(mass_matrix(body, moments), at.twist, at.twist)
         energy -= ca.dot(at.gravity, mass_moment(body, moments))
-    power = ca.dot(plain.point, at.twist)
-    yield from differing(
+    power = ca.dot(body_needs.point, at.twist)
+    yield from mismatched_names(
         {
             "needs: not what its bodies need, body by body": (
-                whole + ca.mtimes(row.T, joint),
-                plain.point,
+                point_needs + ca.mtimes(row.T, joint_needs),
+                body_needs.point,
             ),
             "bodies: the power of what they need is not the rate of their energy": (
                 power,
@@ -168,7 +173,7 @@ def _forces(at: _Moved) -> Iterator[str]:
     )
 
 
-def _locus(at: _Moved) -> Iterator[str]:
+def _locus_faults(at: _LegInMotion) -> Iterator[str]:
     locus, c = at.equations.locus(at.motion.coordinate), at.point.position
     if isinstance(locus, Plane):
         pair = ca.dot(locus.normal, c), locus.offset
@@ -179,4 +184,4 @@ def _locus(at: _Moved) -> Iterator[str]:
         pair = ca.norm_2(ca.cross(normal, c - locus.center)), locus.radius
     else:
         pair = at.rotation.angle, locus.angle
-    yield from differing({"locus: c is not on it at the joint's coordinate": pair})
+    yield from mismatched_names({"locus: c is not on it at the joint's coordinate": pair})

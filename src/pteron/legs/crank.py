@@ -24,11 +24,11 @@ from pteron.bodies.motion import (
     RotationMotion,
     point_rows,
 )
-from pteron.bodies.vectors import Vector, cross, moved, scaled, vertical
+from pteron.bodies.vectors import Vector, cross, scale_vector, shift_point, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
 from pteron.legs.drive import Drive
 from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, force_wrench
 from pteron.legs.reading import Reading
 
 ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
@@ -45,7 +45,7 @@ and the lengths that multiply it (`Transfer.entries`)."""
 
 @dataclass(frozen=True)
 class CrankLeg(LegKind):
-    """The data of a leg with a crank; its kinds say what the last link is."""
+    """The data of a leg with a crank; its subclasses define the last link."""
 
     guide_point: Vector
     direction: Vector
@@ -75,7 +75,7 @@ class CrankLeg(LegKind):
             Quantity(
                 "zero_direction",
                 "normal",
-                self.zero_direction if inside else self._pointing(middle),
+                self.zero_direction if inside else self._direction_at(middle),
             ),
             Quantity("plane_axis", "normal", perpendicular_to(self.direction)),
             Quantity("upper_length", "length", (self.upper_length,), "lu"),
@@ -93,12 +93,14 @@ class CrankLeg(LegKind):
         return self.zero_direction
 
     def zero_at(self, zero: float) -> dict[str, Any]:
-        return {"zero_direction": self._pointing(zero)}
+        return {"zero_direction": self._direction_at(zero)}
 
-    def _pointing(self, angle: float) -> Vector:
-        """Return where the crank points at an angle."""
-        across = cross(self.direction, self.zero_direction)
-        return moved(scaled(self.zero_direction, math.cos(angle)), across, math.sin(angle))
+    def _direction_at(self, angle: float) -> Vector:
+        """Return the crank's direction at an angle, a unit vector in the base frame."""
+        normal_direction = cross(self.direction, self.zero_direction)
+        return shift_point(
+            scale_vector(self.zero_direction, math.cos(angle)), normal_direction, math.sin(angle)
+        )
 
     @property
     def lever(self) -> float:
@@ -118,14 +120,14 @@ class CrankLeg(LegKind):
 
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
         last = self.names["l"]
-        found = [
+        transfer_list = [
             Transfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),
             Transfer(f"crank and {last}{{}} carry the joint between them", ELBOW),
         ]
         if vertical(self.direction, gravity):
             reason = "no gravity acts across the axis of the crank{}"
-            found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
-        return tuple(found)
+            transfer_list += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+        return tuple(transfer_list)
 
 
 class CrankState(NamedTuple):
@@ -165,12 +167,12 @@ class CrankEquations(LegEquations):
         self.middle = middle
 
     @abstractmethod
-    def counted(self, v: Expression) -> Expression:
-        """Return the components of a vector (3, 1) that the last link's length is measured in."""
+    def to_link_space(self, v: Expression) -> Expression:
+        """Return a vector (3, K) in the link's space: itself, or (2, K) in the crank's plane."""
 
     @abstractmethod
-    def within(self, v: Expression) -> Expression:
-        """Return a vector of the crank's plane (2, K) in the components of `counted`."""
+    def plane_to_link_space(self, v: Expression) -> Expression:
+        """Return a vector of the crank's plane (2, K) in the last link's space."""
 
     @abstractmethod
     def height(self, w: Expression) -> Expression:
@@ -184,29 +186,29 @@ class CrankEquations(LegEquations):
         at: CrankState,
         crank: Joint,
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
-        """Return the last link in motion, the joints after the crank, and how the link turns."""
+        """Return the last link's motion, the joints after the crank, the link's rate and growth."""
 
     def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
         """Return u, h and lu^2 u.u - h^2, a quarter of the Delta of two circles, for w = c - r.
 
         The length of the last link is |w - l_u| = ll, so that u . l_u = h, u being in the plane.
         """
-        u, seen = ca.mtimes(self.plane.T, w), self.counted(w)
-        h = 0.5 * ca.dot(seen, seen) + 0.5 * (self.lu * self.lu - self.ll * self.ll)
+        u, link_space_w = ca.mtimes(self.plane.T, w), self.to_link_space(w)
+        h = 0.5 * ca.dot(link_space_w, link_space_w) + 0.5 * (self.lu * self.lu - self.ll * self.ll)
         return u, h, self.lu * self.lu * ca.dot(u, u) - h * h
 
     def state(self, point: PointMotion) -> CrankState:
-        """Return crank and last link and how the crank moves.
+        """Return crank, last link, and the crank's rate and acceleration.
 
         b . c' = (b . g) q'. Differentiated, (b . g) q'' = b . c'' + b' . b' - q'^2 b . g', whose
         last two terms are c' . c' + q' (q' h - 2 g . c').
         """
         w = point.position - self.r
-        dw, ddw = self.counted(point.velocity), self.counted(point.acceleration)
+        dw, ddw = self.to_link_space(point.velocity), self.to_link_space(point.acceleration)
         u, h, quarter = self._triangle(w)
         n2, root = ca.dot(u, u), ca.sqrt(quarter)
         l_u = (h / n2) * u + self.sigma * ((root / n2) * quarter_turn(u))
-        g, b = quarter_turn(l_u), self.counted(w) - self.within(l_u)
+        g, b = quarter_turn(l_u), self.to_link_space(w) - self.plane_to_link_space(l_u)
         divisor = -self.sigma * root  # b . g
         rate = ca.dot(b, dw) / divisor
         du = ca.mtimes(self.plane.T, point.velocity)
@@ -214,13 +216,13 @@ class CrankEquations(LegEquations):
         acceleration = (pull + rate * (rate * h - 2 * ca.dot(g, du))) / divisor
         return CrankState(l_u, g, b, divisor, rate, acceleration)
 
-    def in_space(self, v: Expression) -> Expression:
-        """Return a vector that `counted` or `within` gave, in the base frame."""
+    def to_base_frame(self, v: Expression) -> Expression:
+        """Return a vector of the last link's space in the base frame (3, K)."""
         return v if v.shape[0] == 3 else ca.mtimes(self.plane, v)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self.state(point)
-        l_u, g, b = (self.in_space(v) for v in (at.l_u, at.g, at.b))
+        l_u, g, b = (self.to_base_frame(v) for v in (at.l_u, at.g, at.b))
         full, square = point_rows(b.T), at.rate * at.rate
         coordinate = self.middle + ca.atan2(
             ca.dot(at.l_u, quarter_turn(self.zero)), ca.dot(at.l_u, self.zero)
@@ -228,8 +230,8 @@ class CrankEquations(LegEquations):
         row = full / at.divisor
         x, y = l_u / self.lu, g / self.lu
         ddx, ddy = at.acceleration * y - square * x, -at.acceleration * x - square * y
-        rest = ca.SX(3, 1)
-        crank = BodyMotion(self.r, ca.SX(3, 6), rest, self.d, row, x, y, ddx, ddy)
+        zero = ca.SX(3, 1)
+        crank = BodyMotion(self.r, ca.SX(3, 6), zero, self.d, row, x, y, ddx, ddy)
         joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration, "u", driven=True)
         last, joints, turning = self.last_link(point, rotation, at, joint)
         return LegMotion(
@@ -274,10 +276,10 @@ class CrankEquations(LegEquations):
     def within_limits(
         self, c: Expression, q: Expression, low: float, high: float
     ) -> dict[str, Expression]:
-        """Return on which side of the crank's directions at its limits it points, times n^2.
+        """Return the sines of the crank's angles to its limits, times lu n^2: not negative within.
 
-        Without an angle, which jumps at half a turn. Limits more than that apart are one condition:
-        that the crank is not farther from their middle than they are.
+        They avoid the angle, which jumps at half a turn. Limits more than that apart are one
+        condition: that the crank is no farther from their middle than they are.
         """
         w = c - self.r
         u, h, quarter = self._triangle(w)
@@ -286,16 +288,16 @@ class CrankEquations(LegEquations):
         if high - low >= 2.0 * math.pi:
             return {}
         if high - low > math.pi:
-            along = ca.dot(crank, self._ahead(0.5 * (low + high)))
+            projection = ca.dot(crank, self._plane_direction_at(0.5 * (low + high)))
             least = self.lu * math.cos(0.5 * (high - low))
-            return {"limits": along - least * ca.dot(u, u)}
+            return {"limits": projection - least * ca.dot(u, u)}
         return {
-            "least": ca.dot(crank, quarter_turn(self._ahead(low))),
-            "most": -ca.dot(crank, quarter_turn(self._ahead(high))),
+            "least": ca.dot(crank, quarter_turn(self._plane_direction_at(low))),
+            "most": -ca.dot(crank, quarter_turn(self._plane_direction_at(high))),
         }
 
-    def _ahead(self, q: Expression) -> Expression:
-        """Return where the crank points at an angle q, a unit vector (2, 1) of its plane."""
+    def _plane_direction_at(self, q: Expression) -> Expression:
+        """Return the crank's direction at an angle q, a unit vector (2, 1) of its plane."""
         turn = q - self.middle
         return ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
 
@@ -304,7 +306,7 @@ class CrankEquations(LegEquations):
 
     def tip(self, q: Expression) -> Expression:
         """Return the crank's end at an angle q."""
-        return self.r + self.lu * ca.mtimes(self.plane, self._ahead(q))
+        return self.r + self.lu * ca.mtimes(self.plane, self._plane_direction_at(q))
 
     def needs(
         self,
@@ -313,7 +315,7 @@ class CrankEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that crank and last link need: the latter's at its ends.
+        """Return the required forces of crank and last link, the latter's at its ends.
 
         With eta = m gamma_x / ll, nu = m gamma_y / ll and mu = I / ll^2 of the last link, alpha =
         eta + mu, t the tip and z = d, the tip needs mu t'' - alpha c'' + eta g + nu z x (c'' - g)
@@ -325,13 +327,15 @@ class CrankEquations(LegEquations):
         eta, nu, mu = lower.hx / self.ll, lower.hy / self.ll, lower.i / (self.ll * self.ll)
         alpha = eta + mu
         ddu = ca.mtimes(self.plane.T, point.acceleration)
-        # What gravity does to the crank and, through the tip, to the last link: on g = d x l_u.
-        along = ca.mtimes(weight, eta - upper.hx / self.lu)
-        across = ca.mtimes(quarter_turn(weight), upper.hy / self.lu)
+        # Gravity on the crank and, through the tip, on the last link: its moments on g = d x l_u.
+        weight_along = ca.mtimes(weight, eta - upper.hx / self.lu)
+        weight_across = ca.mtimes(quarter_turn(weight), upper.hy / self.lu)
         swing = ca.mtimes(ddu, alpha) - ca.mtimes(quarter_turn(ddu - weight), nu)
-        joint = at.acceleration * (upper.i + mu * lu2) + ca.mtimes(at.g.T, along + across - swing)
+        joint = at.acceleration * (upper.i + mu * lu2) + ca.mtimes(
+            at.g.T, weight_along + weight_across - swing
+        )
         tip = ca.mtimes(at.g, at.acceleration * alpha) - ca.mtimes(at.l_u, at.rate**2 * alpha)
-        force = ca.mtimes(self.counted(gravity), alpha) - self.within(tip)
+        force = ca.mtimes(self.to_link_space(gravity), alpha) - self.plane_to_link_space(tip)
         turned = quarter_turn(at.g * at.acceleration - at.l_u * at.rate**2 - weight)
-        force = self.in_space(force - self.within(ca.mtimes(turned, nu)))
-        return Needs(joint, on_point(force), lower.m + eta + alpha)
+        force = self.to_base_frame(force - self.plane_to_link_space(ca.mtimes(turned, nu)))
+        return Needs(joint, force_wrench(force), lower.m + eta + alpha)

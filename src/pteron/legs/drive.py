@@ -12,25 +12,25 @@ from pteron.errors import ModelError, shown
 from pteron.toml import keep_checked, refuse
 
 
-def _expected(
-    holds: Callable[[float], bool], wanted: str, optional: bool = True
+def _number_check(
+    condition: Callable[[float], bool], expectation: str, optional: bool = True
 ) -> Callable[[object, str], float | None]:
-    """Return the check of a number: None is one that is left out."""
+    """Return the validator of a number, which is None where an optional one is omitted."""
 
     def check(value: object, key: str) -> float | None:
         if value is None and optional:
             return None
-        found = number(value, key)
-        if not holds(found):
-            raise ModelError(f"{key}: {found:g} given, {wanted} expected")
-        return found
+        converted = number(value, key)
+        if not condition(converted):
+            raise ModelError(f"{key}: {converted:g} given, {expectation} expected")
+        return converted
 
     return check
 
 
-_least = _expected(lambda value: value >= 0.0, "0 or more", optional=False)
-_above = _expected(lambda value: value > 0.0, "a number above 0")
-_nonzero = _expected(lambda value: value != 0.0, "another number than 0")
+_non_negative = _number_check(lambda value: value >= 0.0, "0 or more", optional=False)
+_positive = _number_check(lambda value: value > 0.0, "a number above 0")
+_nonzero = _number_check(lambda value: value != 0.0, "another number than 0")
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Stribeck:
     speed: float
 
     def __post_init__(self) -> None:
-        keep_checked(self, {"force": _least, "speed": _above})
+        keep_checked(self, {"force": _non_negative, "speed": _positive})
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class LuGre:
     damping: float = 0.0
 
     def __post_init__(self) -> None:
-        keep_checked(self, {"damping": _least, "stiffness": _above})
+        keep_checked(self, {"damping": _non_negative, "stiffness": _positive})
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,9 @@ class Elastic:
     encoder: Literal["motor", "joint", "both"] = "motor"
 
     def __post_init__(self) -> None:
-        keep_checked(self, {"damping": _least, "backlash": _least, "stiffness": _above})
+        keep_checked(
+            self, {"damping": _non_negative, "backlash": _non_negative, "stiffness": _positive}
+        )
         if self.encoder not in ("motor", "joint", "both"):
             raise ModelError(
                 f'encoder: {self.encoder!r} given, "motor", "joint" or "both" expected'
@@ -122,7 +124,7 @@ class Winding:
     voltage: float
 
     def __post_init__(self) -> None:
-        keep_checked(self, dict.fromkeys(("resistance", "torque_constant", "voltage"), _above))
+        keep_checked(self, dict.fromkeys(("resistance", "torque_constant", "voltage"), _positive))
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ class Wave:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        keep_checked(self, {"size": number, "phase": number, "order": _above})
+        keep_checked(self, {"size": number, "phase": number, "order": _positive})
 
 
 @dataclass(frozen=True)
@@ -214,8 +216,8 @@ class Drive:
         above = ("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn")
         checks = {
             "offset": number,
-            **dict.fromkeys(("coulomb", "viscous", "rotor_inertia"), _least),
-            **dict.fromkeys((*above, "current_time"), _above),
+            **dict.fromkeys(("coulomb", "viscous", "rotor_inertia"), _non_negative),
+            **dict.fromkeys((*above, "current_time"), _positive),
             "ratio": _nonzero,
         }
         try:
@@ -226,36 +228,36 @@ class Drive:
         refuse(faults)
 
     def _wrong_parts(self) -> list[str]:
-        """Return what is said of what is none of the parts of a drive; its lists become tuples."""
+        """Return the faults of parts of a wrong type; convert lists to tuples."""
         faults = []
         parts = {"stribeck": Stribeck, "lugre": LuGre, "elastic": Elastic, "winding": Winding}
         for name, kind in parts.items():
-            given = getattr(self, name)
-            if given is not None and not isinstance(given, kind):
+            part = getattr(self, name)
+            if part is not None and not isinstance(part, kind):
                 article = "an" if name == "elastic" else "a"
-                faults.append(f"{name}: {shown(given)} given, {article} {kind.__name__} expected")
+                faults.append(f"{name}: {shown(part)} given, {article} {kind.__name__} expected")
         for name in ("curve", "ripple", "cogging"):
-            given = getattr(self, name)
+            part = getattr(self, name)
             try:
-                found = tuple(() if given is None else given)
+                converted = tuple(() if part is None else part)
                 if name == "curve":
-                    found = tuple((float(speed), float(force)) for speed, force in found)
-                    good = all(isfinite(number) for pair in found for number in pair)
+                    converted = tuple((float(speed), float(force)) for speed, force in converted)
+                    good = all(isfinite(number) for pair in converted for number in pair)
                 else:
-                    good = all(isinstance(wave, Wave) for wave in found)
+                    good = all(isinstance(wave, Wave) for wave in converted)
             except (TypeError, ValueError):
                 good = False
             if good:
-                object.__setattr__(self, name, found)
+                object.__setattr__(self, name, converted)
             else:
-                wanted = (
+                expectation = (
                     "pairs of numbers, speed and force," if name == "curve" else "a list of Wave"
                 )
-                faults.append(f"{name}: {shown(given)} given, {wanted} expected")
+                faults.append(f"{name}: {shown(part)} given, {expectation} expected")
         return faults
 
     def _contradictions(self, wrong: set[str]) -> list[str]:
-        """Return how the drive contradicts itself, what is `wrong` by itself left out."""
+        """Return the contradictions between parts, except those that are `wrong` by themselves."""
         faults = []
         if "elastic" not in wrong and self.elastic and not self.rotor_inertia:
             faults.append(
@@ -282,7 +284,7 @@ class Drive:
 
     @property
     def gear(self) -> float:
-        """The ratio, 1 where it is left out."""
+        """The ratio, 1 by default."""
         return 1.0 if self.ratio is None else self.ratio
 
     @property

@@ -45,26 +45,26 @@ def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
     """
     rows = []
     for name, place, unit in _QUANTITIES:
-        values = [_value(leg.drive, place) for leg in legs]
-        if any(values):
+        numbers = [_drive_number(leg.drive, place) for leg in legs]
+        if any(numbers):
             units = [unit.format(**_units(leg)) for leg in legs]
-            one = len(set(units)) == 1
+            is_shared = len(set(units)) == 1
             texts = [
-                f"{value:.4g}{'' if one else f' {own}'}" if value else "-"
-                for value, own in zip(values, units, strict=True)
+                f"{number:.4g}{'' if is_shared else f' {leg_unit}'}" if number else "-"
+                for number, leg_unit in zip(numbers, units, strict=True)
             ]
-            rows.append((f"{name} ({units[0]})" if one else name, texts))
+            rows.append((f"{name} ({units[0]})" if is_shared else name, texts))
     return rows
 
 
-def _value(drive: Drive | None, place: str) -> float | None:
-    """Return a number of a drive, by where it has it."""
+def _drive_number(drive: Drive | None, place: str) -> float | None:
+    """Return a number of a drive, by its attribute path; None if it has none."""
     if drive is None or (place == "rest_speed" and not (drive.coulomb or drive.stribeck)):
         return None
-    found: Drive | Stribeck | Elastic | float | None = drive
+    quantity: Drive | Stribeck | Elastic | float | None = drive
     for name in place.split("."):
-        found = getattr(found, name, None)
-    return found if isinstance(found, float) else None
+        quantity = getattr(quantity, name, None)
+    return quantity if isinstance(quantity, float) else None
 
 
 def _units(leg: LegKind) -> dict[str, str]:

@@ -75,21 +75,21 @@ def drive_warnings(leg: LegKind) -> Iterator[str]:
             f"{fastest:g} {rate}"
         )
     if drive.elastic:
-        yield from _elastic(drive, drive.elastic, leg.joint.unit)
+        yield from _elastic_warnings(drive, drive.elastic, leg.joint.unit)
     if drive.current_time and drive.current_time > _LAG:
         yield (
             f"drive: current_time of {drive.current_time:g} s: current loops have 0.1 to 3 ms; is "
             "it in s?"
         )
     if drive.winding:
-        yield from _winding(drive, drive.winding, unit, rate)
+        yield from _winding_warnings(drive, drive.winding, unit, rate)
     high = max((abs(wave.size) for wave in drive.ripple), default=0.0)
     if high > _WAVE:
         yield f"drive: ripple of {high:g} times the torque: is its size a share, not per cent?"
 
 
-def _elastic(drive: Drive, bends: Elastic, unit: str) -> Iterator[str]:
-    """Yield warnings about a transmission that bends."""
+def _elastic_warnings(drive: Drive, bends: Elastic, unit: str) -> Iterator[str]:
+    """Yield warnings about an elastic transmission."""
     stiffness = "N/m" if unit == "m" else "N m/rad"
     frequency = sqrt(bends.stiffness / drive.inertia) / (2.0 * pi)
     if not _SLOWEST <= frequency <= _FASTEST:
@@ -101,8 +101,8 @@ def _elastic(drive: Drive, bends: Elastic, unit: str) -> Iterator[str]:
         yield f"drive: elastic.backlash of {bends.backlash:g} {unit} is much: is it in {unit}?"
 
 
-def _winding(drive: Drive, winding: Winding, unit: str, rate: str) -> Iterator[str]:
-    """Yield warnings about a winding that does not go with the drive's other numbers."""
+def _winding_warnings(drive: Drive, winding: Winding, unit: str, rate: str) -> Iterator[str]:
+    """Yield warnings about a winding that is inconsistent with the drive's other numbers."""
     constant = abs(drive.gear) * winding.torque_constant
     stall, fastest = constant * winding.voltage / winding.resistance, winding.voltage / constant
     if drive.max_force is not None and drive.max_force > stall:

@@ -34,12 +34,17 @@ KINDS: dict[str, type[LegKind]] = {
 
 
 Leg = PRRR
-"""The kind of leg that a file means where it does not say `type`."""
+"""The default kind of leg, of files without `type`."""
 
 
 def kind_names() -> tuple[str, ...]:
     """Return the names of all kinds that files may name."""
-    return (*KINDS, *sorted(entry.name for entry in _others() if entry.name not in KINDS))
+    return (
+        *KINDS,
+        *sorted(
+            entry_point.name for entry_point in _entry_points() if entry_point.name not in KINDS
+        ),
+    )
 
 
 def kind_named(name: str) -> type[LegKind] | None:
@@ -50,23 +55,25 @@ def kind_named(name: str) -> type[LegKind] | None:
     ModelError
         If the package that has it cannot be imported, or holds no kind of that name.
     """
-    entry = next((e for e in _others() if e.name == name), None) if name not in KINDS else None
-    if entry is not None:
-        KINDS[name] = _loaded(entry)
+    entry_point = (
+        next((e for e in _entry_points() if e.name == name), None) if name not in KINDS else None
+    )
+    if entry_point is not None:
+        KINDS[name] = _load_kind(entry_point)
     return KINDS.get(name)
 
 
-def _others() -> tuple[EntryPoint, ...]:
+def _entry_points() -> tuple[EntryPoint, ...]:
     from importlib.metadata import entry_points
 
     return tuple(entry_points(group=GROUP))
 
 
-def _loaded(entry: EntryPoint) -> type[LegKind]:
+def _load_kind(entry_point: EntryPoint) -> type[LegKind]:
     try:
-        kind = entry.load()
+        kind = entry_point.load()
     except Exception as error:
-        raise ModelError(f"{entry.value}: {type(error).__name__}: {error}") from error
-    if not (isinstance(kind, type) and issubclass(kind, LegKind) and kind.type == entry.name):
-        raise ModelError(f"{entry.value} is no kind of leg with type {entry.name!r}")
+        raise ModelError(f"{entry_point.value}: {type(error).__name__}: {error}") from error
+    if not (isinstance(kind, type) and issubclass(kind, LegKind) and kind.type == entry_point.name):
+        raise ModelError(f"{entry_point.value} is no kind of leg with type {entry_point.name!r}")
     return kind

@@ -81,21 +81,21 @@ ACCOUNTS: dict[str, str] = _GROUPS.pop("accounts")
 
 
 def keys_of(*groups: str) -> dict[str, Key]:
-    """Return the keys of groups of `keys.toml`; a later group may say more closely what one is."""
+    """Return the keys of groups of `keys.toml`; a later group overrides an earlier one."""
     return {name: _key(**about) for group in groups for name, about in _GROUPS[group].items()}
 
 
 def _key(*, default: Any = ..., optional: bool = False, **about: Any) -> Key:
-    given = tuple(default) if isinstance(default, list) else default
-    return Key(**about, default=None if optional else given)
+    default_value = tuple(default) if isinstance(default, list) else default
+    return Key(**about, default=None if optional else default_value)
 
 
 COMMON = keys_of("common")
-"""The keys that every kind of leg has; a kind may say more closely what they are."""
+"""The keys that every kind of leg has; a kind may override them."""
 
 
 def parameters_section(keys: Mapping[str, Key]) -> str:
-    """Return the section of a leg's docstring that says of each field what it holds."""
+    """Return the Parameters section of a leg's docstring."""
     lines = ["", "", "    Parameters", "    ----------"]
     for name, key in keys.items():
         optional = "" if key.default is ... else ", optional"
@@ -105,7 +105,7 @@ def parameters_section(keys: Mapping[str, Key]) -> str:
 
 
 class Condition(NamedTuple):
-    """A condition between fields that are right by themselves."""
+    """A condition between fields that are valid by themselves."""
 
     names: tuple[str, ...]
     check: Callable[..., None]
@@ -113,20 +113,20 @@ class Condition(NamedTuple):
 
 
 def sound_fields(
-    given: Mapping[str, Any],
+    fields: Mapping[str, Any],
     keys: Mapping[str, Key],
     conditions: Sequence[Condition],
     branches: Sequence[int],
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return those of the given fields that are sound, as a leg holds them, and all faults.
+    """Return the valid fields, converted, and the faults of the others.
 
-    What hangs on a field that is not among the sound ones is not checked. `branches` are the values
-    that a sign may have.
+    Fields and conditions that depend on an invalid or missing field are not checked. `branches` are
+    the values that a sign may have.
     """
     sound: dict[str, Any] = {}
     faults: list[str] = []
-    for name in sorted(given, key=lambda name: bool(keys[name].across)):
-        key, value = keys[name], given[name]
+    for name in sorted(fields, key=lambda name: bool(keys[name].across)):
+        key, value = keys[name], fields[name]
         try:
             if key.role == "sign" and (isinstance(value, bool) or value not in branches):
                 valid = "neither 1 nor -1" if len(branches) > 1 else "not 1, its only branch"
@@ -136,7 +136,7 @@ def sound_fields(
             elif axis := sound.get(key.across):
                 sound[name] = perpendicular(value, axis, name, key.across)
             else:
-                sound[name] = _checked(value, name, key.role)
+                sound[name] = _check_value(value, name, key.role)
         except ModelError as error:
             faults += error.faults
     for names, check in conditions:
@@ -148,8 +148,8 @@ def sound_fields(
     return sound, faults
 
 
-def _checked(value: Any, name: str, role: KeyRole) -> Any:
-    """Return what a field holds, or say what is wrong with it."""
+def _check_value(value: Any, name: str, role: KeyRole) -> Any:
+    """Return a field's value, converted; raise where it is invalid."""
     if role == "point":
         return vector(value, name)
     if role == "direction":
@@ -176,7 +176,7 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
 def check_elbow(
     limits: tuple[float, float] | None, least: float = 0.0, most: float = math.pi
 ) -> None:
-    """Refuse an elbow's limits beyond the angles that it can have."""
+    """Raise where an elbow's limits exceed the range of its angle."""
     if limits is not None and not least <= limits[0] < limits[1] <= most:
         raise ModelError(
             f"elbow_limits: {list(limits)} rad reaches beyond {least:.4g} to {most:.4g}, where the "

@@ -33,7 +33,7 @@ class ActuatedJoint:
     force: str
     force_unit: str
     zero: str = ""
-    """Where the coordinate is 0, and which way it counts."""
+    """The zero and the sense of the coordinate."""
 
 
 _TURN = "rad", "torque", "N m"
@@ -52,13 +52,13 @@ depends on, as an axis perpendicular to the kind's first direction; a length; a 
 
 
 class Quantity(NamedTuple):
-    """A part of a leg's geometry that its equations need, or that turns with the machine.
+    """A part of a leg's geometry that its equations need, or that rotates with the machine.
 
-    `LegEquations` takes them all by name, also those that it has no use for.
+    `LegEquations` takes all of them by name, also those that it ignores.
     """
 
     name: str
-    """The field of the leg that holds it; one without a field turns with nothing."""
+    """The field of the leg that holds it; one without a field rotates with none."""
     role: Role
     value: Sequence[float]
     symbol: str = ""
@@ -70,10 +70,10 @@ Monomial = tuple[int, tuple[str, ...]]
 
 
 class Transfer(NamedTuple):
-    """A combination of a leg's parameters that no force notices, in symbols of its lengths."""
+    """A combination of a leg's parameters without effect on any force, in its length symbols."""
 
     reason: str
-    """Why, with {} where the leg's number goes."""
+    """The reason, with {} for the leg's number."""
     entries: Mapping[tuple[str, str], Monomial]
     """The combination's factors, by (kind, body letter) of the parameter."""
 
@@ -83,12 +83,12 @@ class ReachBound(NamedTuple):
 
     point: Vector
     line: Vector | None
-    """The way of a slider: it is within `radius` of point + q line too."""
+    """The direction of a slider: the platform point is within `radius` of point + q line."""
     radius: float
 
 
 _ROUNDING = 1e-9
-"""Share of a body's length by which its centre of mass may be beyond the ends, from rounding."""
+"""Tolerance of the centre of mass beyond a body's ends, relative to its length: rounding."""
 
 _EquationsClass = type[LegEquations]
 
@@ -96,7 +96,7 @@ _EquationsClass = type[LegEquations]
 class LegKind(ABC):
     """The data of one leg: a kind of leg is a frozen dataclass with these fields and its own.
 
-    `pteron.legs.keys.COMMON` says what they hold; a kind's own `keys` may say it more closely.
+    `pteron.legs.keys.COMMON` describes them; a kind's own `keys` may override it.
     """
 
     guide_point: Vector
@@ -121,9 +121,9 @@ class LegKind(ABC):
     measure_text: ClassVar[str] = ""
     """The meaning of its type-I measure, as a clause for a report."""
     singular_text: ClassVar[str] = "it is stretched or folded"
-    """Its stance where that is zero, as a clause for messages."""
+    """Its configuration where that is zero, as a clause for messages."""
     keys: ClassVar[Mapping[str, Key]]
-    """The fields of its own, which are its TOML keys, and what they hold; see `every_key`."""
+    """Its own fields, which are its TOML keys, and their descriptions; see `every_key`."""
     base_cones: ClassVar[tuple[str, ...]] = ()
     """The keys of cones whose axis is in the base frame."""
     conditions: ClassVar[tuple[Condition, ...]] = ()
@@ -132,43 +132,40 @@ class LegKind(ABC):
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __init_subclass__(cls) -> None:
-        # What its fields hold is said once, by its keys.
+        # The keys are the single source of the fields' descriptions.
         if cls.__doc__ and "keys" in vars(cls) and "Parameters\n" not in cls.__doc__:
             cls.__doc__ = cls.__doc__.rstrip() + parameters_section(cls.every_key())
 
     def __post_init__(self) -> None:
         sound, faults = self.checked({name: getattr(self, name) for name in self.every_key()})
         refuse(faults)
-        for name, value in sound.items():
-            object.__setattr__(self, name, value)
+        for name, field_value in sound.items():
+            object.__setattr__(self, name, field_value)
 
     @classmethod
-    def checked(cls, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-        """Return those of the given fields that are sound, as a leg holds them, and all faults.
-
-        What hangs on a field that is not among the sound ones is not checked.
-        """
-        return sound_fields(given, cls.every_key(), cls.conditions, cls.branches)
+    def checked(cls, fields: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+        """Return the valid fields, converted, and the faults of the others; see `sound_fields`."""
+        return sound_fields(fields, cls.every_key(), cls.conditions, cls.branches)
 
     @classmethod
     @cache
     def every_key(cls) -> dict[str, Key]:
-        """Return all its keys, in the order in which files and pages give them."""
-        roles, found = get_args(KeyRole), {**COMMON, **cls.keys}
-        return dict(sorted(found.items(), key=lambda item: roles.index(item[1].role)))
+        """Return all its keys, in the order of files and pages."""
+        roles, keys = get_args(KeyRole), {**COMMON, **cls.keys}
+        return dict(sorted(keys.items(), key=lambda entry: roles.index(entry[1].role)))
 
     @property
     def bodies(self) -> dict[str, Inertia]:
         """The inertia of its bodies, by letter in the order "p", "u", "l"."""
-        found: dict[str, Inertia] = {}
+        inertias: dict[str, Inertia] = {}
         for name, key in self.every_key().items():
             if key.body:
-                value = getattr(self, name)
-                found[key.body] = PointMass(value) if key.role == "slider" else value
-        return {letter: found[letter] for letter in LEG_BODIES if letter in found}
+                field_value = getattr(self, name)
+                inertias[key.body] = PointMass(field_value) if key.role == "slider" else field_value
+        return {letter: inertias[letter] for letter in LEG_BODIES if letter in inertias}
 
     def with_bodies(self, bodies: Mapping[str, Any]) -> Self:
-        """Return the same leg with other inertia, by letter."""
+        """Return the leg with other inertia, by letter."""
         new = {}
         for name, key in self.keys.items():
             if key.body:
@@ -177,15 +174,15 @@ class LegKind(ABC):
         return replace(self, **new)
 
     def with_length(self, body: str, length: float) -> Self | None:
-        """Return the same leg with a link of another length, m, by its key; None if it has none."""
+        """Return the leg with another length, m, of a link ("upper", "lower"), if it has one."""
         key = f"{body}_length"
         return replace(self, **{key: length}) if key in self.every_key() else None
 
     def with_zero(self, zero: float) -> Self | None:
-        """Return the same leg with its coordinate counted from `zero`, m or rad: less by so much.
+        """Return the leg with its coordinate counted from `zero`, m or rad: q becomes q - zero.
 
-        Limits move along, and so does a `reading`: its drive reads in every posture what it did.
-        None where the geometry cannot take a zero, such as a ram's length.
+        Limits and a `reading` are shifted with it, so that the drive's readings stay the same. None
+        where the geometry cannot represent a zero, such as a ram's length.
         """
         changed = self.zero_at(zero)
         if changed is None:
@@ -197,36 +194,36 @@ class LegKind(ABC):
         return replace(self, **changed)
 
     def zero_at(self, zero: float) -> dict[str, Any] | None:
-        """Return the fields of the geometry that count its coordinate from `zero`; or None."""
+        """Return the changed fields of the geometry that move the coordinate's zero; or None."""
         return None
 
     @property
     def at_zero(self) -> Vector | None:
-        """The unit vector along which it points at coordinate 0; None where it points nowhere."""
+        """The unit vector along which the crank points at coordinate 0; None without a crank."""
         return None
 
     @property
     def goes_round(self) -> bool:
-        """Whether a whole turn of its joint leads to the same pose again, as a crank's does."""
+        """Whether a full turn of its joint leads to the same pose, as a crank's does."""
         return self.joint.unit == "rad" and not self.follows_angle
 
     @property
     @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
-        """The geometry that its equations need, but for the platform point."""
+        """The geometry that its equations need, except the platform point."""
 
     @abstractmethod
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return axes that span those about which the leg lets the platform turn.
+        """Return axes that span the rotations of the platform that the leg does not constrain.
 
         `axis` is k of a platform that turns about it, or None.
         """
 
     def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
-        """Return the couples (3, 1), of length 1 or less, that it holds whatever its joints do.
+        """Return the constraint couples (3, 1), of length 1 or less, of the leg.
 
-        They keep the part of the platform that it carries from turning; each vanishes where it does
-        so no longer. `axis` is as in `free_axes`. None where the file does not tell.
+        They constrain rotations of the part of the platform that it carries; each vanishes where it
+        loses its effect. `axis` is as in `free_axes`. None where the file does not define them.
         """
         return [ca.SX(row) for row in complement(self.free_axes(axis))]
 
@@ -236,7 +233,7 @@ class LegKind(ABC):
         return None
 
     def under(self, frame: Sequence[Vector]) -> Self:
-        """Return the leg with what it takes from its platform's frame, where it has it not.
+        """Return the leg with a missing `direction` filled in from the platform's frame.
 
         `frame` is the platform's x, y and z at angles zero, in the base frame.
         """
@@ -254,13 +251,13 @@ class LegKind(ABC):
     def base_axis(self) -> Vector | None:
         """The axis of its joint with the base, as pictures show it; `joint_axis` where it has one.
 
-        None where nothing says it.
+        None where it is not defined.
         """
         return self.joint_axis or self.plane_normal
 
     @property
     def screw_lead(self) -> float | None:
-        """The length that a turn of a ram's piston about its axis adds, m, if it has a screw."""
+        """The lead of a ram's screw, m per turn of the piston about its axis; None without one."""
         return None
 
     @property
@@ -270,20 +267,20 @@ class LegKind(ABC):
 
     @property
     def bar(self) -> Vector | None:
-        """The direction along which its parallel rods stand side by side, where the file says so.
+        """The direction from one of its parallel rods to the other; None if the file has none.
 
         Pictures show such rods as two.
         """
         return None
 
     bar_length: float | None = None
-    """The distance of its parallel rods, m, where the file tells it."""
+    """The distance of its parallel rods, m; None if the file has none."""
 
     @property
     def lever(self) -> float:
         """Metres that the actuated body's end moves per unit of the joint: 1 for a slider.
 
-        It says nothing of a joint that follows the platform's angle.
+        It is meaningless for a joint that follows the platform's angle.
         """
         return 1.0
 
@@ -300,7 +297,9 @@ class LegKind(ABC):
             return bound
         low, high = self.limits
         way = 0.5 * (low + high)
-        x, y, z = (p + way * along for p, along in zip(bound.point, bound.line, strict=True))
+        x, y, z = (
+            p + way * component for p, component in zip(bound.point, bound.line, strict=True)
+        )
         return ReachBound((x, y, z), None, bound.radius + 0.5 * (high - low))
 
     @property
@@ -314,7 +313,7 @@ class LegKind(ABC):
         return {}
 
     def beyond_ends(self, letter: str, x: float) -> str | None:
-        """Return what is said of a body whose centre of mass is at an x beyond its ends."""
+        """Return a warning about a centre of mass at x, m, beyond its body's ends; None within."""
         if letter not in self.extents:
             return None
         _, low, high, ends = self.extents[letter]
@@ -326,19 +325,19 @@ class LegKind(ABC):
 
     @property
     def metres(self) -> dict[str, Sequence[float]]:
-        """Its values in metres, by their keys: they tell if a file is in millimetres."""
-        found: dict[str, Sequence[float]] = {
+        """Its lengths, m, by key, from which a file in millimetres is recognised."""
+        lengths: dict[str, Sequence[float]] = {
             q.name: q.value for q in self.quantities if q.role == "length"
         }
         for key in ("guide_point", "platform_point", "fixed_offset"):
-            found[key] = getattr(self, key)
+            lengths[key] = getattr(self, key)
         if self.limits is not None and self.joint.unit == "m":
-            found["limits"] = self.limits
-        return found
+            lengths["limits"] = self.limits
+        return lengths
 
     @property
     def size(self) -> float:
-        """The length that its reach is measured by, m."""
+        """The length that its reach is relative to, m."""
         return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
@@ -349,21 +348,21 @@ class LegKind(ABC):
         return []
 
     def rod_couple(self, motion: LegMotion) -> Expression | None:
-        """Return the couple (3, 1) that its rods pass on to the platform beside a force along them.
+        """Return the couple (3, 1) that its rods transmit beside a force along them.
 
-        It is zero for a single rod; None for a leg whose chain of joints says what it passes on.
+        It is zero for a single rod; None for a leg whose chain of joints determines its wrench.
         """
         return None
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
-        """Yield what is possible but unlikely in it, beside what is so in any leg.
+        """Yield warnings about values that are valid but unlikely in this kind of leg.
 
         The platform turns about `axis`, if it does.
         """
         yield from ()
 
     def equations(self, values: Mapping[str, Expression] | None = None) -> LegEquations:
-        """Return its equations, for its own geometry or for other values of the quantities."""
+        """Return its equations, for its geometry or for other values of its quantities."""
         if values is None:
             values = {q.name: ca.SX(ca.DM(list(q.value))) for q in self.quantities}
         return self.equations_class(**values)
@@ -376,24 +375,24 @@ class LegKind(ABC):
     def closing(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int] | None:
-        """Return a random c - r in fractions that the leg closes without a root, and its elbow.
+        """Return a random rational c - r whose closure has a rational root, and the elbow.
 
-        With it base parameters are proved in fractions as well as modulo a prime.
+        With it base parameters are proved over the rationals as well as modulo a prime.
         """
         return None
 
     def turned(self, turn: Any, *, platform: bool = False) -> Self:
         """Return the leg with every base-frame vector v replaced by `turn(v)`.
 
-        With `platform` those of the platform's frame are too.
+        If `platform`, vectors of the platform's frame are replaced too.
         """
         vectors = [q.name for q in self.quantities if q.role in ("point", "direction", "normal")]
         vectors += ["fixed_offset", *(["platform_point"] if platform else [])]
         cones = [*self.base_cones, *(["platform_cone"] if platform else [])]
-        given = {name: getattr(self, name, None) for name in (*vectors, *cones)}
-        found = {
-            name: replace(value, axis=turn(value.axis)) if name in cones else turn(value)
-            for name, value in given.items()
-            if value is not None
+        rotating = {name: getattr(self, name, None) for name in (*vectors, *cones)}
+        rotated_fields = {
+            name: replace(vector, axis=turn(vector.axis)) if name in cones else turn(vector)
+            for name, vector in rotating.items()
+            if vector is not None
         }
-        return replace(self, **found)
+        return replace(self, **rotated_fields)

@@ -64,9 +64,9 @@ class Joint(NamedTuple):
     driven: bool = False
     """Whether it is the actuated joint: one of the chain is, wherever it stands."""
     gear: Expression = 1
-    """Its coordinate over the motion that it passes on: of a shaft, its angle per phi."""
+    """Its coordinate over the motion that it transmits: of a shaft, its angle per phi."""
     seat: Expression | None = None
-    """The point where it passes on forces and moments, (3, 1), if that is not on its axis."""
+    """The point where it transmits forces and moments, (3, 1), if that is not on its axis."""
 
 
 class LegMotion(NamedTuple):
@@ -92,7 +92,7 @@ class LegMotion(NamedTuple):
     """Rate and acceleration of the angles of upper and lower link about the leg's axis d, where
     that describes their motion."""
     row_size: Expression | None = None
-    """The size in space of the force that `row` is, where it is known without being worked out: the
+    """The norm in space of the force that `row` is, where it is known without computation: the
     length of the link that `row` lies along."""
 
     @property
@@ -102,19 +102,19 @@ class LegMotion(NamedTuple):
 
     @property
     def pushes(self) -> bool:
-        """Whether the leg passes a force on to its platform point, and not a moment alone."""
+        """Whether the leg transmits a force to its platform point, and not a moment alone."""
         return not self.row[:3].is_zero()
 
     @property
     def wrench_size(self) -> Expression:
-        """The size in space of the force that `row` is; of its moment where it has no force."""
+        """The norm in space of the force that `row` is; of its moment where it has no force."""
         if self.row_size is not None:
             return self.row_size
         return ca.norm_2(self.row[:3] if self.pushes else self.row[3:])
 
 
 class Passive(NamedTuple):
-    """A passive joint that has limits, and where it is."""
+    """A passive joint with limits, and its coordinate."""
 
     noun: str
     """Its name in messages: "elbow"."""
@@ -129,17 +129,17 @@ class Passive(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """The forces that a leg's bodies need, rows of K columns as their parameters have."""
+    """The forces required to move a leg's bodies, one column for each of the K of parameters."""
 
     joint: Expression
     """(1, K): at the actuated joint."""
     point: Expression
     """(6, K): a force on the platform point, and a moment on the platform."""
     mass: Expression
-    """(1, K): a mass that rides on the platform point, left to the platform to carry."""
+    """(1, K): a point mass at the platform point, which the platform's inertia includes."""
 
 
-def on_point(force: Expression) -> Expression:
+def force_wrench(force: Expression) -> Expression:
     """Return the wrench (6, K) of a force (3, K) on the platform point alone."""
     return ca.vertcat(force, ca.SX(3, force.shape[1]))
 
@@ -154,13 +154,13 @@ class Reach(NamedTuple):
     scale: Expression
     """The discriminant over `scale` is the square of the type-I measure."""
     spread: Expression
-    """Metres; where it vanishes the elbow may be anywhere. Where it never may: any length."""
+    """Metres; where it vanishes the elbow is indeterminate. Any length where that cannot happen."""
 
     @property
     def type_i(self) -> Expression:
-        """The type-I measure, without unit: 0 where the leg is singular, 1 at best, NaN beyond.
+        """The type-I measure, dimensionless: 0 where the leg is singular, 1 at best, NaN beyond.
 
-        What is divided by it loses as many digits as it has zeros.
+        A quotient by it loses as many digits as it has leading zeros.
         """
         return ca.sqrt(self.discriminant / self.scale)
 
@@ -171,7 +171,7 @@ class Plane(NamedTuple):
     normal: Expression
     offset: Expression
     size: Expression
-    """The size of the terms that the offset adds up, by which its rounding is judged."""
+    """The size of the offset's terms, to which its rounding is relative."""
 
 
 class Sphere(NamedTuple):
@@ -208,7 +208,7 @@ class LegEquations(ABC):
     row_is_constant: ClassVar[bool] = False
     """Whether dq/dc does not depend on the pose, nor q on phi; see `closures`."""
     constant_row: Expression
-    """dq/dc, (3, 1), where that is so."""
+    """dq/dc, (3, 1), where it is constant."""
     holds: HeldPlane | None = None
     """The plane that it keeps its platform point in, of a leg that does so by itself."""
 
@@ -221,41 +221,41 @@ class LegEquations(ABC):
         """Return whether the leg reaches c."""
 
     def along(self, axes: Expression, origin: Expression) -> LegEquations | None:
-        """Return the leg with vectors along other axes, the columns of (3, 3), from an origin.
+        """Return the leg with vectors in other axes, the columns of (3, 3), about an origin.
 
-        None where the leg has directions, which are cheaper where they stand still.
+        None where the leg has directions, which are cheaper in the base frame.
         """
         return None
 
     def lever(self, length: Expression) -> Expression:
-        """Return the metres that a unit of its joint counts for; 1 for a slider.
+        """Return the metres per unit of its joint; 1 for a slider.
 
-        `length` is what a radian of the platform counts for.
+        `length` is the platform's characteristic length, m per rad.
         """
         return ca.SX(1)
 
     def edges(self, c: Expression) -> dict[str, Expression]:
-        """Return, by name, what is not negative within each edge of its reach: smooth expressions.
+        """Return smooth expressions, by name, that are not negative within each edge of its reach.
 
-        The leg reaches c where none is negative. Named apart they say how it ends.
+        The leg reaches c where none is negative; the names distinguish the causes.
         """
         return {"reach": self.reach(c).discriminant}
 
     def within_limits(
         self, c: Expression, q: Expression, low: float, high: float
     ) -> dict[str, Expression]:
-        """Return, by name, what is not negative within the limits of its joint, which is at q.
+        """Return smooth expressions, by name, that are not negative within its joint's limits.
 
-        Of a pose in reach; it need not be a distance, so that it can be smooth.
+        The joint is at q, the pose in reach. They need not be distances.
         """
         return {"least": q - low, "most": high - q}
 
     @abstractmethod
     def locus(self, q: Expression) -> Locus:
-        """Return where c may be while the actuated joint is at q."""
+        """Return the locus of c while the actuated joint is at q."""
 
     def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        """Return what exported code calls by name: scalars, or vectors (2, 1) or (3, 1)."""
+        """Return the named terms of exported code: scalars, or vectors (2, 1) or (3, 1)."""
         return {}
 
     def needs(
@@ -265,11 +265,11 @@ class LegEquations(ABC):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that the leg's bodies need.
+        """Return the forces required to move the leg's bodies.
 
-        A kind of leg may say more cheaply what `needs_of_bodies` says, giving what its joint
-        carries to `Needs.joint` and what is a mass on its platform point to `Needs.mass`; its
-        conformance test holds the two against each other.
+        A kind of leg may override it with a cheaper form of `needs_of_bodies`, with the forces at
+        its joint in `Needs.joint` and masses at its platform point in `Needs.mass`; the conformance
+        test compares the two.
         """
         return self.needs_of_bodies(point, rotation, gravity, inertia)
 
@@ -280,10 +280,10 @@ class LegEquations(ABC):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return what the leg's bodies need, body by body, as the paper writes it.
+        """Return the forces required to move the leg's bodies, body by body, as in the paper.
 
-        F_b is the wrench that acts on a body by its weight and inertia; what the body needs is
-        -F_b. Eq. (13) sums J_b^T F_b, J_b being the body's rows against (c', omega).
+        F_b is the wrench on a body of its weight and inertia; the required wrench is -F_b. Eq. (13)
+        sums J_b^T F_b, J_b being the body's rows in (c', omega).
         """
         motion = self.motion(point, rotation)
         columns = next(iter(inertia.values())).m.shape[1]
@@ -296,7 +296,7 @@ class LegEquations(ABC):
         return Needs(ca.SX(1, columns), total, ca.SX(1, columns))
 
     def riding(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
-        """Return what a mass (1, K) on the platform point needs, where the platform has it not."""
+        """Return the force for a mass at the platform point, outside the platform's inertia."""
         none = ca.SX(1, mass.shape[1])
         force = ca.mtimes(point.acceleration - gravity, mass)
-        return Needs(none, on_point(force), none)
+        return Needs(none, force_wrench(force), none)

@@ -21,7 +21,7 @@ class SpeedLine(NamedTuple):
 
 
 def supply(drive: Drive) -> tuple[float, float]:
-    """Return what a winding gives at rest, N or N m, and by how much less for each m/s or rad/s."""
+    """Return a winding's stall force, N or N m, and its slope, less per m/s or rad/s."""
     winding, gear = drive.winding, abs(drive.gear)
     if winding is None:
         raise ValueError("drive: has no winding")
@@ -29,19 +29,19 @@ def supply(drive: Drive) -> tuple[float, float]:
     return stall, (gear * winding.torque_constant) ** 2 / winding.resistance
 
 
-def within_motor(
+def limit_to_motor(
     drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return forces (...) of a drive, cut to what its motor can give at its rates (...).
+    """Return forces (...) of a drive, saturated at its motor's limits at its rates (...).
 
     Parameters
     ----------
     drive : Drive
         The drive.
     forces : array, shape (...)
-        What is asked of it, N or N m.
+        Commanded forces, N or N m.
     rates : array, shape (...)
-        Of the motor, counted at the joint, m/s or rad/s.
+        Of the motor, at the joint, m/s or rad/s.
     """
     if drive.curve:
         speeds, most = np.array(drive.curve).T
@@ -54,21 +54,21 @@ def within_motor(
 
 
 class MotorPeak(NamedTuple):
-    """The moment at which a drive's force is nearest to, or most beyond, what its motor gives."""
+    """The moment at which a drive's force is nearest to, or farthest beyond, its motor's limit."""
 
     force: float
     """Its size, N or N m."""
     most: float
-    """The greatest that the motor gives that way at its speed."""
+    """The motor's limit in that direction at its speed, N or N m."""
     at: int
-    """The place of the moment in the array, flat."""
+    """The flat index of the moment in the array."""
 
 
 def motor_peak(drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.float64]) -> MotorPeak:
-    """Return the hardest moment of a drive's forces and rates (...), of which NaN are none."""
+    """Return the moment at which forces and rates (...) are nearest to the limit, NaN ignored."""
     forces, rates = np.broadcast_arrays(forces, rates)
     side = np.where(forces < 0.0, -1.0, 1.0)
-    most = np.maximum(side * within_motor(drive, side * np.inf, rates), 0.0)
+    most = np.maximum(side * limit_to_motor(drive, side * np.inf, rates), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(forces == 0.0, 0.0, np.abs(forces) / most)
     at = int(np.nan_to_num(shares, nan=-1.0, posinf=np.inf).argmax())
@@ -76,19 +76,19 @@ def motor_peak(drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.floa
 
 
 def speed_lines(drive: Drive) -> tuple[SpeedLine, ...]:
-    """Return straight limits that curve and winding keep: all that motions are planned with.
+    """Return linear limits within those of curve and winding, for motion planning.
 
-    They are the winding's and, as long as each piece of the curve falls faster than the one before,
-    the curve's. Where it falls more slowly again, the steeper piece goes on and allows less.
+    They are the winding's and, while each piece of the curve is steeper than the one before, the
+    curve's. Where the curve becomes flatter again, the steeper line continues (conservative).
     """
-    found: list[SpeedLine] = []
+    lines: list[SpeedLine] = []
     if drive.curve:
         ends = (0.0, drive.curve[0][1]), (math.inf, drive.curve[-1][1])
         for (slow, high), (fast, low) in pairwise([ends[0], *drive.curve, ends[1]]):
-            if fast > slow and all(one.force - one.fall * fast > low for one in found):
+            if fast > slow and all(line.force - line.fall * fast > low for line in lines):
                 fall = (high - low) / (fast - slow)
-                found.append(SpeedLine(high + fall * slow, fall, 0.0))
+                lines.append(SpeedLine(high + fall * slow, fall, 0.0))
     if drive.winding:
         stall, back = supply(drive)
-        found.append(SpeedLine(stall, 0.0, back))
-    return tuple(found)
+        lines.append(SpeedLine(stall, 0.0, back))
+    return tuple(lines)

@@ -1,4 +1,4 @@
-"""Breaches of the protocol of `legs.leg`, for which a machine is refused when it is made."""
+"""Breaches of the protocol of `legs.leg`, for which the constructor of a machine raises."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from pteron.bodies.vectors import Vector
 from pteron.legs.kind import LegKind
 from pteron.legs.leg import LegMotion
 
-_TRIED = 200
-"""Random platform points of which the first in reach is taken."""
+_TRIAL_POINTS = 200
+"""Number of random platform points tried; the first in reach is used."""
 
-_ALIKE = 1e-9
-"""Difference of two velocity rows, relative to their size, up to which they are equal."""
+_EQUAL = 1e-9
+"""Relative tolerance of equal velocity rows."""
 
 
 def breaches(leg: LegKind, axes: Sequence[Vector]) -> tuple[str, ...]:
-    """Return why a leg cannot be modelled, a line each; none where it can.
+    """Return the breaches of the protocol by a leg, one line each; () where it conforms.
 
     `axes` are those about which the platform turns against the leg, perpendicular to each other.
     """
@@ -32,31 +32,31 @@ def breaches(leg: LegKind, axes: Sequence[Vector]) -> tuple[str, ...]:
             f"a {leg.type} leg has no size, {leg.size:g} m, to measure its reach by: give its kind "
             'a quantity of role "length", or a `size`',
         )
-    return _of_chain(leg, tuple(axes)) if (type(leg), len(axes)) not in _SOUND else ()
+    return _chain_breaches(leg, tuple(axes)) if (type(leg), len(axes)) not in _SOUND else ()
 
 
 _SOUND: set[tuple[type[LegKind], int]] = set()
-"""Kinds whose chains were found to be in order, under platforms with so many axes: a design's
-search makes thousands of machines, and a chain's order does not depend on a leg's numbers."""
+"""Kinds of legs whose chains conform, with the platform's number of axes: a cache, since a design's
+search makes thousands of machines and a chain does not depend on a leg's numbers."""
 
 
 @lru_cache(maxsize=64)
-def _of_chain(leg: LegKind, axes: tuple[Vector, ...]) -> tuple[str, ...]:
+def _chain_breaches(leg: LegKind, axes: tuple[Vector, ...]) -> tuple[str, ...]:
     motion = _motion(leg, axes)
     if motion is None:
-        return ()  # nowhere in reach, which is told where a pose is used
-    found = (*_carried(leg, motion), *_driven(leg, motion))
-    if not found:
+        return ()  # nowhere in reach, which is reported where a pose is used
+    chain_breaches = (*_body_breaches(leg, motion), *_driven_joint_breaches(leg, motion))
+    if not chain_breaches:
         _SOUND.add((type(leg), len(axes)))
-    return found
+    return chain_breaches
 
 
 def point_in_reach(leg: LegKind, seed: int = 0) -> NDArray[np.float64] | None:
-    """Return a random point (3,) in the reach of a leg; None where none was found."""
+    """Return a random point (3,) in the reach of a leg, m; None if no trial succeeds."""
     equations, bound = leg.equations(), leg.reach_bound
     center, radius = (leg.guide_point, 1.0) if bound is None else (bound.point, bound.radius)
     rng = np.random.default_rng(seed)
-    for point in center + radius * rng.uniform(-1.0, 1.0, (_TRIED, 3)):
+    for point in center + radius * rng.uniform(-1.0, 1.0, (_TRIAL_POINTS, 3)):
         if _numbers(equations.reach(ca.SX(ca.DM(point))).discriminant) > 0.0:
             return np.asarray(point)
     return None
@@ -64,16 +64,16 @@ def point_in_reach(leg: LegKind, seed: int = 0) -> NDArray[np.float64] | None:
 
 def _motion(leg: LegKind, axes: Sequence[Vector]) -> LegMotion | None:
     """Return the leg's motion at rest at a random point in its reach."""
-    point, rest = point_in_reach(leg), ca.SX(3, 1)
+    point, zero = point_in_reach(leg), ca.SX(3, 1)
     if point is None:
         return None
     turns = tuple(Turn(ca.SX(list(axis)), ca.SX(0), ca.SX(0)) for axis in axes)
-    at_rest = PointMotion(ca.SX(ca.DM(point)), rest, rest)
+    at_rest = PointMotion(ca.SX(ca.DM(point)), zero, zero)
     return leg.equations().motion(at_rest, RotationMotion(turns, ca.SX(0.3)))
 
 
-def _carried(leg: LegKind, motion: LegMotion) -> Iterator[str]:
-    """Yield which bodies are not carried by one joint each."""
+def _body_breaches(leg: LegKind, motion: LegMotion) -> Iterator[str]:
+    """Yield the faults of bodies that are not carried by exactly one joint."""
     named = Counter(joint.body for joint in motion.chain if joint.body)
     for letter in sorted({*leg.bodies, *motion.bodies, *named}):
         name = f'body "{letter}"' + (f" ({leg.names[letter]})" if letter in leg.names else "")
@@ -87,8 +87,8 @@ def _carried(leg: LegKind, motion: LegMotion) -> Iterator[str]:
             )
 
 
-def _driven(leg: LegKind, motion: LegMotion) -> Iterator[str]:
-    """Yield why the chain's driven joint is not the leg's."""
+def _driven_joint_breaches(leg: LegKind, motion: LegMotion) -> Iterator[str]:
+    """Yield the faults of the chain's driven joint."""
     row = _numbers(motion.row / motion.divisor)
     size = np.abs(row).max()
     if not size > 0.0:
@@ -101,7 +101,7 @@ def _driven(leg: LegKind, motion: LegMotion) -> Iterator[str]:
             "whose motion is the leg's coordinate (`Joint.driven`)"
         )
         return
-    if not np.abs(_numbers(driven[0].row) - row).max() <= _ALIKE * size:
+    if not np.abs(_numbers(driven[0].row) - row).max() <= _EQUAL * size:
         yield (
             f"the driven joint of a {leg.type} leg does not move as its coordinate does: "
             "`Joint.row` is not `LegMotion.row` over its divisor"

@@ -22,11 +22,11 @@ from pteron.bodies.motion import (
 )
 from pteron.bodies.vectors import Vector, cross, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
-from pteron.legs.cones import within
+from pteron.legs.cones import joint_limit
 from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
 from pteron.legs.kind import Quantity
 from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
-from pteron.legs.planar_links import Turning, last_joints, lower_link_body
+from pteron.legs.planar_links import LinkRotation, last_joints, lower_link_body
 from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
 
 
@@ -57,9 +57,9 @@ class PRR(SlideLeg):
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         # The branch keeps the link ahead of the slider along sigma e.
         ahead, link = self.elbow * ca.SX(list(self.slider_direction)), motion.links[1]
-        across = ca.cross(ca.SX(list(self.plane_normal)), ahead)
-        angle = ca.atan2(ca.dot(link, across), ca.dot(link, ahead))
-        return within("link", "rad", angle, self.elbow_limits, self.lower_length)
+        sideways = ca.cross(ca.SX(list(self.plane_normal)), ahead)
+        angle = ca.atan2(ca.dot(link, sideways), ca.dot(link, ahead))
+        return joint_limit("link", "rad", angle, self.elbow_limits, self.lower_length)
 
     def under(self, frame: Sequence[Vector]) -> Self:
         if self.direction is not None:
@@ -104,21 +104,21 @@ class PRREquations(SlideEquations):
         self.d = direction
         self.plane = plane_of(direction, plane_axis)
 
-    def counted(self, v: Expression) -> Expression:
+    def to_link_space(self, v: Expression) -> Expression:
         return ca.mtimes(self.plane.T, v)
 
-    def in_space(self, v: Expression) -> Expression:
+    def to_base_frame(self, v: Expression) -> Expression:
         return ca.mtimes(self.plane, v)
 
     def link(
         self, point: PointMotion, rotation: RotationMotion, at: SlideState, slider: Joint
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
-        """Return the link: b' = theta' d x b, whose part across e is that of c'."""
-        across = quarter_turn(self.counted(self.e)) / at.divisor
-        row = point_rows(self.in_space(across).T)
-        rate = ca.dot(across, self.counted(point.velocity))
-        pull = self.counted(point.acceleration) + rate * rate * at.b
-        turning = Turning(row, rate, ca.dot(across, pull))
+        """Return the link: b' = theta' d x b, whose component normal to e is that of c'."""
+        rate_row = quarter_turn(self.to_link_space(self.e)) / at.divisor
+        row = point_rows(self.to_base_frame(rate_row).T)
+        rate = ca.dot(rate_row, self.to_link_space(point.velocity))
+        pull = self.to_link_space(point.acceleration) + rate * rate * at.b
+        turning = LinkRotation(row, rate, ca.dot(rate_row, pull))
         body = lower_link_body(point, self.d, self.plane, at.b / self.ll, turning)
         tip = self.r + at.q * self.e
         joints = [
@@ -137,17 +137,17 @@ class PRREquations(SlideEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that slider and link need, with the part of the link's m gamma_y.
+        """Return the required forces of slider and link, with the term of the link's m gamma_y.
 
         With nu = m gamma_y / ll: nu d x (c'' - g) at the tip t, -nu d x (t'' - g) at the platform.
         """
-        along = super().needs(point, rotation, gravity, inertia)
+        needs_of_rod = super().needs(point, rotation, gravity, inertia)
         at, nu = self.state(point), inertia["l"].hy / self.ll
-        e, ddc, weight = (self.counted(v) for v in (self.e, point.acceleration, gravity))
-        joint = along.joint + ca.dot(e, quarter_turn(ddc - weight)) * nu
+        e, ddc, weight = (self.to_link_space(v) for v in (self.e, point.acceleration, gravity))
+        joint = needs_of_rod.joint + ca.dot(e, quarter_turn(ddc - weight)) * nu
         turned = quarter_turn(at.acceleration * e - weight)
-        force = along.point[:3, :] - self.in_space(ca.mtimes(turned, nu))
-        return Needs(joint, ca.vertcat(force, along.point[3:, :]), along.mass)
+        force = needs_of_rod.point[:3, :] - self.to_base_frame(ca.mtimes(turned, nu))
+        return Needs(joint, ca.vertcat(force, needs_of_rod.point[3:, :]), needs_of_rod.mass)
 
 
 PRR.equations_class = PRREquations

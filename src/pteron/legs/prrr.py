@@ -23,7 +23,7 @@ from pteron.bodies.motion import (
     RotationMotion,
     point_rows,
 )
-from pteron.bodies.vectors import Vector, dot, moved, parallel, vertical
+from pteron.bodies.vectors import Vector, dot, parallel, shift_point, vertical
 from pteron.errors import ModelError
 from pteron.legs.circles import (
     edges_of_reach,
@@ -34,7 +34,7 @@ from pteron.legs.circles import (
     random_triangle,
     squared_reach,
 )
-from pteron.legs.cones import between, within
+from pteron.legs.cones import angle_between, joint_limit
 from pteron.legs.crank import ELBOW
 from pteron.legs.drive import Drive
 from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
@@ -47,9 +47,9 @@ from pteron.legs.leg import (
     Passive,
     Plane,
     Reach,
-    on_point,
+    force_wrench,
 )
-from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
+from pteron.legs.planar_links import LinkRotation, last_joints, link_body, lower_link_body
 from pteron.legs.reading import Reading
 from pteron.legs.two_bar import two_bar_needs
 
@@ -123,15 +123,15 @@ class PRRR(LegKind):
         return (self.direction,) if axis is None else (self.direction, axis)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
-        angle = between(*motion.links)
-        return within("elbow", "rad", angle, self.elbow_limits, self.lower_length)
+        angle = angle_between(*motion.links)
+        return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
     @property
     def joint_axis(self) -> Vector:
         return self.e
 
     def zero_at(self, zero: float) -> dict[str, Any]:
-        return {"guide_point": moved(self.guide_point, self.e, zero)}
+        return {"guide_point": shift_point(self.guide_point, self.e, zero)}
 
     @property
     def reach_bound(self) -> ReachBound:
@@ -151,7 +151,7 @@ class PRRR(LegKind):
         }
 
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
-        found = [
+        transfer_list = [
             Transfer(
                 "slider and upper link{} move as one along the guide",
                 {("m", "u"): (1, ()), ("m", "p"): (-1, ())},
@@ -160,8 +160,8 @@ class PRRR(LegKind):
         ]
         if vertical(self.direction, gravity) and parallel(self.direction, self.e):
             reason = "no gravity and no slider acceleration acts across the upper link{}"
-            found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
-        return tuple(found)
+            transfer_list += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+        return tuple(transfer_list)
 
     @classmethod
     def closing(
@@ -171,15 +171,15 @@ class PRRR(LegKind):
         return random_triangle(values, rng)
 
 
-class _InPlane(NamedTuple):
+class _PlanarLinks(NamedTuple):
     """The links in the leg's plane, (2, 1), how they turn, and u''."""
 
     l_u: Expression
     l_l: Expression
     rows: tuple[Expression, Expression]
     """d theta_u / d u and d theta_l / d u, (2, 1)."""
-    upper: Turning
-    lower: Turning
+    upper: LinkRotation
+    lower: LinkRotation
     ddu: Expression
 
 
@@ -215,28 +215,28 @@ class PRRREquations(LegEquations):
             self.d_bar = direction / ca.dot(direction, slider_direction)
             self.e_plane = ca.mtimes(self.plane.T, slider_direction)
         self.constant_row = self.d_bar
-        # u = across (c - r) is the part of c - r - rho e in the plane: r + rho e + u = c.
-        self.across = self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)  # Eq. (3)
+        # u = projection (c - r) is the part of c - r - rho e in the plane: r + rho e + u = c.
+        self.projection = self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)  # Eq. (3)
 
-    def _state(self, point: PointMotion) -> _InPlane:
+    def _state(self, point: PointMotion) -> _PlanarLinks:
         """Return the links and their motion, in the leg's plane.
 
         theta_u' = l_l . u' / D and theta_l' = -l_u . u' / D. Differentiated, and with l_l . l_l =
         ll^2, theta_u'' = l_l . v / D and theta_l'' = -l_u . v / D, v = u'' + theta_u'^2 l_u +
         theta_l'^2 l_l.
         """
-        u = ca.mtimes(self.across, point.position - self.r)  # Eq. (5)
-        du, ddu = (ca.mtimes(self.across, v) for v in (point.velocity, point.acceleration))
+        u = ca.mtimes(self.projection, point.position - self.r)  # Eq. (5)
+        du, ddu = (ca.mtimes(self.projection, v) for v in (point.velocity, point.acceleration))
         l_u, l_l, inverse_d = links_from_triangle(self.lu, self.ll, self.sigma, u)  # Eqs. (6), (7)
         upper_row, lower_row = l_l * inverse_d, -(l_u * inverse_d)
         upper_rate, lower_rate = ca.dot(upper_row, du), ca.dot(lower_row, du)
         v = ddu + (upper_rate * upper_rate) * l_u + (lower_rate * lower_rate) * l_l
         rows = upper_row, lower_row
         upper, lower = (
-            Turning(point_rows(ca.mtimes(row.T, self.across)), rate, ca.dot(row, v))
+            LinkRotation(point_rows(ca.mtimes(row.T, self.projection)), rate, ca.dot(row, v))
             for row, rate in zip(rows, (upper_rate, lower_rate), strict=True)
         )
-        return _InPlane(l_u, l_l, rows, upper, lower, ddu)
+        return _PlanarLinks(l_u, l_l, rows, upper, lower, ddu)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self._state(point)
@@ -254,7 +254,7 @@ class PRRREquations(LegEquations):
         chain = (  # Eq. (9): the joints' screws times these rates
             Joint("P", self.e, self.r, row, rate, sliding, "p", driven=True),
             Joint("R", self.d, r1, *at.upper, "u"),
-            Joint("R", self.d, r1 + links[0], *at.lower.less(at.upper), "l"),
+            Joint("R", self.d, r1 + links[0], *at.lower.relative_to(at.upper), "l"),
             *last_joints(self.d, point, at.lower, rotation),  # Fig. 2, its R3 and R4
         )
         angles = tuple((link.rate, link.acceleration) for link in (at.upper, at.lower))
@@ -265,27 +265,27 @@ class PRRREquations(LegEquations):
         u = at.l_u + at.l_l
         delta = squared_reach(self.lu, self.ll, ca.dot(u, u))
         root = ca.sqrt(delta)
-        found = {"u": u, "n2": ca.dot(u, u), "delta": delta, "root": root, "ddu": at.ddu}
-        found |= {"inverse_d": -2 * self.sigma / root, "links_dot": ca.dot(at.l_u, at.l_l)}
+        terms = {"u": u, "n2": ca.dot(u, u), "delta": delta, "root": root, "ddu": at.ddu}
+        terms |= {"inverse_d": -2 * self.sigma / root, "links_dot": ca.dot(at.l_u, at.l_l)}
         v = at.ddu
         links = (("u", at.l_u, at.rows[0], at.upper), ("l", at.l_l, at.rows[1], at.lower))
         for letter, l_b, row, link in links:
-            found |= {f"theta_{letter}_row": row, f"theta_{letter}_rate": link.rate}
-            found[f"theta_{letter}_acceleration"] = link.acceleration
-            found[f"theta_{letter}_rate2"] = square = link.rate * link.rate
-            found[f"along_{letter}"] = ca.dot(l_b, at.ddu + square * l_b)
-            found[f"plane_{letter}"] = l_b
+            terms |= {f"theta_{letter}_row": row, f"theta_{letter}_rate": link.rate}
+            terms[f"theta_{letter}_acceleration"] = link.acceleration
+            terms[f"theta_{letter}_rate2"] = square = link.rate * link.rate
+            terms[f"along_{letter}"] = ca.dot(l_b, at.ddu + square * l_b)
+            terms[f"plane_{letter}"] = l_b
             v = v + square * l_b
-        return {**found, "v": v}
+        return {**terms, "v": v}
 
     def reach(self, c: Expression) -> Reach:
-        u = ca.mtimes(self.across, c - self.r)
+        u = ca.mtimes(self.projection, c - self.r)
         n, delta = ca.sqrt(ca.dot(u, u)), squared_reach(self.lu, self.ll, ca.dot(u, u))
         margin = ca.fmin(self.lu + self.ll - n, n - ca.fabs(self.lu - self.ll))
         return Reach(margin, delta, (2 * self.lu * self.ll) ** 2, n)
 
     def edges(self, c: Expression) -> dict[str, Expression]:
-        u = ca.mtimes(self.across, c - self.r)
+        u = ca.mtimes(self.projection, c - self.r)
         stretched, folded = edges_of_reach(self.lu, self.ll, ca.dot(u, u))
         return {"stretched": stretched, "folded": folded}
 
@@ -300,7 +300,7 @@ class PRRREquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that the bodies need, in the leg's plane.
+        """Return the required forces of the bodies, in the leg's plane.
 
         The moments of the links act through theta_u and theta_l, whose rows with respect to u turn
         them into a force tau; as u' is the part of c' - e rho' in the plane, tau acts on the point
@@ -311,36 +311,38 @@ class PRRREquations(LegEquations):
         weight = ca.mtimes(self.plane.T, gravity)
         masses = (slider.m + upper.m) * (sliding - ca.dot(self.e, gravity))  # Eq. (14), negated
         if lower.hx.is_zero():
-            u = [ca.mtimes(self.across, v) for v in (point.position - self.r, *point[1:])]
-            along, across = two_bar_needs(self, u, sliding, weight, (upper, lower))
+            u = [ca.mtimes(self.projection, v) for v in (point.position - self.r, *point[1:])]
+            slider_force, plane_force = two_bar_needs(self, u, sliding, weight, (upper, lower))
         else:
             at, on_r1 = self._state(point), sliding * self.e_plane - weight
-            along, across = self._link_needs(at, on_r1, upper, lower)
-        return Needs(masses + along, on_point(ca.mtimes(self.plane, across)), lower.m)
+            slider_force, plane_force = self._link_needs(at, on_r1, upper, lower)
+        return Needs(
+            masses + slider_force, force_wrench(ca.mtimes(self.plane, plane_force)), lower.m
+        )
 
     def riding(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
-        """Return what a mass on the platform point needs: what acts along d, the slider gives."""
+        """Return the force for a mass at the platform point; along d the slider exerts it."""
         a_g = point.acceleration - gravity
         slope = 1 if self.aligned else ca.dot(self.d, self.e)
-        across = ca.mtimes(self.plane, ca.mtimes(ca.mtimes(self.plane.T, a_g), mass))
+        plane_force = ca.mtimes(self.plane, ca.mtimes(ca.mtimes(self.plane.T, a_g), mass))
         none = ca.SX(1, mass.shape[1])
-        return Needs(slope * ca.dot(self.d, a_g) * mass, on_point(across), none)
+        return Needs(slope * ca.dot(self.d, a_g) * mass, force_wrench(plane_force), none)
 
     def _link_needs(
-        self, at: _InPlane, on_r1: Expression, upper: Moments, lower: Moments
+        self, at: _PlanarLinks, on_r1: Expression, upper: Moments, lower: Moments
     ) -> tuple[Expression, Expression]:
-        """Return what the links need along the slider, (1, K), and across R3, (2, K).
+        """Return the required forces of the links along the slider, (1, K), and at R3, (2, K).
 
         `on_r1` is a - g in the leg's plane on R1; on R3 it is u'' more.
         """
         h, dh = first_moment(at.l_u, upper.hx / self.lu, upper.hy / self.lu)
-        turning = at.upper.acceleration * dh - at.upper.rate**2 * h  # h'' of a turning vector
+        upper_force = at.upper.acceleration * dh - at.upper.rate**2 * h  # h'' of a turning vector
         upper_moment = at.upper.acceleration * upper.i + ca.mtimes(on_r1.T, dh)
         h, dh = first_moment(at.l_l, lower.hx / self.ll, lower.hy / self.ll)
-        across = at.lower.acceleration * dh - at.lower.rate**2 * h
+        lower_force = at.lower.acceleration * dh - at.lower.rate**2 * h
         lower_moment = at.lower.acceleration * lower.i + ca.mtimes((on_r1 + at.ddu).T, dh)
         tau = ca.mtimes(at.rows[0], upper_moment) + ca.mtimes(at.rows[1], lower_moment)
-        return ca.mtimes(self.e_plane.T, turning - tau), tau + across
+        return ca.mtimes(self.e_plane.T, upper_force - tau), tau + lower_force
 
 
 PRRR.equations_class = PRRREquations

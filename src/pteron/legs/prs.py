@@ -35,8 +35,8 @@ class PRS(PRR):
         return every_axis()
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
-        own = super().passive(motion, still, turned)
-        return [*own, *ball_cone(self.platform_cone, motion, turned, self.lower_length)]
+        inherited = super().passive(motion, still, turned)
+        return [*inherited, *ball_cone(self.platform_cone, motion, turned, self.lower_length)]
 
 
 class PRSEquations(PRREquations):

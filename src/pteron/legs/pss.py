@@ -53,7 +53,7 @@ class PSS(RodLeg, SlideLeg):
 
     @property
     def _counting_axis(self) -> Vector:
-        """The axis about which the joints of the rod are counted first: the bar of parallel rods.
+        """The first axis of the rod's universal joints: the bar of parallel rods.
 
         A single rod's is across the guide: universal joints about it are singular where the rod
         lies along it, and there the leg is singular anyway (type I).
@@ -75,7 +75,7 @@ class PSS(RodLeg, SlideLeg):
 
 
 class PSSEquations(SlideEquations):
-    """The equations of a P-S-S leg; its joints are counted about the bar and across it."""
+    """The equations of a P-S-S leg, with universal joints about the bar and normal to it."""
 
     kinds: ClassVar = {"p": PointMass.kinds, "l": RodInertia.kinds}
 
@@ -83,10 +83,10 @@ class PSSEquations(SlideEquations):
         super().__init__(**slide)
         self.bar = bar_direction
 
-    def counted(self, v: Expression) -> Expression:
+    def to_link_space(self, v: Expression) -> Expression:
         return v
 
-    def in_space(self, v: Expression) -> Expression:
+    def to_base_frame(self, v: Expression) -> Expression:
         return v
 
     def link(

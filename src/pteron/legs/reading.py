@@ -31,7 +31,7 @@ class Reading:
 
 
 def _not_zero(value: object, key: str) -> float:
-    found = number(value, key)
-    if found == 0.0:
+    converted = number(value, key)
+    if converted == 0.0:
         raise ModelError(f"{key}: 0 given, another number expected")
-    return found
+    return converted

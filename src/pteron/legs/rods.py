@@ -12,7 +12,7 @@ from pteron.bodies.inertia import RodInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector, parallel
 from pteron.legs.ball_end import ball_joint
-from pteron.legs.cones import Cone, within_cone
+from pteron.legs.cones import Cone, cone_limit
 from pteron.legs.kind import LegKind
 from pteron.legs.leg import Joint, LegMotion, Passive
 
@@ -34,7 +34,7 @@ class RodLeg(LegKind):
         """Return the axes of the body that carries the rod, by columns (3, 3)."""
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the axes about which rods let the platform turn; `axis` is its own, if it turns.
+        """Return the axes that the rods do not constrain; `axis` is the platform's, if it turns.
 
         Parallel rods keep the direction of the bar at their ends, on a hinge where the platform
         turns; a single rod keeps none. Without a bar direction in the file only `axis` is
@@ -65,8 +65,8 @@ class RodLeg(LegKind):
         socket = turned if self.rods == 1 and not any(self.fixed_offset) else still
         tip = self.tip_axes(motion)
         return [
-            *within_cone("rod at its tip", self.tip_cone, tip, rod, length),
-            *within_cone("rod at the platform", self.platform_cone, socket, -rod, length),
+            *cone_limit("rod at its tip", self.tip_cone, tip, rod, length),
+            *cone_limit("rod at the platform", self.platform_cone, socket, -rod, length),
         ]
 
     def rod_couple(self, motion: LegMotion) -> Expression:
@@ -96,7 +96,7 @@ class RodLeg(LegKind):
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:
-    """Return a rod in motion: its direction n towards the platform point, n'' and the row of n'.
+    """Return a rod's motion from its direction n towards the platform point, n'' and the row of n'.
 
     `swing` is (3, 6). The rod's angular velocity is n x n', its reference point the platform point.
     """
@@ -112,34 +112,34 @@ def universal_joints(
     swing: Expression,
     direction: tuple[Expression, Expression, Expression],
     rotation: RotationMotion,
-    before: Joint | None = None,
+    preceding: Joint | None = None,
     body: str = "l",
 ) -> list[Joint]:
-    """Return the universal joints at a rod's ends, tip and c: about d, and about d x n across it.
+    """Return the universal joints at a rod's ends, tip and c: about d, and about d x n.
 
     A hinge about each axis of the platform's rotation follows; where the platform tilts the joint
     at c is a ball joint.
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 6) is
-    the row of n'; `before` is a joint about d that turns the tip's side, such as a crank's. `body`
-    is the rod's letter.
+    the row of n'; `preceding` is a joint about d that rotates the tip's body, such as a crank's.
+    `body` is the rod's letter.
     """
     c, (n, dn, ddn) = point.position, direction
-    across, turning = ca.cross(d, n), ca.cross(d, dn)
-    square = ca.dot(across, across)
-    size, growth = ca.sqrt(square), ca.dot(across, turning) / square
-    alpha, beta = ca.dot(dn, across) / square, -ca.dot(dn, d) / size
+    normal, turning = ca.cross(d, n), ca.cross(d, dn)
+    square = ca.dot(normal, normal)
+    size, growth = ca.sqrt(square), ca.dot(normal, turning) / square
+    alpha, beta = ca.dot(dn, normal) / square, -ca.dot(dn, d) / size
     about_d = (
-        ca.mtimes(across.T, swing) / square,
+        ca.mtimes(normal.T, swing) / square,
         alpha,
-        ca.dot(ddn, across) / square - 2 * alpha * growth,
+        ca.dot(ddn, normal) / square - 2 * alpha * growth,
     )
     about_e = (-ca.mtimes(d.T, swing) / size, beta, -ca.dot(ddn, d) / size - beta * growth)
     knee = about_d
-    if before is not None:
-        knee = tuple(a - b for a, b in zip(about_d, before[3:6], strict=True))
-    axis = across / size
+    if preceding is not None:
+        knee = tuple(a - b for a, b in zip(about_d, preceding[3:6], strict=True))
+    axis = normal / size
     ends = [Joint("R", d, tip, *knee), Joint("R", axis, tip, *about_e, body)]
     if rotation.tilts:
         rod = (

@@ -26,8 +26,8 @@ from pteron.legs.circles import (
 )
 from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.kind import Quantity, Transfer
-from pteron.legs.leg import Circle, Joint, LegEquations, LegMotion, Needs, Reach, on_point
-from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
+from pteron.legs.leg import Circle, Joint, LegEquations, LegMotion, Needs, Reach, force_wrench
+from pteron.legs.planar_links import LinkRotation, last_joints, link_body, lower_link_body
 from pteron.legs.ram import RamLeg
 
 
@@ -69,7 +69,7 @@ class RPR(RamLeg):
         return (self.plane_normal,)
 
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
-        found = [
+        transfer_list = [
             Transfer("the cylinder{} turns about a fixed axis", {("m", "u"): (1, ())}),
             Transfer(
                 "cylinder and piston{} turn alike", {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
@@ -77,8 +77,8 @@ class RPR(RamLeg):
         ]
         if vertical(self.plane_normal, gravity):
             reason = "no gravity acts across the axis of the cylinder{}"
-            found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
-        return tuple(found)
+            transfer_list += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+        return tuple(transfer_list)
 
     @classmethod
     def closing(
@@ -100,7 +100,7 @@ class _Ram(NamedTuple):
     """Its direction, (2, 1)."""
     rate: Expression
     """L'."""
-    turning: Turning
+    turning: LinkRotation
     growth: Expression
     """L''."""
 
@@ -134,15 +134,15 @@ class RPREquations(LegEquations):
         y = quarter_turn(n)
         rate, swing = ca.dot(n, dw), ca.dot(y, dw) / length
         row = point_rows(ca.mtimes(self.plane, y / length).T)
-        turning = Turning(row, swing, (ca.dot(y, ddw) - 2 * rate * swing) / length)
+        turning = LinkRotation(row, swing, (ca.dot(y, ddw) - 2 * rate * swing) / length)
         return _Ram(w, length, n, rate, turning, ca.dot(n, ddw) + length * swing * swing)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self._ram(point)
         n = ca.mtimes(self.plane, at.n)
-        row, still = point_rows(n.T), (self.r, ca.SX(3, 6), ca.SX(3, 1))
+        row, fixed = point_rows(n.T), (self.r, ca.SX(3, 6), ca.SX(3, 1))
         bodies = {
-            "u": link_body(still, self.d, self.plane, at.n, at.turning),
+            "u": link_body(fixed, self.d, self.plane, at.n, at.turning),
             "l": lower_link_body(point, self.d, self.plane, at.n, at.turning),
         }
         chain = (
@@ -152,9 +152,9 @@ class RPREquations(LegEquations):
         )
         links = None, ca.mtimes(self.plane, at.w)
         turns = ((at.turning.rate, at.turning.acceleration),) * 2
-        one = ca.SX(1)
+        unit = ca.SX(1)
         return LegMotion(
-            at.length, at.rate, at.growth, row, one, bodies, chain, links, turns, row_size=one
+            at.length, at.rate, at.growth, row, unit, bodies, chain, links, turns, row_size=unit
         )
 
     def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
@@ -177,7 +177,7 @@ class RPREquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that cylinder and piston need: all of them at the platform point.
+        """Return the required forces of cylinder and piston, all at the platform point.
 
         With h and dh = d x h their first moments, it is the force h_l'' of the piston and y / L
         times (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, beside that of the mass at the point.
@@ -185,12 +185,12 @@ class RPREquations(LegEquations):
         at, upper, lower = self._ram(point), inertia["u"], inertia["l"]
         ddc, weight = (ca.mtimes(self.plane.T, v) for v in (point.acceleration, gravity))
         swing, growth = at.turning.rate, at.turning.acceleration
-        _, held = first_moment(at.n, upper.hx, upper.hy)
+        _, dh_upper = first_moment(at.n, upper.hx, upper.hy)
         h, dh = first_moment(at.n, lower.hx, lower.hy)
-        moment = growth * (upper.i + lower.i) - ca.mtimes(weight.T, held)
+        moment = growth * (upper.i + lower.i) - ca.mtimes(weight.T, dh_upper)
         moment += ca.mtimes((ddc - weight).T, dh)
         force = growth * dh - swing * swing * h + ca.mtimes(quarter_turn(at.n) / at.length, moment)
-        return Needs(ca.SX(1, force.shape[1]), on_point(ca.mtimes(self.plane, force)), lower.m)
+        return Needs(ca.SX(1, force.shape[1]), force_wrench(ca.mtimes(self.plane, force)), lower.m)
 
 
 RPR.equations_class = RPREquations

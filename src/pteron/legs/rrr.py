@@ -14,11 +14,11 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_triangle
-from pteron.legs.cones import between, within
+from pteron.legs.cones import angle_between, joint_limit
 from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
 from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
 from pteron.legs.leg import Circle, Joint, LegMotion, Passive
-from pteron.legs.planar_links import Turning, last_joints, lower_link_body
+from pteron.legs.planar_links import LinkRotation, last_joints, lower_link_body
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ class RRR(CrankLeg):
         return (self.direction,)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
-        angle = between(*motion.links)
-        return within("elbow", "rad", angle, self.elbow_limits, self.lower_length)
+        angle = angle_between(*motion.links)
+        return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
     @property
     def plane_normal(self) -> Vector:
@@ -71,10 +71,10 @@ class RRREquations(CrankEquations):
 
     kinds: ClassVar = {"u": PlanarInertia.kinds, "l": PlanarInertia.kinds}
 
-    def counted(self, v: Expression) -> Expression:
+    def to_link_space(self, v: Expression) -> Expression:
         return ca.mtimes(self.plane.T, v)
 
-    def within(self, v: Expression) -> Expression:
+    def plane_to_link_space(self, v: Expression) -> Expression:
         return v
 
     def height(self, w: Expression) -> Expression:
@@ -87,16 +87,16 @@ class RRREquations(CrankEquations):
 
         With v = u'' + theta_u'^2 l_u + theta_l'^2 b; D = b . g.
         """
-        du, ddu = self.counted(point.velocity), self.counted(point.acceleration)
-        along = -at.l_u / at.divisor
-        rate = ca.dot(along, du)
+        du, ddu = self.to_link_space(point.velocity), self.to_link_space(point.acceleration)
+        rate_row = -at.l_u / at.divisor
+        rate = ca.dot(rate_row, du)
         v = ddu + at.rate * at.rate * at.l_u + rate * rate * at.b
-        row = point_rows(ca.mtimes(self.plane, along).T)
-        lower = Turning(row, rate, ca.dot(along, v))
-        upper = Turning(crank.row, crank.rate, crank.acceleration)
+        row = point_rows(ca.mtimes(self.plane, rate_row).T)
+        lower = LinkRotation(row, rate, ca.dot(rate_row, v))
+        upper = LinkRotation(crank.row, crank.rate, crank.acceleration)
         body = lower_link_body(point, self.d, self.plane, at.b / self.ll, lower)
         elbow = self.r + ca.mtimes(self.plane, at.l_u)
-        knee = Joint("R", self.d, elbow, *lower.less(upper), "l")
+        knee = Joint("R", self.d, elbow, *lower.relative_to(upper), "l")
         joints = [knee, *last_joints(self.d, point, lower, rotation)]
         return body, joints, (lower.rate, lower.acceleration)
 

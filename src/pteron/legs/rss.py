@@ -88,10 +88,10 @@ class RSSEquations(CrankEquations):
 
     kinds: ClassVar = {"u": PlanarInertia.kinds, "l": RodInertia.kinds}
 
-    def counted(self, v: Expression) -> Expression:
+    def to_link_space(self, v: Expression) -> Expression:
         return v
 
-    def within(self, v: Expression) -> Expression:
+    def plane_to_link_space(self, v: Expression) -> Expression:
         return ca.mtimes(self.plane, v)
 
     def height(self, w: Expression) -> Expression:

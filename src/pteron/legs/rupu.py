@@ -20,11 +20,20 @@ from pteron.bodies.motion import Expression, Moments, PointMotion, RotationMotio
 from pteron.bodies.vectors import Vector, dot, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
-from pteron.legs.cones import within
+from pteron.legs.cones import joint_limit
 from pteron.legs.drive import Drive
 from pteron.legs.keys import ACCOUNTS, Condition, keys_of
 from pteron.legs.kind import SHAFT, LegKind, Quantity, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned, on_point
+from pteron.legs.leg import (
+    Joint,
+    LegEquations,
+    LegMotion,
+    Needs,
+    Passive,
+    Reach,
+    Turned,
+    force_wrench,
+)
 from pteron.legs.reading import Reading
 from pteron.legs.rods import rod_body, universal_joints
 
@@ -78,15 +87,15 @@ class RUPU(LegKind):
         axis = frame[2]
         if self.direction is None:
             return replace(self, direction=axis)
-        given = f"direction: {list(self.direction)}"
+        text = f"direction: {list(self.direction)}"
         if not parallel(self.direction, axis):
             raise ModelError(
-                f"{given} is not along the platform's axis {list(axis)}, about which a shaft turns "
+                f"{text} is not along the platform's axis {list(axis)}, about which a shaft turns "
                 "it; leave direction out"
             )
         if dot(self.direction, axis) < 0.0:
             raise ModelError(
-                f"{given} is the platform's axis {list(axis)} reversed; leave direction out, and "
+                f"{text} is the platform's axis {list(axis)} reversed; leave direction out, and "
                 "give a negative ratio where the joint's angle counts the other way"
             )
         return self
@@ -106,7 +115,7 @@ class RUPU(LegKind):
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
-        return within("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
+        return joint_limit("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         if not 1.0 / _FAST <= abs(self.ratio) <= _FAST:
@@ -134,13 +143,15 @@ class RUPU(LegKind):
 
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
         swing = {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
-        found = [
+        transfer_list = [
             Transfer("the shaft{} swings about a fixed point", {("m", "u"): (1, ())}),
             Transfer("both parts of the shaft{} swing alike", swing),
         ]
         if not any(gravity):
-            found.append(Transfer("no gravity acts on the shaft{}", {("mgx", "u"): (1, ())}))
-        return tuple(found)
+            transfer_list.append(
+                Transfer("no gravity acts on the shaft{}", {("mgx", "u"): (1, ())})
+            )
+        return tuple(transfer_list)
 
     @classmethod
     def closing(
@@ -175,35 +186,41 @@ class RUPUEquations(LegEquations):
         dn = (point.velocity - rate * n) / length
         growth = ca.dot(n, point.acceleration) + length * ca.dot(dn, dn)
         ddn = (point.acceleration - growth * n - 2 * rate * dn) / length
-        along, rides = point_rows(n.T), point_rows(ca.SX.eye(3))
-        swing = (rides - ca.mtimes(n, along)) / length
+        axial_row, rides = point_rows(n.T), point_rows(ca.SX.eye(3))
+        swing = (rides - ca.mtimes(n, axial_row)) / length
 
         row = self.ratio * turn.row
-        turned = self.ratio * turn.rate, self.ratio * turn.acceleration
+        joint_motion = self.ratio * turn.rate, self.ratio * turn.acceleration
         upper = rod_body(PointMotion(self.r, ca.SX(3, 1), ca.SX(3, 1)), n, ddn, swing)
         bodies = {"u": upper._replace(velocity_row=ca.SX(3, 6))}
         bodies["l"] = rod_body(point, n, ddn, swing)
 
-        # The shaft turns at its base; what turns the platform has its axis at the platform's end.
+        # The shaft turns at its base; the axis about which it turns the platform is at P.
         joint = Joint(
             "R",
             self.d,
             rotation.center(point),
             row,
-            *turned,
+            *joint_motion,
             driven=True,
             gear=self.ratio,
             seat=self.r,
         )
-        swung = (n, dn, ddn)
+        direction = (n, dn, ddn)
         *hinges, last = universal_joints(
-            self.hinge, self.r, point, swing, swung, rotation, body="u"
+            self.hinge, self.r, point, swing, direction, rotation, body="u"
         )
-        telescope = Joint("P", n, self.r, along, rate, growth, "l")
+        telescope = Joint("P", n, self.r, axial_row, rate, growth, "l")
         gear = (last.row - row, last.rate - joint.rate, last.acceleration - joint.acceleration)
         chain = (joint, *hinges[:2], telescope, *hinges[2:], Joint("R", self.d, last.point, *gear))
         return LegMotion(
-            self.ratio * rotation.angle, *turned, row, ca.SX(1), bodies, chain, links=(None, w)
+            self.ratio * rotation.angle,
+            *joint_motion,
+            row,
+            ca.SX(1),
+            bodies,
+            chain,
+            links=(None, w),
         )
 
     def needs(
@@ -213,7 +230,7 @@ class RUPUEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that both parts need: all of them at the platform point.
+        """Return the required forces of both parts, all at the platform point.
 
         With mu = (I_u + I_l) / L^2, eta = m gamma_x / L of the lower part and nu that of the upper,
         kappa = L' / L and P = 1 - n n^T, they are P v - 2 kappa (mu + eta) P c' - eta (n'.n') w
@@ -227,9 +244,9 @@ class RUPUEquations(LegEquations):
         swing = mu + eta
         v = ca.mtimes(ddc, swing + eta) - ca.mtimes(gravity, eta + nu)
         turning = ca.dot(dc, dc) - kappa * forward  # L^2 n'.n'
-        along = (ca.mtimes(w.T, v) + turning * eta) / square - 2 * kappa * kappa * swing
-        force = v - ca.mtimes(w, along) - ca.mtimes(dc, 2 * kappa * swing)
-        return Needs(ca.SX(1, swing.shape[1]), on_point(force), inertia["l"].m)
+        axial_share = (ca.mtimes(w.T, v) + turning * eta) / square - 2 * kappa * kappa * swing
+        force = v - ca.mtimes(w, axial_share) - ca.mtimes(dc, 2 * kappa * swing)
+        return Needs(ca.SX(1, swing.shape[1]), force_wrench(force), inertia["l"].m)
 
     def reach(self, c: Expression) -> Reach:
         w = c - self.r

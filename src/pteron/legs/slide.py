@@ -23,17 +23,17 @@ from pteron.bodies.motion import (
     RotationMotion,
     point_rows,
 )
-from pteron.bodies.vectors import Vector, moved
+from pteron.bodies.vectors import Vector, shift_point
 from pteron.legs.circles import random_fraction
 from pteron.legs.drive import Drive
 from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, force_wrench
 from pteron.legs.reading import Reading
 
 
 @dataclass(frozen=True)
 class SlideLeg(LegKind):
-    """The data of a leg with a slider and one link; its kinds say what the link is."""
+    """The data of a leg with a slider and one link; its subclasses define the link."""
 
     guide_point: Vector
     slider_direction: Vector
@@ -55,7 +55,7 @@ class SlideLeg(LegKind):
         return self.slider_direction
 
     def zero_at(self, zero: float) -> dict[str, Any]:
-        return {"guide_point": moved(self.guide_point, self.slider_direction, zero)}
+        return {"guide_point": shift_point(self.guide_point, self.slider_direction, zero)}
 
     @property
     def reach_bound(self) -> ReachBound:
@@ -102,7 +102,7 @@ class SlideState(NamedTuple):
     """Slider and link in motion."""
 
     w: Expression
-    """c - r as the link counts it: (3, 1), or (2, 1) in the plane."""
+    """c - r in the link's space: (3, 1), or (2, 1) in the plane."""
     q: Expression
     b: Expression
     """The link, as w."""
@@ -128,12 +128,12 @@ class SlideEquations(LegEquations):
         self.ll, self.sigma = lower_length, elbow
 
     @abstractmethod
-    def counted(self, v: Expression) -> Expression:
-        """Return a vector (3, K) as the link's length has it: whole, or (2, K) in its plane."""
+    def to_link_space(self, v: Expression) -> Expression:
+        """Return a vector (3, K) in the link's space: itself, or (2, K) in the link's plane."""
 
     @abstractmethod
-    def in_space(self, v: Expression) -> Expression:
-        """Return a vector that `counted` gave, in the base frame."""
+    def to_base_frame(self, v: Expression) -> Expression:
+        """Return a vector of the link's space in the base frame (3, K)."""
 
     @abstractmethod
     def link(
@@ -143,22 +143,22 @@ class SlideEquations(LegEquations):
         at: SlideState,
         slider: Joint,
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
-        """Return the link in motion, the joints after the slider, and how the link turns."""
+        """Return the link's motion, the joints after the slider, the link's rate and growth."""
 
-    def _closed(self, c: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return w, h = w . e and ll^2 - |w - h e|^2, where the guide is far from c by the last."""
-        w, e = self.counted(c - self.r), self.counted(self.e)
+    def _closure_terms(self, c: Expression) -> tuple[Expression, Expression, Expression]:
+        """Return w, h = w . e and ll^2 - |w - h e|^2, with |w - h e| the distance c to guide."""
+        w, e = self.to_link_space(c - self.r), self.to_link_space(self.e)
         h = ca.dot(w, e)
-        across = w - h * e
-        return w, h, self.ll * self.ll - ca.dot(across, across)
+        perpendicular = w - h * e
+        return w, h, self.ll * self.ll - ca.dot(perpendicular, perpendicular)
 
     def state(self, point: PointMotion) -> SlideState:
-        """Return slider and link and how the slider moves.
+        """Return slider, link, and the slider's rate and acceleration.
 
         (b . e) q' = b . c'. Differentiated, (b . e) q'' = b . c'' + b' . b'.
         """
-        e, dw, ddw = (self.counted(v) for v in (self.e, point.velocity, point.acceleration))
-        w, h, square = self._closed(point.position)
+        e, dw, ddw = (self.to_link_space(v) for v in (self.e, point.velocity, point.acceleration))
+        w, h, square = self._closure_terms(point.position)
         divisor = self.sigma * ca.sqrt(square)  # b . e
         q = h - divisor
         b = w - q * e
@@ -168,7 +168,7 @@ class SlideEquations(LegEquations):
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self.state(point)
-        b = self.in_space(at.b)
+        b = self.to_base_frame(at.b)
         full = point_rows(b.T)
         row = full / at.divisor
         slider = Joint("P", self.e, self.r, row, at.rate, at.acceleration, "p", driven=True)
@@ -189,11 +189,11 @@ class SlideEquations(LegEquations):
         )
 
     def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        w, h, square = self._closed(point.position)
+        w, h, square = self._closure_terms(point.position)
         return {"w": w, "h": h, "square": square, "root": ca.sqrt(square), "b": self.state(point).b}
 
     def reach(self, c: Expression) -> Reach:
-        _, _, square = self._closed(c)
+        _, _, square = self._closure_terms(c)
         far = ca.sqrt(self.ll * self.ll - square)
         return Reach(self.ll - far, square, self.ll * self.ll, self.ll)
 
@@ -204,14 +204,14 @@ class SlideEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that slider and link need: the latter's at its ends.
+        """Return the required forces of slider and link, the latter's at its ends.
 
         With eta = m gamma_x / ll and mu = I / ll^2 of the link, alpha = eta + mu and t the tip, the
         tip needs mu t'' - alpha c'' + eta g and the platform point alpha (g - t'') beside a mass
         m + eta + alpha that rides.
         """
         at, slider, lower = self.state(point), inertia["p"], inertia["l"]
-        e, ddc, weight = (self.counted(v) for v in (self.e, point.acceleration, gravity))
+        e, ddc, weight = (self.to_link_space(v) for v in (self.e, point.acceleration, gravity))
         eta, mu = lower.hx / self.ll, lower.i / (self.ll * self.ll)
         alpha = eta + mu
         joint = (
@@ -219,5 +219,5 @@ class SlideEquations(LegEquations):
             - ca.dot(e, ddc) * alpha
             + ca.dot(e, weight) * (eta - slider.m)
         )
-        force = self.in_space(ca.mtimes(weight - at.acceleration * e, alpha))
-        return Needs(joint, on_point(force), lower.m + eta + alpha)
+        force = self.to_base_frame(ca.mtimes(weight - at.acceleration * e, alpha))
+        return Needs(joint, force_wrench(force), lower.m + eta + alpha)

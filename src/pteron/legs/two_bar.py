@@ -1,9 +1,9 @@
-"""The forces that the two links of a P-R-R-R leg need, in the cheapest form known.
+"""The required forces of the two links of a P-R-R-R leg, in the cheapest form known.
 
 The lower link's m and m gamma_x are two masses at its ends, so they may join the upper link, the
-slider and the platform; what is left of it is a moment of inertia I_l and the first moment across
-the link, m gamma_y. With links l_u + l_l = u, a leg's kinetic energy is then, but for masses that
-move with its first and last revolute joint, R1 and R3,
+slider and the platform; a moment of inertia I_l and the first moment normal to the link, m gamma_y,
+remain. With links l_u + l_l = u, a leg's kinetic energy is then, except for masses that move with
+its first and last revolute joint, R1 and R3,
 
     T = I_u theta_u'^2 / 2  +  I_l theta_l'^2 / 2  -  eta D theta_u' theta_l',
 
@@ -44,7 +44,7 @@ def two_bar_needs(
     gravity: Expression,
     inertia: tuple[Moments, Moments],
 ) -> tuple[Expression, Expression]:
-    """Return the forces that a leg's links need along the slider, (1, K), and across R3, (2, K).
+    """Return the required forces of a leg's links along the slider, (1, K), and at R3, (2, K).
 
     `u` is u, u' and u'', `sliding` is rho'', `gravity` its part in the plane. The lower link's
     m gamma_x must be zero; the masses of both links are left out, for others to add.
@@ -66,21 +66,21 @@ def two_bar_needs(
     upper_acceleration = (along_lower + c * upper_rate2) * inverse_d
     lower_acceleration = (along_upper + c * lower_rate2) * inverse_d
 
-    # Both first moments are h = x l_u + v d x l_u + eta d x u; E and G are what e and gravity do
-    # to its part that turns with the upper link.
+    # Both first moments are h = x l_u + v d x l_u + eta d x u; `slide_vector` and `gravity_vector`
+    # are the projections of e and gravity on the part that turns with the upper link.
     eta, x = lower.hy / leg.ll, upper.hx / leg.lu
     v = upper.hy / leg.lu - eta
     turned = quarter_turn(l_u)
-    along, down = (
+    slide_vector, gravity_vector = (
         ca.mtimes(vector, x) - ca.mtimes(quarter_turn(vector), v)
         for vector in (leg.e_plane, gravity)
     )
-    along_e, across_e = ca.mtimes(l_u.T, along), ca.mtimes(turned.T, along)
+    along_e, across_e = ca.mtimes(l_u.T, slide_vector), ca.mtimes(turned.T, slide_vector)
     upper_moment = (
         upper.i * upper_acceleration
         + eta * along_upper
         + sliding * across_e
-        - ca.mtimes(turned.T, down)
+        - ca.mtimes(turned.T, gravity_vector)
     )
     lower_moment = lower.i * lower_acceleration + eta * along_lower
     tau = (

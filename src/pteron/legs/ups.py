@@ -25,10 +25,19 @@ from pteron.bodies.motion import (
 )
 from pteron.bodies.vectors import Vector, dot
 from pteron.legs.circles import random_fraction, random_vector
-from pteron.legs.cones import Cone, within_cone
+from pteron.legs.cones import Cone, cone_limit
 from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.kind import Quantity, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Sphere, on_point
+from pteron.legs.leg import (
+    Joint,
+    LegEquations,
+    LegMotion,
+    Needs,
+    Passive,
+    Reach,
+    Sphere,
+    force_wrench,
+)
 from pteron.legs.ram import RamLeg
 from pteron.legs.rods import rod_body, universal_joints
 
@@ -80,8 +89,8 @@ class UPS(RamLeg):
         (_, way), length = motion.links, self.limits[1]
         assert way is not None
         return [
-            *within_cone("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
-            *within_cone("ram at the platform", self.platform_cone, turned, -way, length),
+            *cone_limit("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
+            *cone_limit("ram at the platform", self.platform_cone, turned, -way, length),
         ]
 
     def rod_couple(self, motion: LegMotion) -> Expression:
@@ -147,11 +156,11 @@ class UPSEquations(LegEquations):
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self._ram(point)
-        row, one = point_rows(at.n.T), ca.SX(1)
+        row, unit = point_rows(at.n.T), ca.SX(1)
         turning = ca.mtimes(ca.skew(at.n), at.swing)
-        still = self.r, ca.SX(3, 6), ca.SX(3, 1)
+        fixed = self.r, ca.SX(3, 6), ca.SX(3, 1)
         bodies = {
-            "u": BodyMotion(*still, ca.SX.eye(3), turning, at.n, ddx=at.ddn),
+            "u": BodyMotion(*fixed, ca.SX.eye(3), turning, at.n, ddx=at.ddn),
             "l": rod_body(point, at.n, at.ddn, at.swing),
         }
         directions = at.n, at.dn, at.ddn
@@ -160,7 +169,7 @@ class UPSEquations(LegEquations):
         chain = (*joints[:2], ram, *joints[2:])
         links = None, point.position - self.r
         return LegMotion(
-            at.length, at.rate, at.growth, row, one, bodies, chain, links, row_size=one
+            at.length, at.rate, at.growth, row, unit, bodies, chain, links, row_size=unit
         )
 
     def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
@@ -183,7 +192,7 @@ class UPSEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that cylinder and piston need: along the ram at the joint.
+        """Return the required forces of cylinder and piston; those along the ram at the joint.
 
         With P_n = 1 - n n^T, beside the mass that rides: m gamma_l n'' + P_n ((I_u + I_l) n'' - m
         gamma_u g + m gamma_l (c'' - g)) / L. As P_n n'' = P_n (c'' - 2 L'/L c') / L that is P_n x -
@@ -197,7 +206,7 @@ class UPSEquations(LegEquations):
         x = ca.mtimes(point.acceleration, growth + lower.hx * inverse)
         x -= ca.mtimes(point.velocity, (2 * rate * inverse) * growth)
         x -= ca.mtimes(gravity, (upper.hx + lower.hx) * inverse)
-        return Needs(-ca.mtimes(n.T, x) - swing * lower.hx, on_point(x), lower.m)
+        return Needs(-ca.mtimes(n.T, x) - swing * lower.hx, force_wrench(x), lower.m)
 
 
 UPS.equations_class = UPSEquations

@@ -7,7 +7,6 @@ from pteron.public import publish as _publish
 if TYPE_CHECKING:
     from pteron.manipulator.dimensions import with_dimensions as with_dimensions
     from pteron.manipulator.files import catalog as catalog, load as load
-    from pteron.manipulator.given import RobotLike as RobotLike, as_manipulator as as_manipulator
     from pteron.manipulator.manipulator import (
         STANDARD_GRAVITY as STANDARD_GRAVITY,
         Manipulator as Manipulator,
@@ -20,6 +19,10 @@ if TYPE_CHECKING:
         with_parameters as with_parameters,
     )
     from pteron.manipulator.radii import Radii as Radii
+    from pteron.manipulator.robot_like import (
+        RobotLike as RobotLike,
+        as_manipulator as as_manipulator,
+    )
     from pteron.manipulator.saving import save as save
     from pteron.manipulator.tool import Tool as Tool
     from pteron.manipulator.variants import turned as turned, working_modes as working_modes

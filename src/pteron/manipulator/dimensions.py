@@ -13,8 +13,8 @@ import numpy as np
 from pteron.bodies.vectors import Vector, interval, positive, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
-from pteron.manipulator.given import RobotLike, as_manipulator
 from pteron.manipulator.manipulator import Manipulator
+from pteron.manipulator.robot_like import RobotLike, as_manipulator
 from pteron.manipulator.stretched_links import with_stretched_bodies
 
 _DENSITIES = {"steel": 7850.0, "aluminium": 2700.0, "carbon": 1600.0}
@@ -40,34 +40,34 @@ class Stock:
     inner: float = 0.0
 
     @classmethod
-    def of(cls, text: str) -> Self:
-        """Read it from a text such as aluminium-tube:30x2 or steel-rod:8, mm.
+    def parse(cls, text: str) -> Self:
+        """Return the stock of a text such as aluminium-tube:30x2 or steel-rod:8, mm.
 
         Examples
         --------
         >>> from pteron.manipulator.dimensions import Stock
-        >>> Stock.of("aluminium-tube:30x2")
+        >>> Stock.parse("aluminium-tube:30x2")
         Stock(density=2700.0, outer=0.03, inner=0.026)
         """
-        found = _STOCK.fullmatch(text)
-        if found is None or found[1] not in _DENSITIES:
+        match = _STOCK.fullmatch(text)
+        if match is None or match[1] not in _DENSITIES:
             raise ModelError(
                 f"{text!r} is no stock; MATERIAL-tube:DIAMETERxWALL or MATERIAL-rod:DIAMETER in mm "
                 f"expected, of {', '.join(_DENSITIES)}, such as aluminium-tube:30x2"
             )
-        outer = positive(found[2] or found[4], "diameter", "mm")
-        wall = positive(found[3], "wall", "mm") if found[3] else outer / 2.0
+        outer = positive(match[2] or match[4], "diameter", "mm")
+        wall = positive(match[3], "wall", "mm") if match[3] else outer / 2.0
         if 2.0 * wall > outer:
             raise ModelError(f"{text}: a wall of {wall:g} mm is more than half of {outer:g} mm")
-        return cls(_DENSITIES[found[1]], outer / 1e3, round(outer - 2.0 * wall, 9) / 1e3)
+        return cls(_DENSITIES[match[1]], outer / 1e3, round(outer - 2.0 * wall, 9) / 1e3)
 
     def link(self, kind: Any, low: float, high: float, count: int = 1) -> Any:
         """Return the inertia of a link, or several alike, from x = low to high of its frame."""
         length, squares = high - low, self.outer**2 + self.inner**2
         area = math.pi / 4.0 * (self.outer**2 - self.inner**2)
         mass, middle = count * self.density * area * length, (low + high) / 2.0
-        about = mass * (3.0 * squares / 4.0 + length**2) / 12.0 + mass * middle**2
-        return kind.of_body(mass, (middle, 0.0)[: len(kind.kinds) - 2], about)
+        inertia = mass * (3.0 * squares / 4.0 + length**2) / 12.0 + mass * middle**2
+        return kind.of_body(mass, (middle, 0.0)[: len(kind.kinds) - 2], inertia)
 
 
 def with_dimensions(
@@ -83,10 +83,9 @@ def with_dimensions(
 ) -> Manipulator:
     """Return a machine of the same kind with other dimensions, which hold for all of its legs.
 
-    Links of another length keep their section, unless a stock says what they are cut from; so do
-    a ram's cylinder and piston, which are as long as its shortest length. Limits
-    of joints, and the platform's mass and inertia, stay unless they are given. A home that the file
-    names is left out where lengths or limits change.
+    Links of another length keep their section unless `stock` is given; so do a ram's cylinder and
+    piston, which are as long as its shortest length. Limits of joints, and the platform's mass and
+    inertia, are unchanged unless given. The file's home is omitted where lengths or limits change.
 
     Parameters
     ----------
@@ -102,7 +101,7 @@ def with_dimensions(
     limits : (float, float), optional
         Least and greatest joint coordinate: of rams the length, m.
     stock : mapping, optional
-        What links are cut from, by their key, ``upper`` or ``lower``: see `Stock.of`.
+        What links are cut from, by their key, ``upper`` or ``lower``: see `Stock.parse`.
     platform_mass : float, optional
         Of the platform with its bars, kg: its inertia changes by the same factor.
 
@@ -125,20 +124,24 @@ def with_dimensions(
     0.1167
     """
     robot = as_manipulator(robot)
-    if any(value is not None for value in (base_radius, platform_radius, crank, rod, limits)):
+    if any(
+        dimension is not None for dimension in (base_radius, platform_radius, crank, rod, limits)
+    ):
         robot = replace(robot, home=None)
     if base_radius is not None:
         robot = _with_base(robot, positive(base_radius, "base_radius", "m"))
     if platform_radius is not None:
         robot = _with_platform(robot, positive(platform_radius, "platform_radius", "m"))
-    for name, body, value in (("crank", "upper", crank), ("rod", "lower", rod)):
-        if value is not None:
-            robot = _with_length(robot, name, body, positive(value, name, "m"))
+    for name, body, dimension in (("crank", "upper", crank), ("rod", "lower", rod)):
+        if dimension is not None:
+            robot = _with_length(robot, name, body, positive(dimension, name, "m"))
     if limits is not None:
-        held = interval(limits, "limits")
-        robot = _of_legs(robot, (_with_limits(leg, held) for leg in robot.legs))
-    for key, given in (stock or {}).items():
-        robot = _cut(robot, key, Stock.of(given) if isinstance(given, str) else given)
+        checked_limits = interval(limits, "limits")
+        robot = _with_legs(robot, (_with_limits(leg, checked_limits) for leg in robot.legs))
+    for key, link_stock in (stock or {}).items():
+        robot = _with_stock(
+            robot, key, Stock.parse(link_stock) if isinstance(link_stock, str) else link_stock
+        )
     if platform_mass is not None:
         robot = _with_mass(robot, positive(platform_mass, "platform_mass", "kg"))
     return robot
@@ -151,25 +154,27 @@ def _with_limits(leg: LegKind, limits: tuple[float, float]) -> LegKind:
 
 
 def _with_mass(robot: Manipulator, mass: float) -> Manipulator:
-    own, bars = robot.platform.inertia, robot.platform.bars
-    factor = mass / (own.mass + sum(bar.mass for bar in bars))
-    inertia = type(own).of_values([factor * value for value in own.values])
+    platform_inertia, bars = robot.platform.inertia, robot.platform.bars
+    factor = mass / (platform_inertia.mass + sum(bar.mass for bar in bars))
+    inertia = type(platform_inertia).of_values(
+        [factor * parameter for parameter in platform_inertia.values]
+    )
     bars = tuple(replace(bar, mass=factor * bar.mass) for bar in bars)
     return replace(robot, platform=replace(robot.platform, inertia=inertia, bars=bars))
 
 
-def _of_legs(robot: Manipulator, legs: Iterable[LegKind]) -> Manipulator:
+def _with_legs(robot: Manipulator, legs: Iterable[LegKind]) -> Manipulator:
     return replace(robot, legs=tuple(legs))
 
 
 def _with_base(robot: Manipulator, radius: float) -> Manipulator:
     points = np.array([leg.guide_point for leg in robot.legs])
     axis = np.array(robot.platform.axis)
-    across = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
-    factor = _factor("base_radius", across, radius)
-    moved = points + (factor - 1.0) * across
-    pairs = zip(robot.legs, moved, strict=True)
-    return _of_legs(robot, (replace(leg, guide_point=_vector(p)) for leg, p in pairs))
+    radial = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
+    factor = _factor("base_radius", radial, radius)
+    scaled_points = points + (factor - 1.0) * radial
+    pairs = zip(robot.legs, scaled_points, strict=True)
+    return _with_legs(robot, (replace(leg, guide_point=_vector(p)) for leg, p in pairs))
 
 
 def _with_platform(robot: Manipulator, radius: float) -> Manipulator:
@@ -179,28 +184,30 @@ def _with_platform(robot: Manipulator, radius: float) -> Manipulator:
     points = np.array([leg.platform_point for leg in robot.legs])
     flat = np.eye(3) - np.outer(axis, axis)
     factor = _factor("platform_radius", (points @ frame + fixed) @ flat, radius)
-    own = frame @ (np.eye(3) + (factor - 1.0) * flat) @ frame.T
+    scaling = frame @ (np.eye(3) + (factor - 1.0) * flat) @ frame.T
     legs = (
         replace(
             leg,
-            platform_point=_vector(point @ own),
+            platform_point=_vector(point @ scaling),
             fixed_offset=_vector(offset + (factor - 1.0) * flat @ offset),
         )
         for leg, point, offset in zip(robot.legs, points, fixed, strict=True)
     )
-    bars = tuple(replace(bar, hinge=_vector(np.array(bar.hinge) @ own)) for bar in platform.bars)
+    bars = tuple(
+        replace(bar, hinge=_vector(np.array(bar.hinge) @ scaling)) for bar in platform.bars
+    )
     return replace(robot, legs=tuple(legs), platform=replace(platform, bars=bars))
 
 
-def _factor(name: str, across: Any, radius: float) -> float:
-    greatest = float(np.linalg.norm(across, axis=1).max())
+def _factor(name: str, radial: Any, radius: float) -> float:
+    greatest = float(np.linalg.norm(radial, axis=1).max())
     if greatest < 1e-9:
         raise ModelError(f"{name}: the points are on one line along the axis, and have no radius")
     return radius / greatest
 
 
-def _vector(values: Any) -> Vector:
-    return vector([round(float(x), 12) + 0.0 for x in values], "point")
+def _vector(components: Any) -> Vector:
+    return vector([round(float(x), 12) + 0.0 for x in components], "point")
 
 
 def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Manipulator:
@@ -208,19 +215,21 @@ def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Man
     if not any(changed):
         raise ModelError(f"{name}: the legs of {robot.name} have no such length")
     pairs = zip(robot.legs, changed, strict=True)
-    return _of_legs(robot, (with_stretched_bodies(old, new) if new else old for old, new in pairs))
+    return _with_legs(
+        robot, (with_stretched_bodies(old, new) if new else old for old, new in pairs)
+    )
 
 
-def _cut(robot: Manipulator, key: str, stock: Stock) -> Manipulator:
-    cut = [cut_links(leg, {key: stock}) for leg in robot.legs]
-    if not any(cut):
+def _with_stock(robot: Manipulator, key: str, stock: Stock) -> Manipulator:
+    bodies_by_leg = [cut_links(leg, {key: stock}) for leg in robot.legs]
+    if not any(bodies_by_leg):
         raise ModelError(f"{key}: no link of {robot.name}; upper or lower, which its legs have")
-    pairs = zip(robot.legs, cut, strict=True)
-    return _of_legs(robot, (leg.with_bodies({**leg.bodies, **links}) for leg, links in pairs))
+    pairs = zip(robot.legs, bodies_by_leg, strict=True)
+    return _with_legs(robot, (leg.with_bodies({**leg.bodies, **links}) for leg, links in pairs))
 
 
 def cut_links(leg: Any, stocks: Mapping[str, Stock]) -> dict[str, Any]:
-    """Return the bodies of those links of a leg that are cut from stock, given by their key."""
+    """Return the inertia, by letter, of a leg's links that are cut from stock (by their key)."""
     rods = {"lower": getattr(leg, "rods", 1)}
     return {
         letter: stocks[key].link(type(leg.bodies[letter]), low, high, rods.get(key, 1))

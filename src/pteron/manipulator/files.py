@@ -1,4 +1,4 @@
-"""`load` reads a manipulator from a TOML file or the catalog, and tells all its faults at once."""
+"""`load` reads a manipulator from a TOML file or the catalog, and reports all faults at once."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
 _Built = TypeVar("_Built")
 
 DEFAULT_KIND = "PRRR"
-"""The kind of a leg whose file says none."""
+"""The kind of a leg without `type`."""
 
 
 def catalog() -> tuple[str, ...]:
@@ -44,11 +44,11 @@ def _names() -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def descriptions() -> dict[str, str]:
-    """Return what each machine of the catalog is: the first words of its file, to a stop."""
+    """Return a short description of each machine of the catalog: its file's first phrase."""
     folder = files("pteron.manipulator") / "catalog"
     opening = re.compile(r"# (?:An? |The )?(.*?)(?: \(|[.,:;]\s)", re.DOTALL)
     texts = {name: opening.match((folder / f"{name}.toml").read_text("utf-8")) for name in _names()}
-    return {name: found[1].replace("\n# ", " ") for name, found in texts.items() if found}
+    return {name: match[1].replace("\n# ", " ") for name, match in texts.items() if match}
 
 
 def load(name_or_path: str | Path) -> Manipulator:
@@ -90,12 +90,14 @@ def load(name_or_path: str | Path) -> Manipulator:
 
 
 @lru_cache(maxsize=64)
-def read_machine(data: bytes, source: str, given: str) -> tuple[Manipulator, tuple[str, ...]]:
-    """Return the machine of a file's contents, and warnings; what was read once is kept."""
-    document = parsed_toml(data, source, ModelError)
-    robot = _machine(document, given)
-    # Pteron writes first moments, persons centres of mass: what identification finds for a body
-    # alone is one of many equivalent values, and need not be likely.
+def read_machine(
+    content: bytes, source: str, source_name: str
+) -> tuple[Manipulator, tuple[str, ...]]:
+    """Return the machine of a file's contents, and warnings (cached)."""
+    document = parsed_toml(content, source, ModelError)
+    robot = _machine(document, source_name)
+    # Pteron writes first moments, people centres of mass: an identified value of a single body is
+    # one of many equivalent ones, and need not be likely.
     return robot, machine_warnings(robot, bodies=not _has_first_moments(document))
 
 
@@ -109,61 +111,67 @@ def _has_first_moments(table: Any) -> bool:
 
 
 def document(name_or_path: str | Path) -> dict[str, Any]:
-    """Return what the file of a machine holds, unchecked."""
+    """Return the tables of a machine's file, unchecked."""
     return parsed_toml(*contents(name_or_path), ModelError)
 
 
 def contents(name_or_path: str | Path) -> tuple[bytes, str]:
-    """Return the bytes of a machine's file, and what messages call it."""
+    """Return the bytes of a machine's file, and its name in messages."""
     name = str(name_or_path)
     if name in catalog():
         resource = files("pteron.manipulator") / "catalog" / f"{name}.toml"
         return resource.read_bytes(), name
-    names = " or ".join(f'"{near}"' for near in [*_near_files(Path(name)), *_near_machines(name)])
+    names = " or ".join(
+        f'"{similar}"' for similar in [*_similar_files(Path(name)), *_similar_machines(name)]
+    )
     guess = f"; did you mean {names}?" if names else f" ({', '.join(catalog())})"
     absent = f"neither a file nor a machine of the catalog{guess}"
     return toml_bytes(name_or_path, ModelError, absent)
 
 
-def _near_files(path: Path) -> list[str]:
-    """Return the file in a missing file's folder whose name is nearest, if one is near."""
+def _similar_files(path: Path) -> list[str]:
+    """Return the file in a missing file's folder with the most similar name, if one is similar."""
     with suppress(OSError, ValueError):  # no such folder, one that may not be read, or no path
         if not path.exists():
-            beside = [file.name for file in path.parent.iterdir() if file.suffix == ".toml"]
-            near = get_close_matches(path.name, beside, n=1, cutoff=0.75)
-            return [shown(str(path.parent / name), bare=True, longest=1000) for name in near]
+            names = [file.name for file in path.parent.iterdir() if file.suffix == ".toml"]
+            similar = get_close_matches(path.name, names, n=1, cutoff=0.75)
+            return [shown(str(path.parent / name), bare=True, longest=1000) for name in similar]
     return []
 
 
-def _near_machines(name: str) -> list[str]:
-    """Return the machines of the catalog that a name may mean, by their names or what they are."""
+def _similar_machines(name: str) -> list[str]:
+    """Return the machines of the catalog that a name may mean, by names or descriptions."""
     word = Path(name).stem.lower()
-    said = [own for own, text in descriptions().items() if word in text.lower().split()]
-    close = get_close_matches(word, catalog(), n=1, cutoff=0.85) or said
-    return close or get_close_matches(word, catalog(), n=1)
+    by_description = [
+        machine for machine, text in descriptions().items() if word in text.lower().split()
+    ]
+    by_name = get_close_matches(word, catalog(), n=1, cutoff=0.85) or by_description
+    return by_name or get_close_matches(word, catalog(), n=1)
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
     from pteron.manipulator.tables import MachineTable, TiltingMachineTable, platform_table
 
-    carried = document.get("platform")
-    motion = carried.get("motion") if isinstance(carried, dict) else None
+    raw_platform = document.get("platform")
+    motion = raw_platform.get("motion") if isinstance(raw_platform, dict) else None
     tilts = motion in TILTING
-    reading = _Reading(tilts=tilts)
+    reading = _FileReader(tilts=tilts)
     machine = reading.table(TiltingMachineTable if tilts else MachineTable, document, "")
-    table = machine.platform or reading.rest(platform_table(motion), carried)
+    table = machine.platform or reading.valid_part(platform_table(motion), raw_platform)
     platform = table and reading.platform(table)
-    radii = machine.radii and reading.built("radii.", lambda: Radii(**machine.radii.model_dump()))
+    radii = machine.radii and reading.build_or_note(
+        "radii.", lambda: Radii(**machine.radii.model_dump())
+    )
     tools = reading.parts("tools", machine.tools or [], Tool)
-    given = document.get("legs")
-    legs = given if isinstance(given, list) else []
+    raw_legs = document.get("legs")
+    legs = raw_legs if isinstance(raw_legs, list) else []
     built: list[Any] = [reading.leg(i, leg) for i, leg in enumerate(legs, start=1)]
     if platform is not None:
-        # What was told already is not told again.
+        # Faults that are reported already are not repeated.
         name = "?" if machine.name is None else machine.name
-        known = built if machine.legs is not None else [None] * len(platform.coordinates)
+        legs_built = built if machine.legs is not None else [None] * len(platform.coordinates)
         home = None if machine.home is None else tuple(machine.home.pose or ())
-        reading.faults += faults_of(name, platform, known, tools, home)
+        reading.faults += faults_of(name, platform, legs_built, tools, home)
         if not reading.faults:
             return Manipulator(
                 name, platform, tuple(built), machine.gravity, radii, tuple(tools), home
@@ -173,94 +181,99 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
 
 
 @dataclass
-class _Reading:
-    """The faults that were found so far: a file is told all of them at once."""
+class _FileReader:
+    """A reader of a machine's tables, which collects their faults."""
 
     faults: list[str] = field(default_factory=list)
     tilts: bool = False
-    """Whether the machine's platform does."""
+    """Whether the machine's platform tilts."""
     listed: set[tuple[str, ...]] = field(default_factory=set)
-    """The lists of valid keys that were told."""
+    """The lists of valid keys that messages have named."""
 
-    def table(self, model: Any, given: object, prefix: str) -> Any:
-        """Return a table as its model holds it; with its faults noted, what of it `rest` gives."""
+    def table(self, model: Any, raw_table: object, prefix: str) -> Any:
+        """Return a table as its model; one with faults, which are collected, as `valid_part`."""
         from pydantic import ValidationError
 
         try:
-            return model.model_validate(given)
+            return model.model_validate(raw_table)
         except ValidationError as error:
             self.faults += [prefix + line for line in fault_lines(error, model, self.listed)]
-            return self.rest(model, given)
+            return self.valid_part(model, raw_table)
 
-    def rest(self, model: Any, given: object) -> Any:
-        """Return what of a table has the right shape, None for the rest and for what is missing."""
+    def valid_part(self, model: Any, raw_table: object) -> Any:
+        """Return a table's valid entries as a model, None for invalid and missing ones."""
         from pydantic import ValidationError
 
         from pteron.manipulator.leg_tables import part_of
 
-        part, kept = part_of(model), given if isinstance(given, dict) else {}
+        part, entries = part_of(model), raw_table if isinstance(raw_table, dict) else {}
         try:
-            return part.model_validate(kept)
+            return part.model_validate(entries)
         except ValidationError as error:
             wrong = {str(fault["loc"][0]) for fault in error.errors()}
-            found = part.model_validate({k: v for k, v in kept.items() if k not in wrong})
-            return found.model_copy(update=dict.fromkeys(wrong.intersection(part.model_fields)))
+            valid = part.model_validate({k: v for k, v in entries.items() if k not in wrong})
+            return valid.model_copy(update=dict.fromkeys(wrong.intersection(part.model_fields)))
 
-    def built(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
-        """Return what `build` makes, or None with its faults noted under the keys they name."""
+    def build_or_note(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
+        """Return the result of `build`, or None and collect its faults, with `prefix`."""
         try:
             return build()
         except ModelError as error:
             self.faults += [f"{prefix}{fault}" for fault in error.faults]
             return None
 
-    def parts(self, key: str, given: Sequence[Any], kind: Callable[..., _Built]) -> list[_Built]:
-        """Return those of the parts in a list of tables that can be."""
-        found = [
-            self.built(f"{key}, item {i}: ", partial(kind, **dict(part)))
-            for i, part in enumerate(given, start=1)
+    def parts(self, key: str, tables: Sequence[Any], kind: Callable[..., _Built]) -> list[_Built]:
+        """Return the valid parts of a list of tables, and collect the faults of the others."""
+        parts_or_none = [
+            self.build_or_note(f"{key}, item {i}: ", partial(kind, **dict(part)))
+            for i, part in enumerate(tables, start=1)
         ]
-        return [part for part in found if part is not None]
+        return [part for part in parts_or_none if part is not None]
 
     def platform(self, table: Any) -> Platform | None:
-        """Return the platform, or None; one with faults serves to check the legs, where it may."""
+        """Return the platform; if it has faults, a substitute for checks of the legs, or None."""
         from pteron.manipulator.tables import PlatformTable, TiltingTable
 
         inertia = table.unit
         body = table.mass, table.inertia, table.center_of_mass or table.first_moment
         if type(table) in (PlatformTable, TiltingTable) or None not in body:
-            inertia = self.built("platform.", lambda: table.inertia_of("")) or inertia
-        given: dict[str, Any] = {"axis": table.axis, "x_axis": table.x_axis}
-        more = {"limits": table.limits, "tool": table.tool or (0.0, 0.0, 0.0)}
+            inertia = self.build_or_note("platform.", lambda: table.inertia_of("")) or inertia
+        required: dict[str, Any] = {"axis": table.axis, "x_axis": table.x_axis}
+        optional = {"limits": table.limits, "tool": table.tool or (0.0, 0.0, 0.0)}
         if self.tilts:
-            given |= {"axis": table.axis or (0.0, 0.0, 1.0), "angle_order": table.angles or "rpy"}
-            given |= {"center": table.center, "second_axis": table.second_axis}
+            required |= {
+                "axis": table.axis or (0.0, 0.0, 1.0),
+                "angle_order": table.angles or "rpy",
+            }
+            required |= {"center": table.center, "second_axis": table.second_axis}
         else:
-            more["bars"] = tuple(self.parts("platform.bars", table.bars or [], Bar))
-            more["geared"] = tuple(self.parts("platform.geared", table.geared or [], Geared))
-            given["slides"] = bool(table.slides)
+            optional["bars"] = tuple(self.parts("platform.bars", table.bars or [], Bar))
+            optional["geared"] = tuple(self.parts("platform.geared", table.geared or [], Geared))
+            required["slides"] = bool(table.slides)
             if table.motion is None or table.axis is None:
                 return None
-        whole = self.built("platform.", lambda: Platform(table.motion, inertia, **given, **more))
-        if whole is not None:
-            return whole
+        complete = self.build_or_note(
+            "platform.", lambda: Platform(table.motion, inertia, **required, **optional)
+        )
+        if complete is not None:
+            return complete
         with suppress(ModelError):
             if not self.tilts:
                 axis = unit_vector(table.axis, "axis")
-                given |= {"axis": axis, "x_axis": vector(perpendicular_to(axis), "x_axis")}
-                given["slides"] &= table.motion == "3T1R"
-            return Platform(table.motion, inertia, **given)
+                required |= {"axis": axis, "x_axis": vector(perpendicular_to(axis), "x_axis")}
+                required["slides"] &= table.motion == "3T1R"
+            return Platform(table.motion, inertia, **required)
         return None
 
-    def leg(self, i: int, given: object) -> LegKind | None:
-        """Return leg i, from 1, or None; one with faults serves to check the machine."""
+    def leg(self, i: int, raw_table: object) -> LegKind | None:
+        """Return leg i, from 1; if it has faults, a substitute for further checks, or None."""
         from pteron.manipulator.leg_tables import FORMER, leg_of, leg_table
 
         prefix = f"leg {i}: "
-        if not isinstance(given, dict):
-            self.faults.append(f"{prefix}{shown(given)} given, a table [[legs]] expected")
+        if not isinstance(raw_table, dict):
+            self.faults.append(f"{prefix}{shown(raw_table)} given, a table [[legs]] expected")
             return None
-        name = given.get("type", DEFAULT_KIND)
+        name = raw_table.get("type", DEFAULT_KIND)
         try:
             kind = kind_named(name) if isinstance(name, str) else None
         except ModelError as error:
@@ -271,11 +284,11 @@ class _Reading:
             self.faults.append(f"{prefix}type: {shown(name)} is not one of {valid}")
             return None
         for key, former in FORMER.items():
-            if key in given and former in given:
+            if key in raw_table and former in raw_table:
                 self.faults.append(
                     f"{prefix}{former}: the former name of {key}, which is given too; give one"
                 )
-                given = {k: v for k, v in given.items() if k != former}
-        leg, faults = leg_of(kind, self.table(leg_table(kind), given, prefix), self.tilts)
+                raw_table = {k: v for k, v in raw_table.items() if k != former}
+        leg, faults = leg_of(kind, self.table(leg_table(kind), raw_table, prefix), self.tilts)
         self.faults += [prefix + fault for fault in faults]
         return leg

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AliasChoices, BeforeValidator, Field, create_model
 
 from pteron.bodies.inertia import PlanarInertia, RodInertia
-from pteron.bodies.tables import Count, Number, PlanarBody, RodBody, Slider, Table, Three, Two
+from pteron.bodies.tables import Count, Number, PlanarBody, RodBody, Slider, Three, TomlTable, Two
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.keys import Key, KeyRole
@@ -21,10 +21,10 @@ from pteron.manipulator.tables import PARTS, ConeTable, DriveTable, ReadingTable
 from pteron.toml import refuse
 
 
-def _no_truth(given: Any) -> Any:
-    if isinstance(given, bool):  # Python counts it as 1 or 0
-        raise ValueError(f"{given} given, 1 or -1 expected")
-    return given
+def _no_truth(sign: Any) -> Any:
+    if isinstance(sign, bool):  # Python counts it as 1 or 0
+        raise ValueError(f"{sign} given, 1 or -1 expected")
+    return sign
 
 
 _TYPES: dict[KeyRole, Any] = {
@@ -48,13 +48,13 @@ FORMER = {"limits": "slider_limits"}
 
 
 @lru_cache(maxsize=16)
-def leg_table(kind: type[LegKind]) -> type[Table]:
+def leg_table(kind: type[LegKind]) -> type[TomlTable]:
     """Return the pydantic model of a table of `[[legs]]` for a kind of leg."""
     fields: dict[str, Any] = {"type": (str, Field(kind.type, description="the kind of leg"))}
     for key, about in kind.every_key().items():
-        held, former = _TYPES[about.role], FORMER.get(key)
+        field_type, former = _TYPES[about.role], FORMER.get(key)
         fields[toml_key(key, about)] = (
-            held | None if about.default is None else held,
+            field_type | None if about.default is None else field_type,
             Field(
                 about.default,
                 description=about.help,
@@ -63,12 +63,12 @@ def leg_table(kind: type[LegKind]) -> type[Table]:
                 validation_alias=former and AliasChoices(key, former),
             ),
         )
-    return create_model(f"{kind.type}Table", __base__=Table, **fields)
+    return create_model(f"{kind.type}Table", __base__=TomlTable, **fields)
 
 
 @lru_cache(maxsize=16)
-def part_of(model: type[Table]) -> type[Table]:
-    """Return the model with all keys optional: a missing one is None."""
+def part_of(model: type[TomlTable]) -> type[TomlTable]:
+    """Return the model with all keys optional, None where missing."""
     required: dict[str, Any] = {
         key: (field.rebuild_annotation() | None, None)
         for key, field in model.model_fields.items()
@@ -78,7 +78,7 @@ def part_of(model: type[Table]) -> type[Table]:
 
 
 def toml_key(name: str, key: Key) -> str:
-    """Return the key in a file of a leg's field: that of a slider's mass is `slider`, a table."""
+    """Return a leg's field's key in a file; a slider's mass is in the table `slider`."""
     return "slider" if key.role == "slider" else name
 
 
@@ -89,7 +89,7 @@ _ORDINARY: dict[KeyRole, Any] = {
     "planar": PlanarInertia(1.0, (0.0, 0.0), 1.0),
     "rod": RodInertia(1.0, (0.0,), 1.0),
 }
-"""Valid values that replace those with a fault while the rest of the machine is checked."""
+"""Substitutes of values with a fault, with which the other parts of the machine are checked."""
 
 
 def leg_of(
@@ -97,7 +97,7 @@ def leg_of(
 ) -> tuple[LegKind | None, list[str]]:
     """Build a leg from its table, in which required keys may be None; collect its faults.
 
-    `tilts` tells whether its platform tilts.
+    `tilts` is whether its platform tilts.
 
     Returns
     -------
@@ -108,18 +108,18 @@ def leg_of(
         The faults, each beginning with its key; a missing key is not among them.
     """
     keys = kind.every_key()
-    given = {name: getattr(table, toml_key(name, key)) for name, key in keys.items()}
+    raw_fields = {name: getattr(table, toml_key(name, key)) for name, key in keys.items()}
     if tilts:
-        own = {n: key.tilting for n, key in keys.items() if key.tilting is not None}
-        given |= {n: v for n, v in own.items() if n not in table.model_fields_set}
-    given = {n: v for n, v in given.items() if v is not None or keys[n].default is None}
-    values, refused = {}, {}
-    for name, value in given.items():
+        tilting_defaults = {n: key.tilting for n, key in keys.items() if key.tilting is not None}
+        raw_fields |= {n: v for n, v in tilting_defaults.items() if n not in table.model_fields_set}
+    raw_fields = {n: v for n, v in raw_fields.items() if v is not None or keys[n].default is None}
+    converted, refused = {}, {}
+    for name, raw in raw_fields.items():
         try:
-            values[name] = _held(value, name, keys[name])
+            converted[name] = _field_value(raw, name, keys[name])
         except ModelError as error:
             refused[name] = error.faults
-    sound, others = kind.checked(values)
+    sound, others = kind.checked(converted)
     filled = {
         name: _ORDINARY.get(key.role) if key.default is ... or key.role == "point" else key.default
         for name, key in keys.items()
@@ -130,46 +130,49 @@ def leg_of(
         leg = None
     if leg is not None and all(n in sound for n, key in keys.items() if key.role == "length"):
         for name in refused:
-            if text := _beyond_ends(leg, keys[name].body, given[name]):
+            if text := _end_fault(leg, keys[name].body, raw_fields[name]):
                 refused[name] = (f"{name}.center_of_mass: {text}",)
     return leg, [*(fault for several in refused.values() for fault in several), *others]
 
 
-def _held(given: Any, name: str, key: Key) -> Any:
+def _field_value(raw: Any, name: str, key: Key) -> Any:
     """Return the value of a leg's field from that of its table."""
     if key.role == "slider":
-        return given.mass
+        return raw.mass
     if key.body:
-        return given.inertia_of(name)
-    return _built(PARTS[type(given)], given, name) if type(given) in PARTS else given
+        return raw.inertia_of(name)
+    return _build_part(PARTS[type(raw)], raw, name) if type(raw) in PARTS else raw
 
 
-def _built(kind: Any, table: Table, key: str) -> Any:
-    """Return a part of a leg from its table; errors name its keys with `key` before them."""
-    faults, given = list[str](), {name: getattr(table, name) for name in type(table).model_fields}
-    for name, value in given.items():
+def _build_part(kind: Any, table: TomlTable, key: str) -> Any:
+    """Return a part of a leg from its table; errors name its keys with the prefix `key`."""
+    faults, raw_fields = (
+        list[str](),
+        {name: getattr(table, name) for name in type(table).model_fields},
+    )
+    for name, raw in raw_fields.items():
         try:
-            if isinstance(value, list):
-                given[name] = tuple(
-                    _built(PARTS[type(one)], one, f"{key}.{name}[{k}]")
-                    if type(one) in PARTS
-                    else one
-                    for k, one in enumerate(value, start=1)
+            if isinstance(raw, list):
+                raw_fields[name] = tuple(
+                    _build_part(PARTS[type(list_item)], list_item, f"{key}.{name}[{k}]")
+                    if type(list_item) in PARTS
+                    else list_item
+                    for k, list_item in enumerate(raw, start=1)
                 )
-            elif type(value) in PARTS:
-                given[name] = None
-                given[name] = _built(PARTS[type(value)], value, f"{key}.{name}")
+            elif type(raw) in PARTS:
+                raw_fields[name] = None
+                raw_fields[name] = _build_part(PARTS[type(raw)], raw, f"{key}.{name}")
         except ModelError as error:
             faults += error.faults
     try:
-        made = kind(**given)
+        part = kind(**raw_fields)
     except ModelError as error:
         faults += [f"{key}.{fault}" for fault in error.faults]
     refuse(faults)
-    return made
+    return part
 
 
-def _beyond_ends(leg: LegKind, letter: str, body: Any) -> str | None:
+def _end_fault(leg: LegKind, letter: str, body: Any) -> str | None:
     """Return the fault of a body whose centre of mass is beyond its ends, or None."""
     if not letter or body.center_of_mass is None or min(body.mass, body.inertia) <= 0.0:
         return None
@@ -179,13 +182,13 @@ def _beyond_ends(leg: LegKind, letter: str, body: Any) -> str | None:
 
 def leg_items(leg: LegKind) -> Mapping[str, Any]:
     """Return a leg's fields by their keys in a file; bodies stay objects."""
-    found: dict[str, Any] = {"type": leg.type}
+    items: dict[str, Any] = {"type": leg.type}
     for name, key in leg.every_key().items():
-        found[toml_key(name, key)] = leg.bodies[key.body] if key.body else getattr(leg, name)
+        items[toml_key(name, key)] = leg.bodies[key.body] if key.body else getattr(leg, name)
     if leg.drive is not None:
         fields = DriveTable.model_fields
-        given = {name: getattr(leg.drive, name) for name in fields}
-        found["drive"] = {k: v for k, v in given.items() if v and v != fields[k].default}
+        drive_fields = {name: getattr(leg.drive, name) for name in fields}
+        items["drive"] = {k: v for k, v in drive_fields.items() if v and v != fields[k].default}
     if leg.reading is not None:
-        found["reading"] = asdict(leg.reading)
-    return found
+        items["reading"] = asdict(leg.reading)
+    return items

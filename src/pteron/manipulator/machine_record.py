@@ -34,7 +34,7 @@ _ANGULAR = ("direction", "normal")
 
 
 class _Dimension(NamedTuple):
-    """A named quantity of a machine's geometry, and how its differences are measured."""
+    """A named quantity of a machine's geometry, with the role that defines its differences."""
 
     name: str
     """As files name it: "legs[1].lower_length", "platform.axis"."""
@@ -69,15 +69,15 @@ def expect_machine(record: object, robot: Manipulator, source: object) -> None:
         return
     if not isinstance(record, Mapping):
         raise DataError(f"{source}: machine: {shown(record)} given, a table expected")
-    own = machine_record(robot)
+    expected = machine_record(robot)
     name = shown(record.get("name"))
-    if record.get("topology") != own["topology"]:
+    if record.get("topology") != expected["topology"]:
         raise DataError(
             f"{source}: belongs to {name}, a machine of another topology "
-            f"({shown(record.get('layout'))}) than {robot.name} ({own['layout']}); give the "
+            f"({shown(record.get('layout'))}) than {robot.name} ({expected['layout']}); give the "
             "machine that it was made for"
         )
-    if record.get("geometry") == own["geometry"]:
+    if record.get("geometry") == expected["geometry"]:
         return
     difference, text = _largest_difference(record, robot, source)
     if not difference <= MOST_DIFFERENCE:
@@ -132,7 +132,7 @@ def _relative_difference(role: str, here: Any, there: Any, size: float) -> float
 
 
 def _layout(robot: Manipulator) -> str:
-    """Return all that is discrete of a machine: "3T: RSS+ RSS+ RSS+", with the sides of elbows."""
+    """Return a machine's topology as text: "3T: RSS+ RSS+ RSS+", with the signs of its elbows."""
     platform = robot.platform
     legs = []
     for leg in robot.legs:
@@ -148,7 +148,7 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
     for i, leg in enumerate(robot.legs, start=1):
         stored = {field.name for field in fields(leg)}
         for quantity in leg.quantities:
-            # What has no field is made of the others.
+            # Quantities without a field are derived from the others.
             if quantity.role != "sign" and quantity.name in stored:
                 yield _Dimension(f"legs[{i}].{quantity.name}", quantity.role, tuple(quantity.value))
         yield _Dimension(f"legs[{i}].platform_point", "point", leg.platform_point)
@@ -163,9 +163,9 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
         yield _Dimension("platform.center", "point", platform.center)
 
 
-def _digest(data: object) -> str:
-    return sha256(json.dumps(data).encode()).hexdigest()[:_DIGITS]
+def _digest(content: object) -> str:
+    return sha256(json.dumps(content).encode()).hexdigest()[:_DIGITS]
 
 
-def _numbers(values: Any) -> str:
-    return ", ".join(f"{value:.6g}" for value in values)
+def _numbers(components: Any) -> str:
+    return ", ".join(f"{component:.6g}" for component in components)

@@ -12,7 +12,7 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.vectors import Vector, cross
 from pteron.legs import LegKind
 from pteron.legs.drive_warnings import drive_warnings
-from pteron.manipulator.manipulator import Manipulator, told_legs, unheld_axes
+from pteron.manipulator.manipulator import Manipulator, legs_text, unheld_axes
 from pteron.platforms import Platform
 from pteron.thresholds import STOUT_LINK
 
@@ -33,10 +33,10 @@ _HEAVY = 100.0
 """Mass of a platform over that of its legs, beyond which grams are likelier."""
 
 _LEGS = 3
-"""Least number of legs among which one can be the odd one."""
+"""Least number of legs of which one can be an outlier."""
 
 _SAME = 1e-6
-"""Greatest difference of directions that count as equal."""
+"""Tolerance of equal directions."""
 
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
@@ -55,36 +55,36 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     >>> machine_warnings(pteron.load("quadrupteron"))
     ()
     """
-    platform, far = robot.platform, _far(robot)
-    found = _in_millimetres(far)
+    platform, long_lengths = robot.platform, _long_lengths(robot)
+    warnings = _millimetre_warnings(long_lengths)
     if hypot(*robot.gravity) > _PULL:
-        found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
+        warnings.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
     turn, most = ("half a turn", pi) if platform.tilts else ("a turn", 2.0 * pi)
-    found += [
+    warnings += [
         f"platform: limits: {list(limits)} rad, more than {turn} from {angle} = 0: are these "
         "degrees?"
         for angle, limits in platform.angle_limits.items()
         if max(map(abs, limits)) > most
     ]
     radius = max(hypot(*leg.platform_point) for leg in robot.legs)
-    points = any("platform_point" in keys for keys in far.values())
+    points = any("platform_point" in keys for keys in long_lengths.values())
     # Consequences of lengths in millimetres are not listed beside them.
-    if bodies and radius > 0.0 and not points and 0 not in far:
-        found += [f"platform: {text}" for text in _spread(platform, radius)]
+    if bodies and radius > 0.0 and not points and 0 not in long_lengths:
+        warnings += [f"platform: {text}" for text in _size_warnings(platform, radius)]
     if bodies:
-        found += [f"platform: {text}" for text in _grams(platform, robot.legs)]
+        warnings += [f"platform: {text}" for text in _mass_warnings(platform, robot.legs)]
     axis = platform.rotation_axes[0] if len(platform.rotation_axes) == 1 else None
-    alike: dict[str, list[int]] = {}
+    legs_by_text: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
-        own = () if i in far else _leg_warnings(leg, platform, bodies)
-        for text in (*own, *leg.doubts(axis), *drive_warnings(leg)):
-            alike.setdefault(text, []).append(i)
-    found += [f"{told_legs(legs)}: {text}" for text, legs in alike.items()]
+        leg_warnings = () if i in long_lengths else _leg_warnings(leg, platform, bodies)
+        for text in (*leg_warnings, *leg.doubts(axis), *drive_warnings(leg)):
+            legs_by_text.setdefault(text, []).append(i)
+    warnings += [f"{legs_text(legs)}: {text}" for text, legs in legs_by_text.items()]
     if axis is not None:
-        found += _turning_offsets(robot.legs, axis, platform.angles[0])
-    found += _odd_one(robot)
-    found += _beside_the_pin(robot)
-    return tuple(found)
+        warnings += _turning_offsets(robot.legs, axis, platform.angles[0])
+    warnings += _odd_directions(robot)
+    warnings += _beside_the_pin(robot)
+    return tuple(warnings)
 
 
 def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
@@ -111,8 +111,8 @@ def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
             )
 
 
-def _odd_one(robot: Manipulator) -> Iterator[str]:
-    """Yield a leg with a direction opposite to that of all others, seen from the middle."""
+def _odd_directions(robot: Manipulator) -> Iterator[str]:
+    """Yield warnings about a leg with a direction opposite to all others', in radial frames."""
     points = np.array([leg.guide_point for leg in robot.legs])
     axis = np.array(robot.platform.axis)
     out = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
@@ -121,19 +121,23 @@ def _odd_one(robot: Manipulator) -> Iterator[str]:
         return
     out /= radii
     frames = np.stack([out, np.cross(axis, out), np.broadcast_to(axis, out.shape)], axis=1)
-    each = [
+    directions_by_leg = [
         {q.name: q.value for q in leg.quantities if q.role in ("direction", "normal")}
         for leg in robot.legs
     ]
-    for name in sorted(set(robot.legs[0].every_key()).intersection(*each)):
-        seen = np.einsum("ijk,ik->ij", frames, [own[name] for own in each])
-        opposite = (np.abs(seen[:, None] + seen).max(axis=-1) < _SAME).sum(axis=1)
+    for name in sorted(set(robot.legs[0].every_key()).intersection(*directions_by_leg)):
+        local_directions = np.einsum(
+            "ijk,ik->ij", frames, [directions[name] for directions in directions_by_leg]
+        )
+        opposite = (np.abs(local_directions[:, None] + local_directions).max(axis=-1) < _SAME).sum(
+            axis=1
+        )
         for i in np.flatnonzero(opposite == len(out) - 1) + 1:
             yield f"leg {i}: {name}: opposite to all other legs', seen from the axis: is it meant?"
 
 
-def _grams(platform: Platform, legs: Sequence[LegKind]) -> Iterator[str]:
-    """Yield a platform that is far heavier than all that carries it."""
+def _mass_warnings(platform: Platform, legs: Sequence[LegKind]) -> Iterator[str]:
+    """Yield a warning about a platform that is far heavier than all of its legs."""
     mass = platform.inertia.mass
     bodies: list[Any] = [body for leg in legs for body in leg.bodies.values()]
     carried = sum(getattr(body, "mass", 0.0) for body in bodies)
@@ -144,10 +148,10 @@ def _grams(platform: Platform, legs: Sequence[LegKind]) -> Iterator[str]:
         )
 
 
-def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
+def _long_lengths(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
     """Return the lengths beyond `_LARGE`, m, by leg (from 1; 0: the platform) and by key."""
     platform = robot.platform
-    given: dict[int, dict[str, Sequence[float]]] = {
+    lengths: dict[int, dict[str, Sequence[float]]] = {
         0: {
             "tool": platform.tool,
             "center_of_mass": platform.inertia.center_of_mass,
@@ -162,26 +166,26 @@ def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
             for key, body in bodies.items()
             if hasattr(body, "center_of_mass")
         }
-        given[i] = {**leg.metres, **centers}
+        lengths[i] = {**leg.metres, **centers}
     far = {
-        i: {key: v for key, v in values.items() if max(map(abs, v)) > _LARGE}
-        for i, values in given.items()
+        i: {key: v for key, v in leg_lengths.items() if max(map(abs, v)) > _LARGE}
+        for i, leg_lengths in lengths.items()
     }
-    return {i: values for i, values in far.items() if values}
+    return {i: leg_lengths for i, leg_lengths in far.items() if leg_lengths}
 
 
-def _in_millimetres(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[str]:
-    """Return one warning that lengths look like millimetres, with all their legs and keys."""
+def _millimetre_warnings(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[str]:
+    """Return a warning about lengths that are probably in mm, with their legs and keys."""
     if not far:
         return []
-    alike: dict[tuple[str, ...], list[int]] = {}
-    for i, values in far.items():
-        alike.setdefault(tuple(values), []).append(i)
+    legs_by_keys: dict[tuple[str, ...], list[int]] = {}
+    for i, leg_lengths in far.items():
+        legs_by_keys.setdefault(tuple(leg_lengths), []).append(i)
     where = "; ".join(
-        f"{told_legs(legs) if legs[0] else 'platform'}: {', '.join(keys)}"
-        for keys, legs in alike.items()
+        f"{legs_text(legs) if legs[0] else 'platform'}: {', '.join(keys)}"
+        for keys, legs in legs_by_keys.items()
     )
-    first, *others = (value for values in far.values() for value in values.values())
+    first, *others = (length for leg_lengths in far.values() for length in leg_lengths.values())
     size = f"{first[0]:g}" if len(first) == 1 else f"{list(first)}"
     return [f"{where}: {f'beyond {_LARGE:g}' if others else size} m: are these mm?"]
 
@@ -211,16 +215,18 @@ def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[st
                 f"{platform.joined.mass:g} kg: solid steel {1e3 * thick:.0f} mm thick: is it this "
                 "machine's?"
             )
-        yield from (f"{key}: {text}" for text in _unlike_a_bar(body, high - low))
+        yield from (f"{key}: {text}" for text in _inertia_warnings(body, high - low))
 
 
 def _turning_offsets(legs: Sequence[LegKind], axis: Vector, angle: str) -> Iterator[str]:
-    """Yield the legs whose fixed offset no leg at the same hinge keeps from turning."""
+    """Yield warnings about fixed offsets that no leg at the same hinge keeps from rotating."""
     keeps: dict[Vector, bool] = {}
     for leg in legs:
         free = np.array(leg.free_axes(None)).reshape(-1, 3)
-        held = np.linalg.matrix_rank(np.vstack([free, axis])) > np.linalg.matrix_rank(free)
-        keeps[leg.platform_point] = keeps.get(leg.platform_point, False) or bool(held)
+        is_constrained = np.linalg.matrix_rank(np.vstack([free, axis])) > np.linalg.matrix_rank(
+            free
+        )
+        keeps[leg.platform_point] = keeps.get(leg.platform_point, False) or bool(is_constrained)
     for i, leg in enumerate(legs, start=1):
         if hypot(*cross(leg.fixed_offset, axis)) > 0.0 and not keeps[leg.platform_point]:
             yield (
@@ -229,24 +235,24 @@ def _turning_offsets(legs: Sequence[LegKind], axis: Vector, angle: str) -> Itera
             )
 
 
-def _unlike_a_bar(body: Any, length: float) -> Iterator[str]:
-    """Yield the parts of a link's inertia that are far from those of a bar of its length."""
+def _inertia_warnings(body: Any, length: float) -> Iterator[str]:
+    """Yield warnings about a link's inertia that is far from that of a bar of its length."""
     beside = hypot(*body.center_of_mass[1:])
     if beside > length:
         yield f"center_of_mass: {beside:g} m beside it: are these mm?"
         return
-    own = body.inertia - body.mass * sum(x * x for x in body.center_of_mass)
+    central = body.inertia - body.mass * sum(x * x for x in body.center_of_mass)
     # One by one: a product of small numbers may vanish.
-    share = 12.0 * own / length / length / body.mass
+    share = 12.0 * central / length / length / body.mass
     if not 1.0 / _UNLIKE <= share <= _UNLIKE:
         yield (
-            f"inertia: {body.inertia:g} kg m^2 leaves {own:.3g} about the centre of mass, "
+            f"inertia: {body.inertia:g} kg m^2 leaves {central:.3g} about the centre of mass, "
             f"{share:.2g} times that of a uniform bar: is it about the origin, in kg m^2?"
         )
 
 
-def _spread(platform: Platform, radius: float) -> Iterator[str]:
-    """Yield the numbers that are too large for a platform whose points are within a radius, m."""
+def _size_warnings(platform: Platform, radius: float) -> Iterator[str]:
+    """Yield warnings about a centre of mass or inertia too large for a platform's radius, m."""
     body, size = platform.inertia, 3.0 * radius
     off = hypot(*body.center_of_mass)
     if off > size:

@@ -1,4 +1,4 @@
-"""A manipulator as a value: legs, platform and gravity, checked when it is made."""
+"""A manipulator as a value: legs, platform and gravity, checked by its constructor."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from pteron.platforms.parts import HeldPoint
 from pteron.toml import refuse
 
 _COINCIDENT = 1e-9
-"""Distance, m, below which points are taken for one."""
+"""Distance, m, below which points count as coincident."""
 
-_ACROSS = 1e-9
-"""Size in the platform's plane of a leg's unit force, below which it counts as none."""
+_NO_EFFECT = 1e-9
+"""Component in the platform's plane of a leg's unit force that counts as zero."""
 
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
-"""Acceleration of gravity where a file does not say it, m/s^2."""
+"""Default acceleration of gravity, m/s^2."""
 
 
 @checked_arguments
@@ -85,7 +85,7 @@ class Manipulator:
 
     def __getstate__(self) -> dict[str, Any]:
         # Texts hash differently in every process.
-        return {key: value for key, value in self.__dict__.items() if key != "_hash"}
+        return {key: attribute for key, attribute in self.__dict__.items() if key != "_hash"}
 
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
@@ -94,8 +94,8 @@ class Manipulator:
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))
         if self.home is not None:
-            object.__setattr__(self, "home", tuple(float(value) for value in self.home))
-        object.__setattr__(self, "platform", _held(self.platform, legs))
+            object.__setattr__(self, "home", tuple(float(coordinate) for coordinate in self.home))
+        object.__setattr__(self, "platform", _with_held_points(self.platform, legs))
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
     def __repr__(self) -> str:
@@ -196,24 +196,26 @@ def faults_of(
     tools: Sequence[Tool] = (),
     home: Sequence[float] | None = None,
 ) -> list[str]:
-    """Return all that is wrong with a machine, a line each; a leg that is None is wrong itself."""
-    found = [*name_faults(name), *tool_faults(platform, tools), *_home_faults(platform, home)]
+    """Return the faults of a machine, one line each; a leg is None if it has faults itself."""
+    faults = [*name_faults(name), *tool_faults(platform, tools), *_home_faults(platform, home)]
     freedom = len(platform.coordinates)
     if len(legs) != freedom:
-        found.append(
+        faults.append(
             f"legs: {len(legs)} given, but a {platform.motion} platform has {freedom} freedoms and "
             f"needs {freedom} legs"
         )
-    given = {i: leg for i, leg in enumerate(legs, start=1) if leg is not None}
-    found += [f"leg {i}: {fault}" for i, leg in given.items() for fault in _misfits(platform, leg)]
-    if found or len(given) < freedom:
-        return found
-    under = [leg.under(platform.frame) for leg in given.values()]
-    return (_slack if platform.tilts else _loose)(platform, under)
+    known_legs = {i: leg for i, leg in enumerate(legs, start=1) if leg is not None}
+    faults += [
+        f"leg {i}: {fault}" for i, leg in known_legs.items() for fault in _leg_faults(platform, leg)
+    ]
+    if faults or len(known_legs) < freedom:
+        return faults
+    placed_legs = [leg.under(platform.frame) for leg in known_legs.values()]
+    return (_unheld_tilting if platform.tilts else _unheld_freedoms)(platform, placed_legs)
 
 
 def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[str]:
-    """Yield why a home cannot be a pose of the platform."""
+    """Yield the faults of a home that is not a pose of the platform."""
     if home is None:
         return
     names = platform.coordinates
@@ -226,8 +228,8 @@ def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[s
         yield f"home.pose: {list(home)} given, finite numbers expected"
 
 
-def _misfits(platform: Platform, leg: object) -> Iterator[str]:
-    """Yield why a leg cannot carry a platform."""
+def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
+    """Yield the faults of a leg under a platform."""
     if not isinstance(leg, LegKind):
         yield f"{type(leg).__name__} given, a leg expected"
         return
@@ -248,7 +250,7 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
         yield str(error)
         return
     if platform.tilts:
-        yield from _tilt_misfits(platform, leg)
+        yield from _tilting_leg_faults(platform, leg)
         return
     yield from breaches(leg, platform.rotation_axes)
     normal = leg.plane_normal
@@ -269,7 +271,7 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
         )
     elif platform.planar and leg.equations_class.row_is_constant:
         row = np.array(ca.evalf(leg.equations().constant_row)).ravel()
-        if np.linalg.norm(platform.directions @ row) <= _ACROSS * np.linalg.norm(row):
+        if np.linalg.norm(platform.directions @ row) <= _NO_EFFECT * np.linalg.norm(row):
             yield (
                 f"its joint does not move the platform: a {leg.type} leg with these directions "
                 f"pushes along the platform's axis {list(platform.axis)} alone, across the plane; "
@@ -277,8 +279,8 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
             )
 
 
-def _tilt_misfits(platform: Platform, leg: LegKind) -> Iterator[str]:
-    """Yield why a leg cannot carry a platform that tilts."""
+def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
+    """Yield the faults of a leg under a platform that tilts."""
     takes = "legs that end in ball joints and hold nothing else"
     if platform.on_planes:
         takes = "legs that keep their points in planes and end in ball joints"
@@ -307,8 +309,8 @@ def _tilt_misfits(platform: Platform, leg: LegKind) -> Iterator[str]:
         yield from breaches(leg, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
-def _slack(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
-    """Return why legs do not hold a platform that tilts, whatever its pose."""
+def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
+    """Return the fault of legs that leave a tilting platform a freedom at every pose."""
     normals = [leg.plane_normal for leg in legs if leg.plane_normal is not None]
     if normals and all(parallel(normals[0], normal) for normal in normals[1:]):
         return [
@@ -318,7 +320,7 @@ def _slack(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
     return []
 
 
-def _held(platform: Platform, legs: Sequence[LegKind]) -> Platform:
+def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
     """Return a platform with the planes in which its legs keep its points, if it is a tripod's."""
     if not platform.on_planes:
         return platform
@@ -341,11 +343,11 @@ def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float
     return complement(np.vstack([*withheld, *([axis] if axis else [])]))
 
 
-def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
-    """Return which freedom the legs leave the platform that its motion has not."""
+def _unheld_freedoms(platform: Platform, legs: list[LegKind]) -> list[str]:
+    """Return the fault of legs that leave the platform a freedom outside its motion."""
     turning = [i for i, leg in enumerate(legs, start=1) if leg.follows_angle]
     if len(turning) > 1:
-        return [f"{told_legs(turning)}: all turn the platform, which takes one such leg"]
+        return [f"{legs_text(turning)}: all turn the platform, which takes one such leg"]
     if platform.planar and all(leg.plane_normal is None for leg in legs):
         return [f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"]
     axis = platform.axis if platform.turns and not platform.slides else None
@@ -354,26 +356,26 @@ def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
     if not len(free):
         return []
     if platform.motion == "2T":
-        first, second = (_in_plane(platform, leg) for leg in legs)
-        apart = math.hypot(*(first - second))
-        if apart <= _COINCIDENT:
+        first, second = (_planar_point(platform, leg) for leg in legs)
+        distance = math.hypot(*(first - second))
+        if distance <= _COINCIDENT:
             return []
         return [
-            f"legs: their platform points are {apart:.4g} m apart, so that the platform is free to "
-            "turn about its axis; a 2T platform needs one point for both"
+            f"legs: their platform points are {distance:.4g} m apart, so that the platform is free "
+            "to turn about its axis; a 2T platform needs one point for both"
         ]
     single = [
         i
         for i, (leg, rows) in enumerate(zip(legs, withheld, strict=True), start=1)
         if not len(rows) and not leg.follows_angle
     ]
-    causes = [f"{told_legs(single)} keep it from no turn, as single rods do"] if single else []
+    causes = [f"{legs_text(single)} keep it from no turn, as single rods do"] if single else []
     if len(single) + len(turning) < len(legs):
         whose = "the other directions" if single else "all directions"
         where = "lie in one plane with it and the platform's axis" if axis else "are parallel to it"
         causes.append(f"{whose} {where}")
-    one = free[0] * np.sign(free[0][np.abs(free[0]).argmax()])
-    about = [round(float(x), 3) + 0.0 for x in one] if len(free) == 1 else "several axes"
+    axis_direction = free[0] * np.sign(free[0][np.abs(free[0]).argmax()])
+    about = [round(float(x), 3) + 0.0 for x in axis_direction] if len(free) == 1 else "several axes"
     return [
         f"legs: the platform is free to {'tilt' if axis else 'turn'} about {about}: "
         f"{', and '.join(causes)}; turn a leg's direction, or the bar of its rods, elsewhere"
@@ -381,13 +383,13 @@ def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
     ]
 
 
-def told_legs(numbers: Sequence[int]) -> str:
-    """Return legs by their numbers in words: "leg 1", "legs 1 and 2", "legs 1, 2 and 3"."""
-    *rest, last = map(str, numbers)
-    return f"legs {', '.join(rest)} and {last}" if rest else f"leg {last}"
+def legs_text(numbers: Sequence[int]) -> str:
+    """Return a phrase for legs by number: "leg 1", "legs 1 and 2", "legs 1, 2 and 3"."""
+    *first_legs, last = map(str, numbers)
+    return f"legs {', '.join(first_legs)} and {last}" if first_legs else f"leg {last}"
 
 
-def _in_plane(platform: Platform, leg: LegKind) -> NDArray[np.float64]:
-    """Return where a leg's platform point is in the platform's plane, from P, at phi = 0."""
+def _planar_point(platform: Platform, leg: LegKind) -> NDArray[np.float64]:
+    """Return a leg's platform point in the platform's plane, from P, at phi = 0, (2,), m."""
     point = np.array(platform.frame).T @ leg.platform_point + leg.fixed_offset
     return platform.directions @ point

@@ -9,26 +9,26 @@ LONGEST_NAME = 200
 """Characters; a file's name has at most 255 bytes, and adds to the machine's name."""
 
 _JOINERS = "\u200c\u200d"
-"""Unseen characters that spelling needs, in Persian and Hindi."""
+"""Invisible characters that spelling needs, in Persian and Hindi."""
 
 
 def name_faults(name: object) -> Iterator[str]:
-    """Yield what is wrong with a machine's name."""
+    """Yield the faults of a machine's name."""
     if type(name) is not str or not name.strip():
         yield f"name: {name!r} is not a text with at least one letter"
         return
     if len(name) > LONGEST_NAME:
         yield f"name: {len(name)} characters given, at most {LONGEST_NAME} expected"
-    unseen = sorted({c for c in name if _is_unseen(c)})
-    if unseen:
-        codes = ", ".join(f"U+{ord(c):04X}" for c in unseen[:3])
+    invisible = sorted({c for c in name if _is_invisible(c)})
+    if invisible:
+        codes = ", ".join(f"U+{ord(c):04X}" for c in invisible[:3])
         yield (
-            f"name: has control characters ({codes}{', ...' if len(unseen) > 3 else ''}), which "
+            f"name: has control characters ({codes}{', ...' if len(invisible) > 3 else ''}), which "
             "files and messages cannot hold; write it in one line of letters, digits and signs"
         )
 
 
-def _is_unseen(c: str) -> bool:
+def _is_invisible(c: str) -> bool:
     """Return whether a character is a control character or no character at all."""
     if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
         return c not in _JOINERS

@@ -38,8 +38,8 @@ def machine_table(robot: Any) -> str:
     return html_table(robot.name, about, columns, rows)
 
 
-def _numbers(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:.4g}" for value in values).replace("-", "\u2212")
+def _numbers(components: Sequence[float]) -> str:
+    return ", ".join(f"{component:.4g}" for component in components).replace("-", "\u2212")
 
 
 def _limits(leg: LegKind) -> str:
@@ -54,5 +54,5 @@ def _drive(leg: LegKind) -> str:
     if drive is None:
         return "none"
     limits = ((drive.max_force, joint.force_unit), (drive.max_speed, f"{joint.unit}/s"))
-    told = [f"{value:.4g} {unit}" for value, unit in limits if value is not None]
-    return f"up to {', '.join(told)}" if told else "without limits"
+    limit_texts = [f"{limit:.4g} {unit}" for limit, unit in limits if limit is not None]
+    return f"up to {', '.join(limit_texts)}" if limit_texts else "without limits"

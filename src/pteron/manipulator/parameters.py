@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from pteron.bodies.inertia import Inertia
 from pteron.bodies.parameters import PLATFORM, Parameter, parameter_list
 from pteron.errors import ModelError
-from pteron.manipulator.given import RobotLike, as_manipulator
 from pteron.manipulator.manipulator import Manipulator
+from pteron.manipulator.robot_like import RobotLike, as_manipulator
 
 
 def parameter_data(
@@ -44,11 +44,11 @@ def parameter_data(
     robot = as_manipulator(robot)
     kinds = tuple(tuple((b, i.kinds) for b, i in leg.bodies.items()) for leg in robot.legs)
     carried = robot.platform.joined.kinds
-    return _listed(kinds, carried, None if groups is None else tuple(groups))
+    return _cached_parameter_list(kinds, carried, None if groups is None else tuple(groups))
 
 
 @lru_cache(maxsize=64)
-def _listed(
+def _cached_parameter_list(
     kinds: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...],
     platform: tuple[str, ...],
     groups: tuple[tuple[int, ...], ...] | None,
@@ -137,8 +137,8 @@ def with_parameters(robot: RobotLike, values: ArrayLike) -> Manipulator:
     if vector.shape != (len(listed),):
         raise ModelError(f"parameters: shape {vector.shape} given, ({len(listed)},) expected")
     blocks: dict[tuple[str, tuple[int, ...]], list[float]] = {}
-    for p, value in zip(listed, vector.tolist(), strict=True):
-        blocks.setdefault((p.body, p.legs), []).append(value)
+    for p, parameter in zip(listed, vector.tolist(), strict=True):
+        blocks.setdefault((p.body, p.legs), []).append(parameter)
     bodies: dict[tuple[str, tuple[int, ...]], Any] = {}
     for (body, owner), block in blocks.items():
         old: Inertia = robot.legs[owner[0] - 1].bodies[body] if owner else robot.platform.joined

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def has_readings(robot: Manipulator) -> bool:
-    """Return whether the joint coordinates of some leg are not what its drive reads."""
+    """Return whether the drive readings of any leg differ from its joint coordinate."""
     return any(leg.reading not in (None, Reading()) for leg in robot.legs)
 
 
@@ -34,24 +34,24 @@ def reading_zeros(robot: Manipulator) -> Array:
 
 def from_readings(robot: Manipulator, readings: ArrayLike) -> Array:
     """Return joint coordinates (..., n) of readings (..., n)."""
-    given = np.asarray(readings, dtype=float)
-    return reading_zeros(robot) + reading_scales(robot) * given if has_readings(robot) else given
+    array = np.asarray(readings, dtype=float)
+    return reading_zeros(robot) + reading_scales(robot) * array if has_readings(robot) else array
 
 
 def to_readings(robot: Manipulator, joints: ArrayLike) -> Array:
     """Return the readings (..., n) of joint coordinates (..., n)."""
-    given = np.asarray(joints, dtype=float)
-    return (given - reading_zeros(robot)) / reading_scales(robot) if has_readings(robot) else given
+    array = np.asarray(joints, dtype=float)
+    return (array - reading_zeros(robot)) / reading_scales(robot) if has_readings(robot) else array
 
 
-def without_readings(robot: Manipulator) -> Manipulator:
-    """Return the machine as if its drives read the joint coordinates."""
+def remove_readings(robot: Manipulator) -> Manipulator:
+    """Return the machine without readings: its drives read the joint coordinates."""
     legs = tuple(replace(leg, reading=None) for leg in robot.legs)
     return replace(robot, legs=legs) if has_readings(robot) else robot
 
 
 def refuse_readings(robot: Manipulator, writer: str) -> None:
-    """Refuse a machine with readings where what is written counts joint coordinates."""
+    """Raise for a machine with readings where `writer` supports joint coordinates only."""
     if has_readings(robot):
         legs = [str(i) for i, leg in enumerate(robot.legs, start=1) if leg.reading is not None]
         raise ModelError(

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from pteron.atomic import write_text
-from pteron.manipulator.given import RobotLike, as_manipulator
 from pteron.manipulator.manipulator import Manipulator
+from pteron.manipulator.robot_like import RobotLike, as_manipulator
 
 
 def save(robot: RobotLike, path: str | Path) -> Path:
@@ -35,26 +35,26 @@ def save(robot: RobotLike, path: str | Path) -> Path:
 
 
 def text_of(robot: Manipulator) -> str:
-    """Return the text of a manipulator's file; different machines have different texts."""
-    from pteron.manipulator.writing import written
+    """Return the text of a manipulator's file, unique to the machine."""
+    from pteron.manipulator.writing import robot_text
 
-    return written(document_of(robot))
+    return robot_text(document_of(robot))
 
 
 def document_of(robot: Manipulator) -> dict[str, Any]:
     """Return the contents of a manipulator's file."""
     from pteron.manipulator.leg_tables import leg_items
 
-    own = robot.platform
-    platform: dict[str, Any] = {"motion": own.motion, "axis": own.axis}
-    if own.x_axis is not None:
-        platform["x_axis"] = own.x_axis
-    if own.angle_order != "rpy":
-        platform["angles"] = own.angle_order
-    platform |= {"tool": own.tool, **asdict(own.inertia)}
+    moving_platform = robot.platform
+    platform: dict[str, Any] = {"motion": moving_platform.motion, "axis": moving_platform.axis}
+    if moving_platform.x_axis is not None:
+        platform["x_axis"] = moving_platform.x_axis
+    if moving_platform.angle_order != "rpy":
+        platform["angles"] = moving_platform.angle_order
+    platform |= {"tool": moving_platform.tool, **asdict(moving_platform.inertia)}
     for name in ("slides", "limits", "bars", "geared", "center", "second_axis"):
-        if given := getattr(own, name):
-            platform[name] = given
+        if attribute := getattr(moving_platform, name):
+            platform[name] = attribute
     radii = {} if robot.radii is None else {"radii": asdict(robot.radii)}
     legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
     machine = {"name": robot.name, "gravity": robot.gravity, **radii}
@@ -65,14 +65,14 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
     if robot.home is not None:
         machine["home"] = {"pose": robot.home}
     machine |= {"platform": platform, "legs": legs}
-    found: dict[str, Any] = _plain(machine)
-    return found
+    tables: dict[str, Any] = _plain(machine)
+    return tables
 
 
-def _plain(value: Any) -> Any:
-    """Return a value as TOML has it: a body as a table, a tuple as a list."""
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+def _plain(content: Any) -> Any:
+    """Return content converted for TOML: dataclasses to tables, tuples to lists."""
+    if isinstance(content, dict):
+        return {key: _plain(part) for key, part in content.items()}
+    if isinstance(content, list | tuple):
+        return [_plain(part) for part in content]
+    return asdict(content) if is_dataclass(content) and not isinstance(content, type) else content

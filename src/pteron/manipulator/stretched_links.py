@@ -14,19 +14,19 @@ from typing import Any
 from pteron.legs import LegKind
 
 
-def with_stretched_bodies(before: LegKind, after: LegKind) -> LegKind:
-    """Return a leg with the inertia that its links have at their new lengths.
+def with_stretched_bodies(unchanged: LegKind, changed: LegKind) -> LegKind:
+    """Return a leg with the inertia of its links stretched to their new lengths.
 
-    `after` has the new lengths, and still the inertia of `before`.
+    `changed` has the new lengths with the inertia of `unchanged`.
     """
-    bodies = dict(after.bodies)
-    for letter, (_, low, high, _) in after.extents.items():
-        _, old_low, old_high, _ = before.extents[letter]
-        bodies[letter] = stretched(bodies[letter], (high - low) / (old_high - old_low))
-    return after.with_bodies(bodies)
+    bodies = dict(changed.bodies)
+    for letter, (_, low, high, _) in changed.extents.items():
+        _, old_low, old_high, _ = unchanged.extents[letter]
+        bodies[letter] = stretch_link(bodies[letter], (high - low) / (old_high - old_low))
+    return changed.with_bodies(bodies)
 
 
-def stretched(body: Any, factor: float) -> Any:
+def stretch_link(body: Any, factor: float) -> Any:
     """Return the inertia of a link stretched along x by a factor, with the same section.
 
     Examples
@@ -35,12 +35,12 @@ def stretched(body: Any, factor: float) -> Any:
     >>> stretched(RodInertia.of_body(1.0, [-0.5], 1.0 / 3.0), 2.0).values
     (2.0, -2.0, 2.6666666666666665)
     """
-    values = dict(zip(body.kinds, body.values, strict=True))
-    across = values.get("mgy", 0.0) ** 2 / values["m"]
-    drawn = {
-        "m": values["m"] * factor,
-        "mgx": values["mgx"] * factor**2,
-        "mgy": values.get("mgy", 0.0) * factor,
-        "I": (values["I"] - across) * factor**3 + across * factor,
+    by_kind = dict(zip(body.kinds, body.values, strict=True))
+    offset_inertia = by_kind.get("mgy", 0.0) ** 2 / by_kind["m"]
+    stretched_by_kind = {
+        "m": by_kind["m"] * factor,
+        "mgx": by_kind["mgx"] * factor**2,
+        "mgy": by_kind.get("mgy", 0.0) * factor,
+        "I": (by_kind["I"] - offset_inertia) * factor**3 + offset_inertia * factor,
     }
-    return type(body).of_values([drawn[kind] for kind in body.kinds])
+    return type(body).of_values([stretched_by_kind[kind] for kind in body.kinds])

@@ -16,14 +16,14 @@ from typing import Any, get_args, get_origin, get_type_hints
 from pydantic import create_model
 
 from pteron.bodies.tables import (
-    Bar,
-    Geared,
+    BarTable,
+    GearedTable,
     Number,
     PlanarBody,
     Six,
     SpatialBody,
-    Table,
     Three,
+    TomlTable,
     Two,
     key,
 )
@@ -34,39 +34,43 @@ from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.manipulator.radii import Radii
 from pteron.platforms.kinds import TILTING, AngleOrder, Motion
 
-_TOLD: dict[str, dict[str, Any]] = loads(
+_DESCRIPTIONS: dict[str, dict[str, Any]] = loads(
     (files("pteron.manipulator") / "parts.toml").read_text(encoding="utf-8")
 )
 
-PARTS: dict[type[Table], Any] = {}
-"""The dataclasses that tables of a file become."""
+PARTS: dict[type[TomlTable], Any] = {}
+"""The dataclass of each table of a file."""
 
 
-def _table_of(part: Any) -> type[Table]:
-    """Return the table of a dataclass: its fields, in the order in which files give them."""
+def _table_of(part: Any) -> type[TomlTable]:
+    """Return the table model of a dataclass: its fields in the order of files."""
     hints, defaults = get_type_hints(part), {field.name: field.default for field in fields(part)}
-    made: dict[str, Any] = {}
-    for name, told in _TOLD[part.__name__].items():
-        about, *example = [told] if isinstance(told, str) else told
+    table_fields: dict[str, Any] = {}
+    for name, description in _DESCRIPTIONS[part.__name__].items():
+        about, *example = [description] if isinstance(description, str) else description
         default = {MISSING: ..., (): []}.get(defaults[name], defaults[name])
-        made[name] = _held(hints[name]), key(about, default, *example)
-    about = _TOLD["about"][part.__name__]
-    table = create_model(f"{part.__name__}Table", __base__=Table, __doc__=about, **made)
+        table_fields[name] = _field_type(hints[name]), key(about, default, *example)
+    about = _DESCRIPTIONS["about"][part.__name__]
+    table = create_model(f"{part.__name__}Table", __base__=TomlTable, __doc__=about, **table_fields)
     PARTS[table] = part
     return table
 
 
-def _held(hint: Any) -> Any:
-    """Return what a table has of a field with a type hint: parts as tables, and lists of them."""
+def _field_type(hint: Any) -> Any:
+    """Return the type of a table's key from a field's type hint: parts become tables."""
     tables = {part: table for table, part in PARTS.items()}
     if hint in (float, *tables):
         return tables.get(hint, Number)
     args = get_args(hint)
     if get_origin(hint) is UnionType:
-        return reduce(or_, map(_held, args))
+        return reduce(or_, map(_field_type, args))
     if get_origin(hint) is tuple:
-        held = tuple(_held(one) for one in args if one is not ...)
-        return list.__class_getitem__(held) if ... in args else tuple.__class_getitem__(held)
+        item_types = tuple(_field_type(part_hint) for part_hint in args if part_hint is not ...)
+        return (
+            list.__class_getitem__(item_types)
+            if ... in args
+            else tuple.__class_getitem__(item_types)
+        )
     return hint
 
 
@@ -75,7 +79,7 @@ ElasticTable, WindingTable, WaveTable = map(_table_of, (Elastic, Winding, Wave))
 DriveTable, ReadingTable, RadiiTable = map(_table_of, (Drive, Reading, Radii))
 
 
-class _Motion(Table):
+class _Motion(TomlTable):
     motion: Motion = key(
         '"3T": x, y, z. "3T1R": also phi, about axis. "2T": x, y in the plane across '
         'axis. "2T1R": also phi. Tilting: "3T3R", "3R" and "2R" about center, "1T2R" of a tripod'
@@ -104,12 +108,12 @@ class PlatformTable(PlanarBody, _Motion):
         [-0.8, 0.8],
     )
     tool: Three = key("the tool's centre point in the platform frame, m", (0.0, 0.0, 0.0))
-    bars: list[Bar] = key(
+    bars: list[BarTable] = key(
         "parts that move with a hinge of the platform and do not turn",
         [],
         [{"mass": 0.1, "hinge": [0.05, 0.0, 0.0]}],
     )
-    geared: list[Geared] = key(
+    geared: list[GearedTable] = key(
         "balanced parts, such as a tool, that a gear turns with the platform",
         [],
         [{"inertia": 6e-5, "ratio": 4.0}],
@@ -136,11 +140,11 @@ class TiltingTable(SpatialBody, _Motion):
 
 
 def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
-    """Return what a platform of a motion holds; one that is not known as if it did not tilt."""
+    """Return the table model of a platform's motion; `PlatformTable` for an unknown motion."""
     return TiltingTable if motion in TILTING else PlatformTable
 
 
-class ToolTable(Table):
+class ToolTable(TomlTable):
     """`[[tools]]`: a tool that the platform can carry, which --tool and `with_tool` mount."""
 
     name: str = key("what it is called")
@@ -156,13 +160,13 @@ class ToolTable(Table):
     )
 
 
-class HomeTable(Table):
+class HomeTable(TomlTable):
     """`[home]`: where the machine stands before it moves."""
 
     pose: list[Number] = key("the pose's coordinates in their order, m and rad")
 
 
-class MachineTable(Table):
+class MachineTable(TomlTable):
     """The whole file; each of `legs` is read by its own kind."""
 
     name: str = key("what the machine is called")

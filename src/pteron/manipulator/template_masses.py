@@ -1,4 +1,4 @@
-"""Masses that a machine still has of the catalog's machine that its file was made after."""
+"""Masses of a machine that are unchanged from its template in the catalog."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pteron.manipulator.files import catalog, contents, load
 from pteron.manipulator.manipulator import Manipulator
 
 _SAME = 1e-6
-"""Relative difference of masses that count as one, and as edited beyond: files have more digits."""
+"""Relative tolerance of unchanged masses: files have more digits."""
 
 
 def template_masses(robot: Manipulator) -> str:
-    """Return a sentence on masses that are those of a machine of the catalog, "" where none is.
+    """Return a sentence on masses that equal those of a machine of the catalog; "" if none do.
 
     All links of the first leg have its masses or its sections (kg/m), and perhaps the platform.
-    Machines with a name of the catalog are taken for these; `pteron new` gives others.
+    Machines with a name of the catalog count as the catalog's; `pteron new` gives other names.
     """
     if robot.name in catalog():
         return ""
@@ -41,13 +41,13 @@ def template_masses(robot: Manipulator) -> str:
 
 def _links(robot: Manipulator, template: Manipulator) -> Iterator[str]:
     """Yield the first leg's links whose mass or section is that of the template."""
-    own: Any = robot.legs[0]
-    other: Any = template.legs[0]
-    for letter, (key, low, high, _) in own.extents.items():
-        if letter not in other.extents:
+    leg: Any = robot.legs[0]
+    template_leg: Any = template.legs[0]
+    for letter, (key, low, high, _) in leg.extents.items():
+        if letter not in template_leg.extents:
             continue
-        _, least, most, _ = other.extents[letter]
-        mass, former = own.bodies[letter].mass, other.bodies[letter].mass
+        _, least, most, _ = template_leg.extents[letter]
+        mass, former = leg.bodies[letter].mass, template_leg.bodies[letter].mass
         if isclose(mass, former, rel_tol=_SAME):
             yield f"{key} {mass:.4g} kg"
         elif isclose(mass / (high - low), former / (most - least), rel_tol=_SAME):

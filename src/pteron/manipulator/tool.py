@@ -88,19 +88,19 @@ class Tool:
 
 
 def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
-    """Yield what is wrong with a machine's tools."""
+    """Yield the faults of a machine's tools."""
     names = [tool.name for tool in tools]
     for i, tool in enumerate(tools, start=1):
         if tool.name in names[: i - 1]:
             yield f"tools, item {i}: name: {tool.name!r} is listed twice; give each its own name"
         several = isinstance(tool.central_inertia, tuple)
         if tool.central_inertia != 0.0 and several != (inertia_count(platform.inertia.kinds) > 1):
-            wanted = "Ixx, Ixy, Ixz, Iyy, Iyz, Izz" if platform.tilts else "one number"
+            expected = "Ixx, Ixy, Ixz, Iyy, Iyz, Izz" if platform.tilts else "one number"
             yield (
-                f"tools, item {i}: central_inertia: {tool.central_inertia} given, {wanted} "
+                f"tools, item {i}: central_inertia: {tool.central_inertia} given, {expected} "
                 f"expected for a {platform.motion} platform"
             )
 
 
-def _inertia(given: Any, key: str) -> float | tuple[float, ...]:
-    return numbers(given, key, _SPATIAL) if isinstance(given, Sequence) else number(given, key)
+def _inertia(raw: Any, key: str) -> float | tuple[float, ...]:
+    return numbers(raw, key, _SPATIAL) if isinstance(raw, Sequence) else number(raw, key)

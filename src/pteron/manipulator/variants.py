@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from pteron.bodies.vectors import Vector, vector
 from pteron.errors import ModelError
-from pteron.manipulator.given import RobotLike, as_manipulator
 from pteron.manipulator.manipulator import Manipulator
+from pteron.manipulator.robot_like import RobotLike, as_manipulator
 
 _ORTHOGONAL = 1e-9
 """Greatest element by which R R^T of a rotation may differ from 1."""

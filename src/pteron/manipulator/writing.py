@@ -9,7 +9,7 @@ from typing import Any, get_args
 import tomlkit
 from pydantic.fields import FieldInfo
 
-from pteron.bodies.tables import PlanarBody, Table
+from pteron.bodies.tables import PlanarBody, TomlTable
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.installed import kind_named, kind_names
@@ -30,31 +30,33 @@ _CONVENTIONS = (
 )
 
 
-def written(
+def robot_text(
     document: Mapping[str, Any], *, explained: bool = False, about: Sequence[str] = ()
 ) -> str:
     """Return the text of a machine's file.
 
-    `explained` says of every key what it is, and names those that it has not, as comments; of legs
-    of one kind at the first. `about` are comments at its head.
+    With `explained`, comments describe every key, also absent ones; for legs of one kind at the
+    first. `about` are comments at its head.
     """
     head = [*about, *([*_CONVENTIONS, _bodies()] if explained else [f"For Pteron. {_UNITS}"])]
     lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]
-    own = {k: value for k, value in document.items() if k not in ("home", "platform", "legs")}
-    lines += ["", *_block("", MachineTable, own, explained)]
+    machine_keys = {
+        k: content for k, content in document.items() if k not in ("home", "platform", "legs")
+    }
+    lines += ["", *_block("", MachineTable, machine_keys, explained)]
     if "home" in document:
         lines += ["", *_block("home", HomeTable, document["home"], explained)]
     carried = document["platform"]
     model = platform_table(carried["motion"])
     lines += ["", *_block("platform", model, carried, explained)]
-    told: set[str] = set()
+    kinds_explained: set[str] = set()
     for i, leg in enumerate(document["legs"], start=1):
         kind = leg["type"]
-        heading, *rest = _block(
-            "[legs]", leg_table(_kind_of(kind)), leg, explained and kind not in told
+        heading, *leg_lines = _block(
+            "[legs]", leg_table(_kind_of(kind)), leg, explained and kind not in kinds_explained
         )
-        lines += ["", f"{heading} # {i}", *rest]
-        told.add(kind)
+        lines += ["", f"{heading} # {i}", *leg_lines]
+        kinds_explained.add(kind)
     return "\n".join(lines) + "\n"
 
 
@@ -74,38 +76,43 @@ def _bodies() -> str:
     return f"A body's keys: {'; '.join(f'{key}, {field.description}' for key, field in fields)}."
 
 
-def _block(name: str, model: type[Table], given: Mapping[str, Any], explained: bool) -> list[str]:
+def _block(
+    name: str, model: type[TomlTable], table: Mapping[str, Any], explained: bool
+) -> list[str]:
     """Return the lines of one table, and of the lists of tables in it."""
     fields, lines, inner = model.model_fields, [f"[{name}]"] if name else [], []
     entries = []
-    for key, value in given.items():
-        if isinstance(value, list) and value and isinstance(value[0], Mapping):
+    for key, content in table.items():
+        if isinstance(content, list) and content and isinstance(content[0], Mapping):
             part = get_args(fields[key].annotation)[0]
-            for one in value:
-                inner += ["", *_block(f"[{f'{name}.' * bool(name)}{key}]", part, one, explained)]
+            for subtable in content:
+                inner += [
+                    "",
+                    *_block(f"[{f'{name}.' * bool(name)}{key}]", part, subtable, explained),
+                ]
         else:
-            entries.append((f"{key} = {_toml(value)}", fields.get(key)))
+            entries.append((f"{key} = {_toml(content)}", fields.get(key)))
     if explained:
         entries += [
-            (f"#{key} = {_toml(_example(field, given))}", field)
+            (f"#{key} = {_toml(_example(field, table))}", field)
             for key, field in fields.items()
-            if key not in given and (field.examples or field.default is not None)
+            if key not in table and (field.examples or field.default is not None)
             if not field.is_required()
         ]
-        return [*lines, *_commented(entries), *inner]
+        return [*lines, *_comment_lines(entries), *inner]
     return [*lines, *(text for text, _ in entries), *inner]
 
 
-def _example(field: FieldInfo, given: Mapping[str, Any]) -> Any:
-    """Return what could stand behind a key in a table that gives others."""
+def _example(field: FieldInfo, table: Mapping[str, Any]) -> Any:
+    """Return an example value of an absent key of a table."""
     like = field.json_schema_extra
-    if isinstance(like, Mapping) and like["like"] in given:
-        return given[str(like["like"])]
+    if isinstance(like, Mapping) and like["like"] in table:
+        return table[str(like["like"])]
     return field.examples[0] if field.examples else field.default
 
 
-def _commented(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
-    """Return lines with what their keys are: behind the short ones, above the long ones."""
+def _comment_lines(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
+    """Return lines with comments on their keys: after short lines, above long ones."""
     lines = []
     column = max((len(text) for text, _ in entries if len(text) <= _COLUMN), default=0)
     for text, field in entries:
@@ -113,14 +120,17 @@ def _commented(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
         if len(text) > column:
             lines += [*(f"# {line}" for line in wrap(about, _WIDTH - 2)), text]
             continue
-        first, *more = wrap(about, _WIDTH - column - 4) or [""]
-        lines += [f"{text:{column}}  # {first}", *(f"{'':{column}}  # {line}" for line in more)]
+        first, *further_lines = wrap(about, _WIDTH - column - 4) or [""]
+        lines += [
+            f"{text:{column}}  # {first}",
+            *(f"{'':{column}}  # {line}" for line in further_lines),
+        ]
     return lines
 
 
-def _toml(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + " }"
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return f"[{', '.join(map(_toml, value))}]"
-    return str(tomlkit.item(value).as_string())
+def _toml(content: Any) -> str:
+    if isinstance(content, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in content.items()) + " }"
+    if isinstance(content, Sequence) and not isinstance(content, str):
+        return f"[{', '.join(map(_toml, content))}]"
+    return str(tomlkit.item(content).as_string())

@@ -14,7 +14,7 @@ import numpy as np
 
 from pteron.extras import of_extra
 from pteron.kernels import Array
-from pteron.kernels.choice import guarded
+from pteron.kernels.choice import kernel_with_status
 from pteron.kernels.jax import Traced
 from pteron.manipulator import Manipulator
 from pteron.maps.grid import Grid, Region
@@ -49,7 +49,9 @@ def _function(
     jnp = jax.numpy
     jax.config.update("jax_enable_x64", True)
     kernels = {
-        name: guarded(robot, name, Traced) for name in ("standing", *names) if name != MARGIN.name
+        name: kernel_with_status(robot, name, Traced)
+        for name in ("standing", *names)
+        if name != MARGIN.name
     }
 
     def evaluate(pose: Any, *values: Any) -> dict[str, Any]:

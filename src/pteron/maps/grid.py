@@ -16,7 +16,7 @@ import numpy as np
 from pteron.arguments import checked_arguments
 from pteron.errors import DataError, ModelError, shown
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms.coordinates import COORDINATES, coordinate
@@ -258,7 +258,7 @@ def pose_grid(
     pose = np.zeros(len(names))
     if held is None:
         # A coordinate that varies is needed only as the start of the search for the reach.
-        pose = home_pose(robot) if center is None else checked_one(robot, center, "center").copy()
+        pose = home_pose(robot) if center is None else finite_pose(robot, center, "center").copy()
         platform = robot.platform
         pair = platform.lengths if len(platform.lengths) > 1 else platform.angles
         varying = set(spans or pair[:2])

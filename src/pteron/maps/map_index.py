@@ -14,7 +14,7 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.indices.index import expect_index
 from pteron.kernels import Array, numeric
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.saving import text_of
 from pteron.maps.accelerated import accelerated
@@ -163,7 +163,7 @@ def _computed(
         outputs["status"][part] = status
         for name in names:
             outputs[name][part] = (
-                margin if name == MARGIN.name else evaluated(robot, name, "nan", rows[part])
+                margin if name == MARGIN.name else evaluate_kernel(robot, name, "nan", rows[part])
             )
     return {name: values.reshape(poses.shape[:-1]) for name, values in outputs.items()}
 

@@ -19,7 +19,7 @@ import scipy  # type: ignore[import-untyped]
 from pteron.arguments import checked_arguments, expect
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.replay import rows_of
@@ -164,7 +164,7 @@ def cue(
             "coordinates; take a 3T3R one",
             subject=robot.name,
         )
-    middle = home_pose(robot) if pose is None else checked_one(robot, pose, "pose")
+    middle = home_pose(robot) if pose is None else finite_pose(robot, pose, "pose")
     rows = rows_of(table, COLUMNS)
     time, *columns = rows.numbers(COLUMNS).T
     if len(time) < 2 or not (np.diff(time) > 0.0).all():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PerJoint, PoseLike
@@ -166,8 +166,8 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
     robot = as_manipulator(robot)
     poses = as_array(pose, "pose", (robot.freedom,), columns=robot.coordinates)
     coordinates = inverse_kinematics(robot, poses)
-    chain: Array = evaluated(robot, "joint_points", "raise", poses)
-    points: Array = evaluated(robot, "platform_points", "raise", poses)
+    chain: Array = evaluate_kernel(robot, "joint_points", "raise", poses)
+    points: Array = evaluate_kernel(robot, "platform_points", "raise", poses)
     p, axes = robot.platform.at(poses)
     links = tuple(
         _links(leg, chain[..., i, :, :], coordinates[..., i], points[..., i, :])

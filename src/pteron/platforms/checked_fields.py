@@ -13,93 +13,96 @@ from pteron.toml import refuse
 BASE_Z: Vector = (0.0, 0.0, 1.0)
 
 
-def checked_fields(given: Any) -> tuple[dict[str, Any], list[str]]:
-    """Return the fields of a `Platform` as it holds them, and all that is wrong with them."""
+def checked_fields(platform: Any) -> tuple[dict[str, Any], list[str]]:
+    """Return the valid fields of a `Platform`, converted, and the faults of the others."""
     faults: list[str] = []
-    sound = {"bars": tuple(given.bars), "geared": tuple(given.geared)}
+    sound = {"bars": tuple(platform.bars), "geared": tuple(platform.geared)}
     for check in (_axes, _limits, _tool, _joint):
         try:
-            sound |= check(given)
+            sound |= check(platform)
         except ModelError as error:
             faults += error.faults
-    motion = given.motion
-    if given.slides and motion != "3T1R":
+    motion = platform.motion
+    if platform.slides and motion != "3T1R":
         faults.append(f"slides: a {motion} platform has no halves that slide; only 3T1R")
-    if given.slides and any(bar.hinge[2] != 0.0 for bar in sound["bars"]):
+    if platform.slides and any(bar.hinge[2] != 0.0 for bar in sound["bars"]):
         faults.append("bars: what slides moves across the axis; give 0 as hinge's third number")
-    if sound["geared"] and not given.turns:
+    if sound["geared"] and not platform.turns:
         faults.append(f"geared: a {motion} platform has no axis for a gear to turn about")
-    if sound["bars"] and given.tilts:
+    if sound["bars"] and platform.tilts:
         faults.append(f"bars: a {motion} platform tilts, and takes none")
-    expected = SpatialInertia if given.tilts else PlanarInertia
-    if not isinstance(given.inertia, expected):
+    expected = SpatialInertia if platform.tilts else PlanarInertia
+    if not isinstance(platform.inertia, expected):
         faults.append(
-            f"inertia: {type(given.inertia).__name__} given, but a {motion} platform "
-            f"{'tilts' if given.tilts else 'does not tilt'}: {expected.__name__} expected"
+            f"inertia: {type(platform.inertia).__name__} given, but a {motion} platform "
+            f"{'tilts' if platform.tilts else 'does not tilt'}: {expected.__name__} expected"
         )
     return sound, faults
 
 
-def _axes(given: Any) -> dict[str, Any]:
-    axis = unit_vector(given.axis, "axis")
-    if given.x_axis is not None and given.motion == "2R":
+def _axes(platform: Any) -> dict[str, Any]:
+    axis = unit_vector(platform.axis, "axis")
+    if platform.x_axis is not None and platform.motion == "2R":
         raise ModelError(
             "x_axis: a 2R platform's frame is the base frame at angles zero; leave it out"
         )
-    if given.x_axis is not None:
-        return {"axis": axis, "x_axis": perpendicular(given.x_axis, axis, "x_axis", "axis")}
-    if axis == BASE_Z or given.motion == "2R":
-        return {"axis": axis, "x_axis": None if given.motion == "2R" else (1.0, 0.0, 0.0)}
+    if platform.x_axis is not None:
+        return {"axis": axis, "x_axis": perpendicular(platform.x_axis, axis, "x_axis", "axis")}
+    if axis == BASE_Z or platform.motion == "2R":
+        return {"axis": axis, "x_axis": None if platform.motion == "2R" else (1.0, 0.0, 0.0)}
     raise ModelError(
         f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
         "where the platform frame's x points at phi = 0"
     )
 
 
-def _limits(given: Any) -> dict[str, Any]:
-    if given.limits is None:
+def _limits(platform: Any) -> dict[str, Any]:
+    if platform.limits is None:
         return {}
-    if not given.angles:
-        raise ModelError(f"limits: a {given.motion} platform has no angle to limit")
-    if not given.tilts:
-        return {"limits": interval(given.limits, "limits")}
+    if not platform.angles:
+        raise ModelError(f"limits: a {platform.motion} platform has no angle to limit")
+    if not platform.tilts:
+        return {"limits": interval(platform.limits, "limits")}
     try:
-        pairs = [tuple(pair) for pair in given.limits]
+        pairs = [tuple(pair) for pair in platform.limits]
     except TypeError:
         pairs = []
-    if len(pairs) != len(given.angles):
+    if len(pairs) != len(platform.angles):
         raise ModelError(
-            f"limits: {given.limits!r} given, one pair for each of {', '.join(given.angles)} "
+            f"limits: {platform.limits!r} given, one pair for each of {', '.join(platform.angles)} "
             "expected, rad"
         )
     return {"limits": tuple(interval(p, f"limits[{i}]") for i, p in enumerate(pairs))}
 
 
-def _tool(given: Any) -> dict[str, Any]:
-    return {"tool": vector(given.tool, "tool")}
+def _tool(platform: Any) -> dict[str, Any]:
+    return {"tool": vector(platform.tool, "tool")}
 
 
-def _joint(given: Any) -> dict[str, Any]:
-    """Return what a platform on a joint with the base has, and no other."""
-    faults, found = [], {}
-    if given.angle_order not in get_args(AngleOrder):
-        faults.append(f'angles: {given.angle_order!r} is not "rpy" or "xyz"')
-    elif given.angle_order != "rpy" and given.motion not in XYZ:
-        faults.append(f'angles: a {given.motion} platform has no "xyz"; only 3T3R and 3R')
-    wanted = {"center": given.motion in ("3R", "2R"), "second_axis": given.motion == "2R"}
-    for name, needed in wanted.items():
-        value = getattr(given, name)
-        if (value is None) == needed:
+def _joint(platform: Any) -> dict[str, Any]:
+    """Return the fields of a platform on a joint with the base; raise where others have them."""
+    faults, checked = [], {}
+    if platform.angle_order not in get_args(AngleOrder):
+        faults.append(f'angles: {platform.angle_order!r} is not "rpy" or "xyz"')
+    elif platform.angle_order != "rpy" and platform.motion not in XYZ:
+        faults.append(f'angles: a {platform.motion} platform has no "xyz"; only 3T3R and 3R')
+    requirements = {
+        "center": platform.motion in ("3R", "2R"),
+        "second_axis": platform.motion == "2R",
+    }
+    for name, needed in requirements.items():
+        field_value = getattr(platform, name)
+        if (field_value is None) == needed:
             faults.append(
-                f"{name}: missing; a {given.motion} platform turns about it"
+                f"{name}: missing; a {platform.motion} platform turns about it"
                 if needed
-                else f"{name}: a {given.motion} platform has none; leave it out"
+                else f"{name}: a {platform.motion} platform has none; leave it out"
             )
         elif needed:
             check = vector if name == "center" else unit_vector
-            found[name] = check(value, name)
-    second = found.get("second_axis")
-    if second and parallel(unit_vector(given.axis, "axis"), second):
+            checked[name] = check(field_value, name)
+    second = checked.get("second_axis")
+    if second and parallel(unit_vector(platform.axis, "axis"), second):
         faults.append("second_axis: along axis, so that both angles turn alike; turn one")
     refuse(faults)
-    return found
+    return checked

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
-from pteron.bodies.agreement import TIME, differing, rate_of
+from pteron.bodies.agreement import TIME, mismatched_names, rate_of
 from pteron.bodies.motion import Expression
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import COORDINATES
@@ -24,7 +24,7 @@ _SMALL = 0.3
 
 
 def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
-    """Return where a platform breaks the protocol, a line each; none where it keeps it.
+    """Return the breaches of the protocol by a platform, one line each; () where it conforms.
 
     Examples
     --------
@@ -47,21 +47,21 @@ def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
         return [ca.SX(ca.DM(rng.normal(size=3) * (1.0, 1.0, high))) for _ in range(_POINTS)]
 
     frame = [ca.SX(ca.DM(list(axis))) for axis in platform.frame]
-    held = [ca.SX(ca.DM(list(plane.platform_point))) for plane in platform.planes]
-    own = held or points(platform.slides)
-    equations = kind(frame, own, points(False), platform.expressions())
+    held_points = [ca.SX(ca.DM(list(plane.platform_point))) for plane in platform.planes]
+    platform_points = held_points or points(platform.slides)
+    equations = kind(frame, platform_points, points(False), platform.expressions())
     x, dx, ddx = (_SMALL * drawn(len(kind.coordinates)) for _ in range(3))
     rates = dx + ddx * TIME
     motion = equations.motion(x + dx * TIME + ddx * TIME**2 / 2, rates, ddx)
     inertia = ca.vertsplit(ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kind.kinds)))))
     quasi = motion.pose_rows(ca.SX.eye(len(kind.coordinates))) @ rates
     return (
-        *_motions(motion, quasi),
-        *_forces(equations, motion, quasi, drawn(3), inertia),
+        *_motion_faults(motion, quasi),
+        *_force_faults(equations, motion, quasi, drawn(3), inertia),
     )
 
 
-def _motions(motion: PlatformMotion, rates: Expression) -> Iterator[str]:
+def _motion_faults(motion: PlatformMotion, rates: Expression) -> Iterator[str]:
     omega = sum((turn.rate * turn.axis for turn in motion.rotation.turns), ca.SX(3, 1))
     turned = ca.mtimes(ca.skew(omega), motion.axes)
     pairs = {"axes: do not turn with the angular velocity": (rate_of(motion.axes), turned)}
@@ -89,10 +89,10 @@ def _motions(motion: PlatformMotion, rates: Expression) -> Iterator[str]:
         ca.mtimes(motion.matrix, rates),
         ca.vertcat(rate_of(motion.body.position), omega),
     )
-    yield from differing(pairs)
+    yield from mismatched_names(pairs)
 
 
-def _forces(
+def _force_faults(
     equations: PlatformEquations,
     motion: PlatformMotion,
     rates: Expression,
@@ -105,16 +105,16 @@ def _forces(
     energy -= ca.dot(gravity, equations.mass_moment(motion, inertia))
     needs = equations.needs(motion, gravity, inertia)
     masses = [ca.SX(k + 1.0) for k in range(len(motion.points))]
-    carried = equations.needs(motion, gravity, equations.carrying(inertia, masses)) - needs
+    extra_needs = equations.needs(motion, gravity, equations.carrying(inertia, masses)) - needs
     pairs = zip(motion.points, motion.matrices, masses, strict=True)
-    ridden = sum(ca.mtimes(a[:3, :].T, m * (c.acceleration - gravity)) for c, a, m in pairs)
-    yield from differing(
+    mass_forces = sum(ca.mtimes(a[:3, :].T, m * (c.acceleration - gravity)) for c, a, m in pairs)
+    yield from mismatched_names(
         {
             "mass_matrix: not symmetric": (mass, mass.T),
             "needs: its power is not the rate of the energy": (
                 ca.dot(needs, rates),
                 rate_of(energy),
             ),
-            "carrying: not what masses on the points need": (carried, ridden),
+            "carrying: not what masses on the points need": (extra_needs, mass_forces),
         }
     )

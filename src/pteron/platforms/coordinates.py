@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 Unit = Literal["m", "rad"]
 
 SHOWN: dict[str, tuple[str, float]] = {"m": ("mm", 1e3), "rad": ("°", 180.0 / math.pi)}
-"""The unit in which people read lengths and angles, by their SI unit, and how many make one."""
+"""The display unit of lengths and angles by their SI unit, and its value per SI unit."""
 
 _TURN_ROUNDING = 1e-14
-"""Rounding of an angle of half a turn, rad."""
+"""Tolerance of an angle of half a turn, rad: rounding."""
 
 
 class Coordinate(NamedTuple):
@@ -69,11 +69,11 @@ def coordinate(name: str) -> Coordinate:
 
 
 def are_angles(names: Iterable[str]) -> NDArray[np.bool_]:
-    """Return, for each of the names of coordinates, whether it is an angle."""
+    """Return whether each of the named coordinates is an angle, (m,) bool."""
     return np.array([coordinate(name).unit == "rad" for name in names], dtype=bool)
 
 
-def within_a_turn(phi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return angles in (-pi, pi]; what is -pi but for rounding becomes pi."""
-    turned = phi - 2.0 * np.pi * np.ceil((phi - np.pi) / (2.0 * np.pi))
-    return np.where(turned <= -np.pi + _TURN_ROUNDING, np.pi, turned)
+def wrap_angle(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return angles wrapped to (-pi, pi]; -pi up to rounding becomes pi."""
+    wrapped = phi - 2.0 * np.pi * np.ceil((phi - np.pi) / (2.0 * np.pi))
+    return np.where(wrapped <= -np.pi + _TURN_ROUNDING, np.pi, wrapped)

@@ -16,18 +16,18 @@ class PlatformJoint(NamedTuple):
     """A virtual joint of the chain from the base to the platform."""
 
     name: str
-    """Name of its coordinate: one of the pose's, or one that follows from them."""
+    """Name of its coordinate: one of the pose's, or a dependent one."""
     slides: bool
     axis: Array
     """Unit vector (3,) where all coordinates are zero; joints before it move it."""
     values: Array
-    """Its coordinate (...) in the poses given, m or rad."""
+    """Its coordinate (...) at the poses, m or rad."""
 
 
 def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
     """Return the chain of joints whose motion is the platform's, at poses (..., m).
 
-    A tripod's chain has x, y and yaw too, which follow from its pose.
+    A tripod's chain has x, y and yaw too, which depend on its pose.
     """
     kind = platform.kind
     x0, y0, k = (np.array(axis) for axis in platform.frame)
@@ -37,12 +37,16 @@ def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
         axes["beta"] = np.array(platform.second_axis)
     names = kind.joints or platform.coordinates
     axes |= dict(zip(platform.lengths, platform.directions, strict=True))
-    values = {name: poses[..., i] for i, name in enumerate(platform.coordinates)}
-    if len(names) > len(values):
-        p, turned = platform.at(poses)
-        along = turned[..., 0, :] * np.sign(np.cos(values["pitch"]))[..., None]
-        held = {"x": p @ x0, "y": p @ y0, "yaw": np.arctan2(along @ y0, along @ x0)}
-        values = held | values
+    by_name = {name: poses[..., i] for i, name in enumerate(platform.coordinates)}
+    if len(names) > len(by_name):
+        p, axes_now = platform.at(poses)
+        x_direction = axes_now[..., 0, :] * np.sign(np.cos(by_name["pitch"]))[..., None]
+        dependent = {
+            "x": p @ x0,
+            "y": p @ y0,
+            "yaw": np.arctan2(x_direction @ y0, x_direction @ x0),
+        }
+        by_name = dependent | by_name
     return [
-        PlatformJoint(name, name in ("x", "y", "z"), axes[name], values[name]) for name in names
+        PlatformJoint(name, name in ("x", "y", "z"), axes[name], by_name[name]) for name in names
     ]

@@ -1,10 +1,10 @@
 """The protocol of platforms' equations: the page to read before writing a kind of platform.
 
 From the pose x and its derivatives the equations give the motion of the platform's points, one a
-leg, and the wrench that the platform's own weight and inertia need. A kind is a subclass of
-`PlatformEquations` in this folder, entered in `kinds.py`, where `equations_class` picks it by what
-a robot file says of its platform. P is the platform's reference point, phi the one angle of a
-platform that does not tilt, k the axis that it turns about.
+leg, and the wrench required by the platform's own weight and inertia. A kind is a subclass of
+`PlatformEquations` in this folder, entered in `kinds.py`, where `equations_class` selects it by the
+robot file. P is the platform's reference point, phi the one angle of a platform that does not tilt,
+k the axis that it turns about.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from pteron.platforms.coordinates import are_angles
 
 
 class Offset(NamedTuple):
-    """s = a cos(phi) + b sin(phi) + still, from P to a platform point; each (3, 1).
+    """s = a cos(phi) + b sin(phi) + constant, from P to a platform point; each (3, 1).
 
-    `still` is the part that phi does not turn: along k, and the point's fixed offset.
+    `constant` is the part that phi does not rotate: along k, and the point's fixed offset.
     """
 
     a: Expression
     b: Expression
-    still: Expression
+    constant: Expression
 
 
 class PlatformMotion(NamedTuple):
@@ -52,7 +52,7 @@ class PlatformMotion(NamedTuple):
     axes: Expression
     """(3, 3): columns x, y and z of the platform's frame at the joints of the legs."""
     body: BodyMotion
-    """The motion of the platform itself as a body, with its rows against (p', omega)."""
+    """The motion of the platform itself as a body, with its rows in (p', omega)."""
     matrix: Expression
     """(6, m): (p', omega) = matrix x'."""
     spatial: SpatialMotion | None = None
@@ -64,7 +64,7 @@ class PlatformMotion(NamedTuple):
     k angles, and x' above stands for them. None where they are the pose's rates."""
 
     def pose_rows(self, rows: Expression) -> Expression:
-        """Return rows (j, m) against x' from rows against the quasi-velocities."""
+        """Return rows (j, m) in x' from rows in the quasi-velocities."""
         if self.angular is None:
             return rows
         lengths = rows.shape[1] - self.angular.shape[0]
@@ -84,21 +84,21 @@ class PlatformMotion(NamedTuple):
 
     @property
     def twist_rows(self) -> Expression:
-        """The twist (v, omega) of P, (6, m), against the pose's rates."""
+        """The Jacobian (6, m) of P's twist (v, omega) in the pose's rates."""
         return self.pose_rows(self.matrix)
 
     def velocity_of(self, twist: Expression) -> tuple[Expression, Expression]:
         """Return x' (m, 1) nearest to a twist of P (6, 1), and the remaining twist (6, 1).
 
-        The nearest is that of least squares; the platform cannot have the remaining part.
+        The solution is that of least squares; the remaining part is infeasible for the platform.
         """
-        square, across = ca.mtimes(self.matrix.T, self.matrix), ca.mtimes(self.matrix.T, twist)
-        quasi = across if square.is_constant() else ca.mtimes(ca.inv_minor(square), across)
+        square, projection = ca.mtimes(self.matrix.T, self.matrix), ca.mtimes(self.matrix.T, twist)
+        quasi = projection if square.is_constant() else ca.mtimes(ca.inv_minor(square), projection)
         return self.pose_rates(quasi), twist - ca.mtimes(self.matrix, quasi)
 
     @property
     def angle_measure(self) -> Expression:
-        """Det E: 0 where the angles are singular, though the machine may not be; 1 at best."""
+        """Det E: 0 where the angles are singular (gimbal lock), 1 at best."""
         if self.angular is None:
             return ca.SX(1)
         a, b, c = ca.horzsplit(self.angular)
@@ -115,11 +115,11 @@ class PlatformMotion(NamedTuple):
     @property
     def _angular_inverse(self) -> Expression:
         a, b, c = ca.horzsplit(self.angular)
-        across = ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
-        return across.T / ca.dot(a, across[:, 0])
+        adj = ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
+        return adj.T / ca.dot(a, adj[:, 0])
 
     def rotation_at(self, point: PointMotion, fixed: Expression) -> RotationMotion:
-        """Return the rotation for the leg at a point; its fixed offset is `fixed` (3, 1), m."""
+        """Return the rotation at a leg's platform point with the fixed offset `fixed` (3, 1), m."""
         return self.rotation._replace(hinge=point.position - fixed)
 
 
@@ -142,26 +142,26 @@ class PlatformEquations(ABC):
     """The names of the components of a wrench at P; none where they follow from the coordinates."""
     joints: ClassVar[tuple[str, ...]] = ()
     """The prismatic and revolute joints of a chain from base to platform, in order, by the names of
-    their coordinates, those that planes hold included; none where they are the pose's own."""
+    their coordinates, dependent ones included; none where they are the pose's own."""
 
     def __init__(
         self,
         frame: Sequence[Expression],
         platform_points: Sequence[Expression],
         fixed_offsets: Sequence[Expression],
-        more: Mapping[str, Any] | None = None,
+        quantities: Mapping[str, Any] | None = None,
     ) -> None:
         self.frame, self.points, self.fixed = frame, platform_points, fixed_offsets
-        self.more = more or {}
+        self.quantities = quantities or {}
         self.offsets = [
             self.offset(s, t) for s, t in zip(platform_points, fixed_offsets, strict=True)
         ]
         x0, y0, k = frame
-        along = {"x": x0, "y": y0, "z": k}
-        lengths = [along[name] for name in self.coordinates if name in along]
+        frame_axes = {"x": x0, "y": y0, "z": k}
+        lengths = [frame_axes[name] for name in self.coordinates if name in frame_axes]
         self.directions = ca.SX.eye(3) if len(lengths) == 3 else ca.horzcat(ca.SX(3, 0), *lengths)
-        """(3, l): unit vectors along which the pose's l lengths count; P is at directions @ lengths
-        where the lengths determine its place."""
+        """(3, l): unit vectors of the pose's l lengths; P is at directions @ lengths where the
+        lengths determine its position."""
 
     def offset(self, s: Expression, t: Expression) -> Offset:
         """Return the offset of a platform point: s in the platform's frame, t its fixed offset."""
@@ -170,13 +170,13 @@ class PlatformEquations(ABC):
 
     @classmethod
     def angles(cls) -> list[int]:
-        """Return the places of the angles in a pose."""
+        """Return the indices of the angles in a pose."""
         return np.flatnonzero(are_angles(cls.coordinates)).tolist()
 
     def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
-        """Return the platform with vectors along its own axes, from P, and the axes (3, 3).
+        """Return the platform with vectors in its own axes, from P, and the axes (3, 3).
 
-        None where that saves nothing.
+        None where that saves no operations.
         """
         return None
 
@@ -194,12 +194,12 @@ class PlatformEquations(ABC):
     def needs(
         self, motion: PlatformMotion, gravity: Expression, inertia: PlatformMoments
     ) -> Expression:
-        """Return the wrench (m, K) that the platform itself needs at P, -F_e."""
+        """Return the wrench (m, K) required at P to move the platform itself, -F_e."""
 
     def needed_wrench(
         self, motion: PlatformMotion, gravity: Expression, inertia: PlatformMoments
     ) -> tuple[Expression, Expression]:
-        """Return the force and the moment about P, each (3, K), that the platform needs."""
+        """Return the force and the moment about P, each (3, K), required to move the platform."""
         return needed_wrench(motion.body, inertia, gravity)
 
     def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
@@ -215,22 +215,22 @@ class PlatformEquations(ABC):
         return mass_moment(motion.body, inertia)
 
     def applied(self, motion: PlatformMotion, wrench: Expression) -> Expression:
-        """Return the forces (m, K) of a wrench on it, whose rows are `wrench_columns`."""
+        """Return the generalized forces (m, K) of a wrench, whose rows are `wrench_columns`."""
         return wrench
 
     def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return the constraint measure of planes that hold the freedoms not in the pose.
+        """Return the constraint measure of the planes that constrain freedoms outside the pose.
 
-        It is 1 at best, 0 where a freedom is not held.
+        It is 1 at best, 0 where a freedom is unconstrained.
         """
         return ca.SX(1)
 
     def held_rows(self, motion: PlatformMotion) -> Expression | None:
-        """Return the unit forces and moments (k, 6) of planes about P; None: no planes hold it."""
+        """Return the unit constraint wrenches (k, 6) of planes about P; None without planes."""
         return None
 
     def carrying(self, inertia: PlatformMoments, masses: Sequence[Expression]) -> PlatformMoments:
-        """Return the platform's inertia with masses (1, K), one a leg, on its points."""
+        """Return the platform's inertia with point masses (1, K), one a leg, at its points."""
         m, hx, hy, i = inertia
         for s, mass in zip(self.points, masses, strict=True):
             m, hx, hy = m + mass, hx + s[0] * mass, hy + s[1] * mass

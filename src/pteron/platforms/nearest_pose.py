@@ -13,23 +13,23 @@ from pteron.platforms.platform import Platform
 Array = NDArray[np.float64]
 
 _TURN_STEPS = 30
-"""Most steps in the search for the angles of a frame."""
+"""Maximum number of Gauss-Newton steps."""
 
 _TURN_APART = 1e-6
-"""Angle of the differences there, rad."""
+"""Step of the central differences, rad."""
 
 _TURN_MOST = 0.5
 """Longest step of an angle, rad."""
 
 _TURN_ROUNDING = 1e-9
-"""Step that ends the search, rad."""
+"""Step at which the iteration ends, rad."""
 
 _SINGULAR = 1e-12
-"""Cosine of the middle angle below which the pose's angles are taken for singular."""
+"""Cosine of the middle angle below which the pose's angles count as singular."""
 
 
 def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
-    """Return the pose (..., m) that has a position (..., 3) of P and a rotation, if one has.
+    """Return the pose (..., m) with a position (..., 3) of P and a rotation, if one exists.
 
     Where the motion cannot have them it is a pose near to them. Roll, or rz, is 0 where the angles
     are singular.
@@ -42,23 +42,23 @@ def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
 
 
 def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
-    """Return a pose (m,) whose angles, next to those of `pose`, bring its axes nearest to others.
+    """Return the pose (m,) near `pose` whose axes are nearest to a frame's, by Gauss-Newton.
 
-    `axes` (3, 3) are those of a frame, one a row, which the platform may not be able to have: the
-    sum of squared differences becomes least, by Gauss and Newton's steps.
+    `axes` (3, 3) are the frame's, one a row, not necessarily feasible for the platform; the sum of
+    squared differences is minimised.
     """
-    found, turns = np.array(pose, dtype=float), np.flatnonzero(platform.angular)
+    nearest, turns = np.array(pose, dtype=float), np.flatnonzero(platform.angular)
     for _ in range(_TURN_STEPS):
-        beside = np.eye(len(found))[turns] * _TURN_APART
+        offsets = np.eye(len(nearest))[turns] * _TURN_APART
         ahead, behind = (
-            platform.at(found + side * beside)[1].reshape(-1, 9) for side in (1.0, -1.0)
+            platform.at(nearest + side * offsets)[1].reshape(-1, 9) for side in (1.0, -1.0)
         )
         slopes = (ahead - behind).T / (2.0 * _TURN_APART)
-        step = np.linalg.lstsq(slopes, (axes - platform.at(found)[1]).ravel(), rcond=None)[0]
-        found[turns] += np.clip(step, -_TURN_MOST, _TURN_MOST)
+        step = np.linalg.lstsq(slopes, (axes - platform.at(nearest)[1]).ravel(), rcond=None)[0]
+        nearest[turns] += np.clip(step, -_TURN_MOST, _TURN_MOST)
         if np.abs(step).max(initial=0.0) < _TURN_ROUNDING:
             break
-    return found
+    return nearest
 
 
 def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
@@ -66,7 +66,7 @@ def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
     if not platform.angles:
         return ()
     if platform.second_axis is not None:
-        return _universal(np.array(platform.axis), np.array(platform.second_axis), rotation)
+        return _universal_angles(np.array(platform.axis), np.array(platform.second_axis), rotation)
     turned = np.array(platform.frame) @ rotation
     if not platform.tilts:
         return (np.arctan2(turned[..., 1, 0], turned[..., 0, 0]),)
@@ -78,38 +78,38 @@ def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
     return (roll, pitch, yaw)[: len(platform.angles)]
 
 
-def _roll_pitch_yaw(turned: Array) -> tuple[Array, Array, Array]:
+def _roll_pitch_yaw(matrix: Array) -> tuple[Array, Array, Array]:
     """Return the angles of Rz(yaw) Ry(pitch) Rx(roll)."""
-    cosine = np.hypot(turned[..., 0, 0], turned[..., 1, 0])
-    pitch = np.arctan2(-turned[..., 2, 0], cosine)
-    held = cosine < _SINGULAR
-    roll = np.where(held, 0.0, np.arctan2(turned[..., 2, 1], turned[..., 2, 2]))
+    cosine = np.hypot(matrix[..., 0, 0], matrix[..., 1, 0])
+    pitch = np.arctan2(-matrix[..., 2, 0], cosine)
+    is_singular = cosine < _SINGULAR
+    roll = np.where(is_singular, 0.0, np.arctan2(matrix[..., 2, 1], matrix[..., 2, 2]))
     yaw = np.where(
-        held,
-        np.arctan2(-turned[..., 0, 1], turned[..., 1, 1]),
-        np.arctan2(turned[..., 1, 0], turned[..., 0, 0]),
+        is_singular,
+        np.arctan2(-matrix[..., 0, 1], matrix[..., 1, 1]),
+        np.arctan2(matrix[..., 1, 0], matrix[..., 0, 0]),
     )
     return roll, pitch, yaw
 
 
-def _universal(first: Array, second: Array, rotation: Array) -> tuple[Array, Array]:
+def _universal_angles(first: Array, second: Array, rotation: Array) -> tuple[Array, Array]:
     """Return the angles of Rot(first, alpha) Rot(second, beta)."""
-    alpha = _turn(first, second, rotation @ second)
-    # As seen from the base the second axis is R b, and what is across it turns about it by beta.
-    moved = rotation @ second
-    across = np.cross(first, second)
-    carried = _rotated(first, alpha, across)
-    return alpha, _turn(moved, carried, rotation @ across)
+    alpha = _angle_about(first, second, rotation @ second)
+    # In the base frame the second axis is R b, and its normal turns about it by beta.
+    second_now = rotation @ second
+    normal = np.cross(first, second)
+    normal_after_alpha = _rotate(first, alpha, normal)
+    return alpha, _angle_about(second_now, normal_after_alpha, rotation @ normal)
 
 
-def _turn(axis: Array, start: Array, end: Array) -> Array:
-    """Return the angle (...) about an axis that takes one vector to another, across it."""
-    along = (axis * np.cross(start, end)).sum(axis=-1)
-    flat = (start * end).sum(axis=-1) - (axis * start).sum(axis=-1) * (axis * end).sum(axis=-1)
-    return np.asarray(np.arctan2(along, flat))
+def _angle_about(axis: Array, start: Array, end: Array) -> Array:
+    """Return the angle (...) about an axis that takes one vector to another, both normal to it."""
+    sine = (axis * np.cross(start, end)).sum(axis=-1)
+    cosine = (start * end).sum(axis=-1) - (axis * start).sum(axis=-1) * (axis * end).sum(axis=-1)
+    return np.asarray(np.arctan2(sine, cosine))
 
 
-def _rotated(axis: Array, angle: Array, vector: Array) -> Array:
-    """Return a vector across an axis (3,), turned about it."""
+def _rotate(axis: Array, angle: Array, vector: Array) -> Array:
+    """Return a vector normal to an axis (3,), rotated about it."""
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     return np.asarray(cosine * vector + sine * np.cross(axis, vector))

@@ -1,6 +1,6 @@
 """`Platform`, the moving platform of a machine: its freedom, axes, parts, inertia, limits and tool.
 
-It is checked when it is made, and says where platform and tool are at poses.
+Its constructor checks it; `at` and `tool_motion` give the positions of platform and tool.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Platform:
     second_axis : unit vector, optional
         What a 2R platform turns about by beta, at alpha = 0.
     planes : tuple of HeldPoint
-        Of a 1T2R platform the planes in which its legs keep its points: the manipulator says them.
+        Of a 1T2R platform the planes in which its legs keep its points: the manipulator sets them.
     """
 
     motion: Motion
@@ -93,8 +93,8 @@ class Platform:
             raise ModelError(f"motion: {self.motion!r} is not {valid}")
         sound, faults = checked_fields(self)
         refuse(faults)
-        for name, value in sound.items():
-            object.__setattr__(self, name, value)
+        for name, field_value in sound.items():
+            object.__setattr__(self, name, field_value)
 
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
@@ -116,7 +116,7 @@ class Platform:
 
     @property
     def on_planes(self) -> bool:
-        """Whether planes, in which its legs keep its points, fix what its pose does not tell."""
+        """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
         return self.motion == "1T2R"
 
     @property
@@ -165,8 +165,8 @@ class Platform:
     @property
     def wrench_columns(self) -> tuple[str, ...]:
         """Names of a wrench at P: a force and moments along its coordinates, all where it tilts."""
-        own = self.kind.wrench_columns
-        return own or tuple(COORDINATES[name].wrench for name in self.coordinates)
+        columns = self.kind.wrench_columns
+        return columns or tuple(COORDINATES[name].wrench for name in self.coordinates)
 
     @property
     def rotation_axes(self) -> tuple[Vector, ...]:
@@ -182,17 +182,17 @@ class Platform:
     def directions(self) -> NDArray[np.float64]:
         """Unit vectors (l, 3) along which the pose's lengths count; l = 2 or 3 of most."""
         x, y, k = self.frame
-        along = {"x": x, "y": y, "z": k}
-        found = np.array([along[name] for name in self.lengths]).reshape(-1, 3)
-        return np.eye(3) if len(found) == 3 else found
+        frame_axes = {"x": x, "y": y, "z": k}
+        unit_vectors = np.array([frame_axes[name] for name in self.lengths]).reshape(-1, 3)
+        return np.eye(3) if len(unit_vectors) == 3 else unit_vectors
 
     def at(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame.
 
-        Of a platform that slides they are the tool's.
+        For a platform that slides the axes are the tool's.
         """
         if self.tilts:
-            return self._placed(poses)
+            return self._place_tilting(poses)
         count = len(self.lengths)
         x, y, z = (np.array(axis) for axis in self.frame)
         angle = poses[..., -1:] if self.turns else np.zeros((*poses.shape[:-1], 1))
@@ -201,24 +201,24 @@ class Platform:
         return poses[..., :count] @ self.directions, np.stack(axes, axis=-2)
 
     def angle_measures(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a measure (...) of poses' angles, 1 at best: 0 where these are singular.
+        """Return a measure (...) of poses' angles: 1 at best, 0 where they are singular.
 
-        So they are where the second turn of three lays the third one's axis along the first.
+        They are singular where the second of three rotations aligns the third axis with the first.
         """
         middle = {"rpy": "pitch", "xyz": "ry"}[self.angle_order]
         if len(self.angles) < 3:
             return np.ones(poses.shape[:-1])
         return np.abs(np.cos(poses[..., self.coordinates.index(middle)]))
 
-    def _placed(
+    def _place_tilting(
         self, poses: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         shape = poses.shape[:-1]
         if not poses.size:
             return np.empty((*shape, 3)), np.empty((*shape, 3, 3))
         rows = np.asarray(poses, dtype=float).reshape(-1, poses.shape[-1])
-        place, axes = (np.asarray(part) for part in _placing(self)(rows.T))
-        # The columns of each (3, 3) stand one behind the other.
+        place, axes = (np.asarray(part) for part in _placement_function(self)(rows.T))
+        # Each (3, 3) is stored column by column.
         return place.T.reshape(*shape, 3), axes.T.reshape(*shape, 3, 3)
 
     def tool_motion(
@@ -227,11 +227,12 @@ class Platform:
         velocities: NDArray[np.float64],
         accelerations: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return place, velocity and acceleration (..., 3) of the tool's centre point."""
+        """Return position, velocity and acceleration (..., 3) of the tool's centre point."""
         parts = poses, velocities, accelerations
         rows = [np.asarray(part, dtype=float).reshape(-1, part.shape[-1]).T for part in parts]
         place, first, second = (
-            np.asarray(found).T.reshape(*poses.shape[:-1], 3) for found in _tool_moving(self)(*rows)
+            np.asarray(column).T.reshape(*poses.shape[:-1], 3)
+            for column in _tool_function(self)(*rows)
         )
         return place, first, second
 
@@ -239,7 +240,7 @@ class Platform:
     def quantities(self) -> dict[str, tuple[float, ...]]:
         """The numbers that its equations need beside its frame and its points, by name.
 
-        Names that end in "axis" are those of unit vectors.
+        Names that end in "axis" denote unit vectors.
         """
         if self.motion == "1T2R":
             return {"side": (self._side,)}
@@ -255,9 +256,9 @@ class Platform:
 
     @property
     def turning_keys(self) -> tuple[str, ...]:
-        """Keys of the points and directions about which it turns, where its legs leave them free.
+        """Keys of the points and directions about which it turns, where its legs do not fix them.
 
-        Those of a platform in the plane follow from its legs.
+        The legs determine those of a planar platform.
         """
         if self.turns and not self.planar and not self.slides:
             return ("axis",)
@@ -265,9 +266,9 @@ class Platform:
 
     def expressions(self) -> dict[str, Any]:
         """Return its `quantities`, and the planes that hold its points, as expressions."""
-        more: dict[str, Any] = {name: _column(v) for name, v in self.quantities.items()}
+        quantities: dict[str, Any] = {name: _column(v) for name, v in self.quantities.items()}
         planes = [HeldPlane(_column(n), _column(r)) for n, r, _ in self.planes]
-        return {**more, "planes": planes} if planes else more
+        return {**quantities, "planes": planes} if planes else quantities
 
     @property
     def _side(self) -> float:
@@ -279,7 +280,7 @@ class Platform:
         return float(np.copysign(1.0, -(weights * (np.cross(normals, arms) @ k)).sum()))
 
     def arms(self, points: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the way (..., k, 3) from P to platform points (k, 3), but for fixed offsets."""
+        """Return vectors (..., k, 3) from P to platform points (k, 3), without fixed offsets."""
         if self.slides:
             return np.asarray(poses[..., -1:, None] * (points @ np.array(self.frame)))
         return np.asarray(points @ self.at(poses)[1])
@@ -287,8 +288,8 @@ class Platform:
     def turned(self, turn: Callable[[Vector], Vector]) -> Platform:
         """Return the platform with every base-frame vector v replaced by `turn(v)`.
 
-        Of a 2R platform, whose frame is the base frame at angles zero, it is another frame that the
-        tool, the inertia and the platform points are in.
+        The frame of a 2R platform is the base frame at angles zero: its tool, inertia and platform
+        points are converted to the new frame.
         """
         x, _, axis = self.frame
         center = self.center and turn(self.center)
@@ -306,7 +307,7 @@ class Platform:
 
     @property
     def joined(self) -> PlanarInertia | SpatialInertia:
-        """The platform's inertia with its bars and geared parts, as the equations take it.
+        """The platform's inertia including its bars and geared parts, for the equations.
 
         A bar counts as a point mass at its hinge; a gear of ratio n adds n^2 times the inertia.
         """
@@ -321,37 +322,39 @@ class Platform:
         return PlanarInertia(mass, (hx, hy), inertia)
 
     def with_joined(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
-        """Return the same platform with this inertia, of which no part is told apart."""
+        """Return the platform with this inertia for all of it, without separate parts."""
         return replace(self, inertia=inertia, bars=(), geared=())
 
 
 @lru_cache(maxsize=64)
-def _placing(platform: Platform) -> ca.Function:
-    """Return P (3,) and the axes, as columns (3, 3), by pose, of a platform that tilts."""
+def _placement_function(platform: Platform) -> ca.Function:
+    """Return the function from a tilting platform's pose to P (3,) and axes, columns (3, 3)."""
     pose = ca.SX.sym("pose", len(platform.coordinates))
-    motion = _at_rest(platform, pose)
+    motion = _rest_motion(platform, pose)
     return ca.Function("placing", [pose], [motion.body.position, ca.vec(ca.densify(motion.axes))])
 
 
 @lru_cache(maxsize=64)
-def _tool_moving(platform: Platform) -> ca.Function:
-    """Return the tool's place, velocity and acceleration (3,) by those of the pose."""
+def _tool_function(platform: Platform) -> ca.Function:
+    """Return the function from a pose, its rate and growth to those of the tool's point (3,)."""
     pose, rate, growth = (ca.SX.sym(name, len(platform.coordinates)) for name in "xva")
-    motion = _at_rest(platform, pose)
+    motion = _rest_motion(platform, pose)
     place = motion.body.position + ca.mtimes(motion.axes, _column(platform.tool))
     velocity = ca.jtimes(place, pose, rate)
     acceleration = ca.jtimes(velocity, pose, rate) + ca.jtimes(place, pose, growth)
-    found = [ca.densify(part) for part in (place, velocity, acceleration)]
-    return ca.Function("tool", [pose, rate, growth], found)
+    outputs = [ca.densify(part) for part in (place, velocity, acceleration)]
+    return ca.Function("tool", [pose, rate, growth], outputs)
 
 
-def _at_rest(platform: Platform, pose: ca.SX) -> PlatformMotion:
-    """Return the state of a platform that rests; its points are those that planes hold."""
-    points = [_column(held.platform_point) for held in platform.planes]
+def _rest_motion(platform: Platform, pose: ca.SX) -> PlatformMotion:
+    """Return the motion of a platform at rest; its points are those kept in planes."""
+    points = [_column(plane.platform_point) for plane in platform.planes]
     frame = [_column(axis) for axis in platform.frame]
-    still, rest = [ca.SX(3, 1)] * len(points), ca.SX.zeros(len(platform.coordinates))
-    return platform.kind(frame, points, still, platform.expressions()).motion(pose, rest, rest)
+    zero_offsets, zero_rates = [ca.SX(3, 1)] * len(points), ca.SX.zeros(len(platform.coordinates))
+    return platform.kind(frame, points, zero_offsets, platform.expressions()).motion(
+        pose, zero_rates, zero_rates
+    )
 
 
-def _column(values: Sequence[float]) -> ca.SX:
-    return ca.SX(ca.DM(list(values)))
+def _column(vector: Sequence[float]) -> ca.SX:
+    return ca.SX(ca.DM(list(vector)))

@@ -40,11 +40,11 @@ class Sliding(PlatformEquations):
         p, dp, ddp = (v[:3] for v in (pose, velocity, acceleration))
         phi, rate, growth = pose[3], velocity[3], acceleration[3]
         points, matrices = [], []
-        for v, _, still in self.offsets:
-            points.append(PointMotion(p + still + v * phi, dp + v * rate, ddp + v * growth))
+        for v, _, constant in self.offsets:
+            points.append(PointMotion(p + constant + v * phi, dp + v * rate, ddp + v * growth))
             matrices.append(self._matrix(v))
         x0, y0, k = self.frame
-        # The first moment of the halves has axes that do not turn; its size grows with phi.
+        # The axes of the halves' first moment do not rotate; its size is proportional to phi.
         grows = x0 * phi, y0 * phi, x0 * growth, y0 * growth
         body = BodyMotion(p, point_rows(ca.SX.eye(3)), ddp, k, ca.SX(1, 6), *grows)
         at_p, axes = self._matrix(ca.SX(3, 1)), ca.horzcat(*self.frame)

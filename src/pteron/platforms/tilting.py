@@ -34,7 +34,7 @@ class Rotation(NamedTuple):
     """A rotation by angles one after the other, to second order."""
 
     matrix: Expression
-    """R (3, 3), but for the platform frame at angles zero."""
+    """R (3, 3), relative to the platform frame at angles zero."""
     axes: Expression
     """E (3, k): omega = E angles'."""
     turning: Expression
@@ -51,19 +51,19 @@ def rotation(
 ) -> Rotation:
     """Return R = Rot(a_1, angle_1) Rot(a_2, angle_2) ..., angles given by cosine and sine.
 
-    With u_i the axis a_i as those before have turned it: omega = sum u_i angle_i', and alpha = sum
-    u_i angle_i'' + omega_(i-1) x u_i angle_i', omega_(i-1) being the sum before.
+    With u_i the axis a_i rotated by the preceding angles: omega = sum u_i angle_i', and alpha = sum
+    u_i angle_i'' + omega_(i-1) x u_i angle_i', omega_(i-1) being the preceding partial sum.
     """
     matrix, omega, alpha = ca.SX.eye(3), ca.SX(3, 1), ca.SX(3, 1)
-    moved = []
+    turned_axes = []
     for a, (c, s), rate, growth in zip(axes, angles, rates, accelerations, strict=True):
         u = ca.mtimes(matrix, a)
         alpha = alpha + u * growth + ca.cross(omega, u) * rate
         omega = omega + u * rate
         turn = c * ca.SX.eye(3) + s * ca.skew(a) + (1 - c) * ca.mtimes(a, a.T)
         matrix = ca.mtimes(matrix, turn)
-        moved.append(u)
-    return Rotation(matrix, ca.horzcat(*moved), omega, alpha)
+        turned_axes.append(u)
+    return Rotation(matrix, ca.horzcat(*turned_axes), omega, alpha)
 
 
 class Tilting(PlatformEquations):
@@ -81,82 +81,84 @@ class Tilting(PlatformEquations):
     order: ClassVar[tuple[str, ...]]
     """The angles' coordinates, in the order in which their turns follow each other."""
 
-    def __init__(self, *given: Any) -> None:
-        super().__init__(*given)
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
         self.based: Tilting | None = None
-        """The same along the base's axes, where vectors are along the platform's."""
+        """The platform in the base's axes, if vectors here are in the platform's axes."""
         self.zero = ca.horzcat(*self.frame)
         """(3, 3): the platform's axes at angles zero."""
         self.arms = [ca.mtimes(self.zero, s) for s in self.points]
         """R s0 at angles zero."""
 
     def turn_axes(self) -> list[Expression]:
-        """Return the axes of the turns at angles zero, in the order of `order`."""
+        """Return the rotation axes at angles zero, in the order of `order`."""
         x, y, k = self.frame
         known = {"roll": x, "rx": x, "pitch": y, "ry": y, "yaw": k, "rz": k}
         return [known[name] for name in self.order]
 
-    def rotated(
+    def pose_rotation(
         self, pose: Expression, velocity: Expression, acceleration: Expression, sign: int = 1
     ) -> Rotation:
         """Return the rotation of a pose; the columns of E are in the order of the coordinates.
 
-        With sign -1 it is the base's against the platform, whose rates are those of -angles.
+        With sign -1 it is the inverse rotation, by -angles in reverse order.
         """
         places = [self.coordinates.index(name) for name in self.order][::sign]
-        found = rotation(
+        turned = rotation(
             self.turn_axes()[::sign],
             [(ca.cos(pose[i]), sign * ca.sin(pose[i])) for i in places],
             [sign * velocity[i] for i in places],
             [sign * acceleration[i] for i in places],
         )
         columns = [places.index(i) for i in sorted(places)]
-        return found._replace(axes=found.axes[:, columns])
+        return turned._replace(axes=turned.axes[:, columns])
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
         if self.based is not None:
-            into, turned = self.based.turned_back(pose, velocity, acceleration)
-            rates = (ca.mtimes(into, v[:3]) for v in (velocity, acceleration))
+            to_own_axes, turned = self.based.rotation_in_own_axes(pose, velocity, acceleration)
+            rates = (ca.mtimes(to_own_axes, v[:3]) for v in (velocity, acceleration))
             place = PointMotion(ca.SX(3, 1), *rates)
         else:
-            turned = self.rotated(pose, velocity, acceleration)
+            turned = self.pose_rotation(pose, velocity, acceleration)
             place = PointMotion(pose[:3], velocity[:3], acceleration[:3])
-        return self.moved(place, turned, ca.SX.eye(6), turned.axes)
+        return self.assemble_motion(place, turned, ca.SX.eye(6), turned.axes)
 
     def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
         if "x" not in self.coordinates:
             return None
-        own = type(self)(ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.more)
-        own.based, rest = self, ca.SX.zeros(len(self.coordinates))
-        return own, self.turned_back(pose, rest, rest)[0].T
+        in_own_frame = type(self)(
+            ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.quantities
+        )
+        in_own_frame.based, zero = self, ca.SX.zeros(len(self.coordinates))
+        return in_own_frame, self.rotation_in_own_axes(pose, zero, zero)[0].T
 
-    def turned_back(
+    def rotation_in_own_axes(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> tuple[Expression, Rotation]:
-        """Return the matrix of vectors along the platform's axes, and its rotation along them."""
-        back, own = self.rotated(pose, velocity, acceleration, -1), self.zero.T
-        turning, growth = (-ca.mtimes(own, v) for v in (back.turning, back.growth))
+        """Return the matrix (3, 3) from base to platform axes, and the rotation in the latter."""
+        back, to_own_axes = self.pose_rotation(pose, velocity, acceleration, -1), self.zero.T
+        turning, growth = (-ca.mtimes(to_own_axes, v) for v in (back.turning, back.growth))
         return (
-            ca.mtimes(own, back.matrix),
-            Rotation(ca.SX.eye(3), ca.mtimes(own, back.axes), turning, growth),
+            ca.mtimes(to_own_axes, back.matrix),
+            Rotation(ca.SX.eye(3), ca.mtimes(to_own_axes, back.axes), turning, growth),
         )
 
-    def moved(
+    def assemble_motion(
         self, place: PointMotion, turned: Rotation, twist: Expression, angular: Expression | None
     ) -> PlatformMotion:
-        """Return the motion of P and of a rotation.
+        """Return the platform's motion from that of P and a rotation.
 
-        `twist` (6, m) is what the quasi-velocities make of (v, omega); `angular` is their block
-        against the angles' rates, None where the quasi-velocities are the pose's.
+        `twist` (6, m) maps the quasi-velocities to (v, omega); `angular` maps the angles' rates to
+        quasi-velocities, None where these are the pose's rates.
         """
         p, dp, ddp = place
         _, _, w, dw = turned
         points, shifts = [], []
         swing = ca.skew(dw) + ca.mtimes(w, w.T) - ca.dot(w, w) * ca.SX.eye(3)
         axes = ca.mtimes(turned.matrix, self.zero)
-        # Of six points that have but x and y, the axes' accelerations cost less than each point's.
+        # For six points with z = 0, the axes' accelerations cost less than each point's.
         flat = len(self.points) == 6 and all(s[2].is_zero() for s in self.points)
         pulled = ca.mtimes(swing, axes[:, :2])
         for arm, s0 in zip(self.arms, self.points, strict=True):
@@ -199,8 +201,8 @@ class Tilting(PlatformEquations):
         return needed_twist_wrench(motion.spatial, inertia, gravity)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: SpatialMoments) -> Expression:
-        whole = twist_mass_matrix(motion.axes, inertia)
-        return ca.mtimes(motion.matrix.T, ca.mtimes(whole, motion.matrix))
+        twist_mass = twist_mass_matrix(motion.axes, inertia)
+        return ca.mtimes(motion.matrix.T, ca.mtimes(twist_mass, motion.matrix))
 
     def mass_moment(self, motion: PlatformMotion, inertia: SpatialMoments) -> Expression:
         moment = ca.mtimes(motion.axes, inertia.h)
@@ -236,13 +238,13 @@ class _Centred(Tilting):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        turned = self.rotated(pose, velocity, acceleration)
-        still = ca.SX(3, 1)
-        place = PointMotion(self.more["center"], still, still)
-        return self.moved(place, turned, *self.basis(turned))
+        turned = self.pose_rotation(pose, velocity, acceleration)
+        zero = ca.SX(3, 1)
+        place = PointMotion(self.quantities["center"], zero, zero)
+        return self.assemble_motion(place, turned, *self.basis(turned))
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the matrix (6, k) of the quasi-velocities, and their block against the rates."""
+        """Return the matrix (6, k) of the quasi-velocities, and that from the angles' rates."""
         return ca.vertcat(ca.SX(3, 3), ca.SX.eye(3)), turned.axes
 
 
@@ -267,7 +269,7 @@ class Universal(_Centred):
     order = ("alpha", "beta")
 
     def turn_axes(self) -> list[Expression]:
-        return [self.more["first_axis"], self.more["second_axis"]]
+        return [self.quantities["first_axis"], self.quantities["second_axis"]]
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
         return ca.vertcat(ca.SX(3, 2), turned.axes), None

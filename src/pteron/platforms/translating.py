@@ -26,12 +26,14 @@ class Translating(PlatformEquations):
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
         p, dp, ddp = (ca.mtimes(self.directions, v) for v in (pose, velocity, acceleration))
-        points = tuple(PointMotion(p + offset.a + offset.still, dp, ddp) for offset in self.offsets)
+        points = tuple(
+            PointMotion(p + offset.a + offset.constant, dp, ddp) for offset in self.offsets
+        )
         matrix = ca.vertcat(self.directions, ca.SX(3, len(self.coordinates)))
-        rest, axes = ca.SX(3, 1), ca.horzcat(*self.frame)
+        zero, axes = ca.SX(3, 1), ca.horzcat(*self.frame)
         x, y, k = self.frame
         row = point_rows(ca.SX.eye(3))
-        body = BodyMotion(p, row, ddp, k, ca.SX(1, 6), x, y, rest, rest)
+        body = BodyMotion(p, row, ddp, k, ca.SX(1, 6), x, y, zero, zero)
         return PlatformMotion(points, (matrix,) * len(points), RotationMotion(), axes, body, matrix)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:

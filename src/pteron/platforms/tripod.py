@@ -29,20 +29,20 @@ class Tripod(Tilting):
     order = ("yaw", "pitch", "roll")
     joints = ("x", "y", "z", *order)
 
-    def __init__(self, *given: Any) -> None:
-        super().__init__(*given)
-        self.planes: Sequence[HeldPlane] = self.more["planes"]
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.planes: Sequence[HeldPlane] = self.quantities["planes"]
         k = self.frame[2]
         normals = [plane.normal for plane in self.planes]
         pairs = [(1, 2), (2, 0), (0, 1)]
         self.weights = [ca.dot(ca.cross(normals[i], normals[j]), k) for i, j in pairs]
         """l."""
-        across = ca.horzcat(*self.frame[:2])
-        flat = [ca.mtimes(across.T, n) for n in normals]
+        horizontal = ca.horzcat(*self.frame[:2])
+        flat = [ca.mtimes(horizontal.T, n) for n in normals]
         (a, b), (_, c) = (ca.horzsplit(row) for row in ca.vertsplit(sum(n @ n.T for n in flat)))
         inverse = ca.blockcat([[c, -b], [-b, a]]) / (a * c - b * b)
-        self.along = [ca.mtimes(across, ca.mtimes(inverse, n)) for n in flat]
-        """(3, 1) a leg: P moves by the sum of them times n_i . v_i where its plane moves by v_i."""
+        self.plane_responses = [ca.mtimes(horizontal, ca.mtimes(inverse, n)) for n in flat]
+        """(3, 1) a leg: P moves by the sum of them times n_i . v_i if plane i moves by v_i."""
 
     def _yaw(self, level: Expression) -> tuple[Expression, Expression]:
         """Return the yaw's cosine and sine; `level` (3, 3) turns by roll and pitch."""
@@ -53,7 +53,7 @@ class Tripod(Tilting):
             a, b = a + weight * ca.dot(n, u), b - weight * ca.dot(ca.cross(n, u), k)
             c = c + weight * ca.dot(n, r)
         square = a * a + b * b
-        root = self.more["side"] * ca.sqrt(square - c * c)
+        root = self.quantities["side"] * ca.sqrt(square - c * c)
         return (a * c + b * root) / square, (b * c - a * root) / square
 
     def motion(
@@ -64,40 +64,45 @@ class Tripod(Tilting):
             ca.vertsplit(v) for v in (pose, velocity, acceleration)
         )
         turns = [(ca.cos(pitch), ca.sin(pitch)), (ca.cos(roll), ca.sin(roll))]
-        none = ca.SX(0)
-        level = rotation((y0, x0), turns, (none, none), (none, none)).matrix
+        zero = ca.SX(0)
+        level = rotation((y0, x0), turns, (zero, zero), (zero, zero)).matrix
         turns = [self._yaw(level), *turns]
         axes = (k, y0, x0)
-        still = rotation(axes, turns, (none,) * 3, (none,) * 3)
-        arms = [ca.mtimes(still.matrix, arm) for arm in self.arms]
+        at_rest = rotation(axes, turns, (zero,) * 3, (zero,) * 3)
+        arms = [ca.mtimes(at_rest.matrix, arm) for arm in self.arms]
         normals = [plane.normal for plane in self.planes]
-        # The planes hold the sum of l_i s_i x n_i . omega at 0, and with it yaw'.
+        # The planes constrain the sum of l_i s_i x n_i . omega to 0, which determines yaw'.
         trios = zip(self.weights, arms, normals, strict=True)
-        held = sum(weight * ca.cross(s, n) for weight, s, n in trios)
-        about = ca.horzsplit(still.axes)  # yaw, pitch, roll
-        shares = [-ca.dot(held, u) / ca.dot(held, about[0]) for u in (about[2], about[1])]
+        yaw_constraint = sum(weight * ca.cross(s, n) for weight, s, n in trios)
+        about = ca.horzsplit(at_rest.axes)  # yaw, pitch, roll
+        shares = [
+            -ca.dot(yaw_constraint, u) / ca.dot(yaw_constraint, about[0])
+            for u in (about[2], about[1])
+        ]
         spin = ca.horzcat(
             ca.SX(3, 1), about[2] + shares[0] * about[0], about[1] + shares[1] * about[0]
         )
-        twist = ca.vertcat(self._carried(arms, spin) + ca.horzcat(k, ca.SX(3, 2)), spin)
+        twist = ca.vertcat(self._carried_velocity(arms, spin) + ca.horzcat(k, ca.SX(3, 2)), spin)
         first = shares[0] * rates[0] + shares[1] * rates[1]
-        # Once more, with what turning adds to the points' acceleration.
+        # Second order: with the centripetal terms of the points' acceleration.
         rates = (first, rates[1], rates[0])
-        bias = rotation(axes, turns, rates, (none,) * 3)
+        bias = rotation(axes, turns, rates, (zero,) * 3)
         w = bias.turning
         swings = [ca.cross(bias.growth, s) + ca.cross(w, ca.cross(w, s)) for s in arms]
         trios = zip(self.weights, normals, swings, strict=True)
-        drift = -sum(weight * ca.dot(n, v) for weight, n, v in trios) / ca.dot(held, about[0])
+        drift = -sum(weight * ca.dot(n, v) for weight, n, v in trios) / ca.dot(
+            yaw_constraint, about[0]
+        )
         second = shares[0] * growths[0] + shares[1] * growths[1] + drift
         turned = rotation(axes, turns, rates, (second, growths[1], growths[0]))
         dw = turned.growth
-        moved = [ca.cross(dw, s) + ca.cross(w, ca.cross(w, s)) for s in arms]
-        triples = zip(self.planes, arms, self.along, strict=True)
+        accelerations = [ca.cross(dw, s) + ca.cross(w, ca.cross(w, s)) for s in arms]
+        triples = zip(self.planes, arms, self.plane_responses, strict=True)
         place = sum(v * ca.dot(n, r - s) for (n, r), s, v in triples) + z * k
-        triples = zip(normals, moved, self.along, strict=True)
+        triples = zip(normals, accelerations, self.plane_responses, strict=True)
         ddp = ddz * k - sum(v * ca.dot(n, a) for n, a, v in triples)
         dp = ca.mtimes(twist[:3, :], velocity)
-        return self.moved(PointMotion(place, dp, ddp), turned, twist, None)
+        return self.assemble_motion(PointMotion(place, dp, ddp), turned, twist, None)
 
     def held_rows(self, motion: PlatformMotion) -> Expression:
         normals = [plane.normal.T for plane in self.planes]
@@ -105,9 +110,9 @@ class Tripod(Tilting):
         return ca.vertcat(*(ca.mtimes(n, shift[:3, :]) for n, shift in pairs))
 
     def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return how well the planes hold x, y and yaw: 0 at a constraint singularity.
+        """Return the constraint measure of x, y and yaw: 0 at a constraint singularity.
 
-        It is the determinant of their forces and moments about k over the most that it may be.
+        It is the determinant of the planes' forces and moments about k over its upper bound.
         """
         x, y, k = self.frame
         rows = self.held_rows(motion)
@@ -116,9 +121,9 @@ class Tripod(Tilting):
         square = sum(ca.dot(s - center, s - center) for s in self.points)
         return ca.dot(flat[:, 0], ca.cross(flat[:, 1], flat[:, 2])) / (1.5 * ca.sqrt(square))
 
-    def _carried(self, arms: Sequence[Expression], spin: Expression) -> Expression:
-        """Return the velocity of P (3, m) that keeps the points in their planes while it turns."""
+    def _carried_velocity(self, arms: Sequence[Expression], spin: Expression) -> Expression:
+        """Return the velocity of P (3, m) that keeps the points in their planes during `spin`."""
         total = ca.SX(3, spin.shape[1])
-        for (n, _), s, v in zip(self.planes, arms, self.along, strict=True):
+        for (n, _), s, v in zip(self.planes, arms, self.plane_responses, strict=True):
             total = total - ca.mtimes(v, ca.mtimes(ca.cross(s, n).T, spin))
         return total

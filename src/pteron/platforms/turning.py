@@ -35,20 +35,20 @@ class Turning(PlatformEquations):
         turn = Turn(k, velocity[-1], acceleration[-1])
         rotation = RotationMotion((turn,), pose[-1])
         points, matrices = [], []
-        for a, b, still in self.offsets:
-            s, lever, dds = _turned(a, b, rotation)
-            points.append(PointMotion(p + s + still, dp + lever * turn.rate, ddp + dds))
+        for a, b, constant in self.offsets:
+            s, lever, dds = _rotate_offset(a, b, rotation)
+            points.append(PointMotion(p + s + constant, dp + lever * turn.rate, ddp + dds))
             matrices.append(self._matrix(lever))
-        x, y, ddx = _turned(x0, y0, rotation)
-        ddy = _turned(y0, -x0, rotation)[2]
+        x, y, ddx = _rotate_offset(x0, y0, rotation)
+        ddy = _rotate_offset(y0, -x0, rotation)[2]
         body = BodyMotion(p, point_rows(ca.SX.eye(3)), ddp, k, turn.row, x, y, ddx, ddy)
         at_p, axes = self._matrix(ca.SX(3, 1)), ca.horzcat(x, y, k)
         return PlatformMotion(tuple(points), tuple(matrices), rotation, axes, body, at_p)
 
     def _matrix(self, lever: Expression) -> Expression:
         """Return the matrix (6, m) of a point with this k x s."""
-        still = ca.SX(3, self.directions.shape[1])
-        return ca.blockcat([[self.directions, lever], [still, self.frame[2]]])
+        zero = ca.SX(3, self.directions.shape[1])
+        return ca.blockcat([[self.directions, lever], [zero, self.frame[2]]])
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
         a_g = motion.body.acceleration - gravity
@@ -69,7 +69,7 @@ class Turning(PlatformEquations):
         x0, y0, _ = self.frame
         h0 = ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
         dh0 = ca.mtimes(y0, inertia.hx) - ca.mtimes(x0, inertia.hy)
-        return _turned(h0, dh0, motion.rotation)
+        return _rotate_offset(h0, dh0, motion.rotation)
 
 
 class PlanarTurning(Turning):
@@ -78,11 +78,11 @@ class PlanarTurning(Turning):
     coordinates = ("x", "y", "phi")
 
 
-def _turned(
+def _rotate_offset(
     a: Expression, b: Expression, rotation: RotationMotion
 ) -> tuple[Expression, Expression, Expression]:
     """Return s = a cos(phi) + b sin(phi), k x s and s'' = k x s phi'' - s phi'^2, b being k x a."""
     (turn,) = rotation.turns
     c, s = ca.cos(rotation.angle), ca.sin(rotation.angle)
-    turned, lever = a * c + b * s, b * c - a * s
-    return turned, lever, lever * turn.acceleration - turned * (turn.rate * turn.rate)
+    rotated, lever = a * c + b * s, b * c - a * s
+    return rotated, lever, lever * turn.acceleration - rotated * (turn.rate * turn.rate)

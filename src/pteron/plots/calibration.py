@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_guides, enlarged_points, greatest_difference
@@ -91,7 +91,7 @@ def differences_figure(
     """
     machine, other = as_manipulator(drawn), as_manipulator(found)
     expect_alike(machine, other)
-    shown = home_pose(machine) if pose is None else checked(machine, pose, "pose").ravel()
+    shown = home_pose(machine) if pose is None else finite_rows(machine, pose, "pose").ravel()
     points, there = joint_points(machine, shown), joint_points(other, shown)
     guides = joint_guides(machine, shown)
     size = scene_of(points, guides, None).size

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
-from pteron.kernels.named_columns import by_name
+from pteron.kernels.named_columns import pick_columns
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.manipulator import RobotLike, as_manipulator
 
@@ -25,7 +25,7 @@ def named(robot: RobotLike | None, values: ArrayLike, what: str) -> ArrayLike:
     """Return a table's columns of a machine, such as its "forces"; an array as it is."""
     if robot is None:
         return values
-    columns: ArrayLike = by_name(values, as_manipulator(robot).column_names[what], what)
+    columns: ArrayLike = pick_columns(values, as_manipulator(robot).column_names[what], what)
     return columns
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points
 from pteron.plots.canvas import FONT_SIZE, INK, blank
@@ -88,12 +88,16 @@ def draw(
     >>> figure.savefig("delta.png")  # doctest: +SKIP
     """
     robot = as_manipulator(robot)
-    shown = home_pose(robot) if pose is None else checked(robot, pose, "pose")
+    shown = home_pose(robot) if pose is None else finite_rows(robot, pose, "pose")
     if shown.size != robot.freedom:  # a table's row is one pose too
         count = shown.size // robot.freedom
         raise DataError(f"pose: {count} given, 1 expected; poses_figure draws several")
     shown = shown.ravel()
-    way = None if along is None else np.reshape(checked(robot, along, "along"), (-1, robot.freedom))
+    way = (
+        None
+        if along is None
+        else np.reshape(finite_rows(robot, along, "along"), (-1, robot.freedom))
+    )
     return robot_figure(
         joint_points(robot, shown),
         joint_guides(robot, shown if way is None else np.vstack([shown[None], way])),
@@ -196,7 +200,7 @@ def poses_figure(
     machines = [as_manipulator(robot) for robot in several]
     expect(machines, "robots", "none", "at least 1")
     first = machines[0]
-    shown = np.reshape(checked(first, poses, "poses"), (-1, first.freedom))
+    shown = np.reshape(finite_rows(first, poses, "poses"), (-1, first.freedom))
     count = max(len(machines), len(shown))
     if len(shown) not in (1, count) or len(machines) not in (1, count):
         raise DataError(f"poses: {len(shown)} given for {len(machines)} robots, as many expected")

@@ -14,8 +14,8 @@ from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import inverse_dynamics
 from pteron.kernels import Array, Port, bare, count_operations, program
 from pteron.kernels.graph import graph_of
-from pteron.kernels.hoisting import hoisted
-from pteron.kernels.kept import kept_result
+from pteron.kernels.hoisting import hoist_invariants
+from pteron.kernels.program_cache import cached_result
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data
 from pteron.reduction.find import base_parameters
 from pteron.reduction.numerical import independent
@@ -65,7 +65,7 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
 def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
     columns = parameter_data(robot)
     key, packages = ("cheapest", bare(robot)), ("kinematics", "reduction")
-    best = kept_result(key, packages, lambda: _cheapest_columns(robot))
+    best = cached_result(key, packages, lambda: _cheapest_columns(robot))
     return base_parameters(robot, keep=[columns[k].name for k in best])
 
 
@@ -126,7 +126,7 @@ class _Model:
     """The reduced model of a machine, which costs something for every choice of base parameters."""
 
     def __init__(self, robot: Manipulator) -> None:
-        self.machine = Machine.of(robot)
+        self.machine = Machine.numeric(robot)
         names = ("pose", "velocity", "acceleration")
         self.motion = [ca.SX.sym(name, robot.freedom) for name in names]
         self.state = self.machine.state(*self.motion)
@@ -156,4 +156,4 @@ class _Model:
 def _final_cost(robot: Manipulator, base_columns: tuple[int, ...]) -> int:
     """Return the operations of the kernel: after the pass, base parameters made ready once."""
     built = program(robot, "inverse_dynamics", tuple((column,) for column in base_columns))
-    return count_operations(hoisted(built, "base_parameters")[0].function)
+    return count_operations(hoist_invariants(built, "base_parameters")[0].function)

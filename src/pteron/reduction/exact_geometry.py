@@ -138,7 +138,7 @@ class ExactGeometry:
         return values
 
     def within(self, field: Field[Element]) -> list[Element]:
-        """Return the geometry vector of `Machine.symbols` in a field."""
+        """Return the geometry vector of `Machine.symbolic` in a field."""
         numbers = [
             number
             for leg in self.legs

@@ -15,8 +15,8 @@ from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.kernels import OTHER_LAYOUT, bare, same_layout
-from pteron.kernels.kept import kept_result
-from pteron.kinematics.evaluate import evaluated
+from pteron.kernels.program_cache import cached_result
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction.grouping import Grouping
 from pteron.reduction.numerical import qr_grouping, svd_grouping
@@ -124,7 +124,7 @@ def _grouping(
         return _NUMERICAL[method](layout, order, sharing, seed)
 
     key = "grouping", layout, method, order, groups, seed, version("sympy")
-    return kept_result(key, ("kinematics", "reduction"), found)
+    return cached_result(key, ("kinematics", "reduction"), found)
 
 
 def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int]:
@@ -194,5 +194,5 @@ def base_regressor(
     if base.robot is not robot and not same_layout(base.robot, robot):
         raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
     motion = pose, velocity, acceleration
-    matrices: Regressors = evaluated(robot, "base_regressor", on_failure, *motion, base=base)
+    matrices: Regressors = evaluate_kernel(robot, "base_regressor", on_failure, *motion, base=base)
     return matrices  # Section 5 (c), Contribution 3

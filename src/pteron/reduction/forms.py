@@ -16,7 +16,7 @@ from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
 from pteron.equations.regressor import Terms, terms
 from pteron.kernels import TARGETS, Kernel, Port, compile
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
 from pteron.manipulator import parameters
 from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
@@ -80,7 +80,7 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
         parameters as a fixed input.
     """
     robot = base.robot
-    machine = Machine.of(robot)
+    machine = Machine.numeric(robot)
     values = parameters(robot)
     sets = {
         "complete": (ca.SX.eye(len(values)), values),
@@ -97,7 +97,9 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
         for name, (selection, numbers) in sets.items():
             symbols = ca.SX.sym("parameters", len(numbers))
             forces = build(inverse, factors, selection, symbols)
-            function = optimised(ca.Function("forces", [x, dx, ddx, symbols], [ca.cse(forces)]))
+            function = optimise_function(
+                ca.Function("forces", [x, dx, ddx, symbols], [ca.cse(forces)])
+            )
             kernels[form, name] = TARGETS["vm"](
                 f"{form}, {name}",
                 function,

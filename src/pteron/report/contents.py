@@ -12,7 +12,7 @@ import numpy as np
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
-from pteron.kernels.kept import kept_result
+from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
@@ -166,7 +166,7 @@ class Report:
 
 def _volume(robot: Manipulator, home: Array) -> ReachVolume:
     key = "reach_volume", robot, tuple(home.tolist()), version("scipy")
-    return kept_result(key, ("kinematics", "workspace"), lambda: reach_volume(robot, home))
+    return cached_result(key, ("kinematics", "workspace"), lambda: reach_volume(robot, home))
 
 
 def contents(robot: Manipulator, motion: Playback | None = None) -> Report:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pteron.kernels.kept import kept_result
+from pteron.kernels.program_cache import cached_result
 from pteron.reduction import FORMS, BaseParameters, model_forms
 
 PAPER_CLAIM = (  # Section 5 (d), Section 6
@@ -53,7 +53,7 @@ def costs(base: BaseParameters) -> tuple[Cost, ...]:
     of `base`.
     """
     every = range(base.selection.shape[0])
-    counts = kept_result(
+    counts = cached_result(
         ("costs", base.robot, base.parameters, base.kept),
         ("kinematics", "reduction"),
         lambda: {key: kernel.operations for key, kernel in model_forms(base).items()},

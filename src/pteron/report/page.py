@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 from pteron.bodies.inertia import Inertia, with_center
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.kernels.kept import kept_result
+from pteron.kernels.program_cache import cached_result
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
 from pteron.manipulator import Manipulator
@@ -270,7 +270,7 @@ def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
     """Return the sums in symbols and the symbols' values in m; None if none, or too long."""
     key = base.robot, base.parameters, base.kept, base.certificate.method, version("sympy")
     packages = "kinematics", "reduction", "report", "short_numbers"
-    texts = kept_result(("symbols", *key), packages, partial(_in_symbols, base))
+    texts = cached_result(("symbols", *key), packages, partial(_in_symbols, base))
     if texts is None:
         return None
     sums, lengths = texts

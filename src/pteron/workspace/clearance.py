@@ -10,7 +10,7 @@ import numpy as np
 from pteron.equations.clearance import meetings, pairs
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import evaluated
+from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, Radii, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
 from pteron.workspace.conditions import Condition
@@ -108,7 +108,7 @@ def clearance(
     """
     robot = as_manipulator(robot)
     counted = pairs(robot)
-    distances: Array = evaluated(robot, "clearances", on_failure, pose)
+    distances: Array = evaluate_kernel(robot, "clearances", on_failure, pose)
     names = tuple((a.name, b.name) for a, b in counted)
     given = _radii(robot, radii)
     touching = [getattr(given, a.kind) + getattr(given, b.kind) for a, b in counted]

@@ -127,7 +127,7 @@ def _edges(layout: Manipulator) -> tuple[Condition, ...]:
     pose = ca.SX.sym("pose", layout.freedom)
     return tuple(
         Condition(edge.leg, _clause(edge), "room", "room", k)
-        for k, edge in enumerate(edges(Machine.of(layout), pose))
+        for k, edge in enumerate(edges(Machine.numeric(layout), pose))
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.kernels.bisection import bisected
+from pteron.kernels.bisection import bisect_condition
 from pteron.workspace.components import Lattice, lattice
 from pteron.workspace.paving import Paving
 
@@ -57,7 +57,7 @@ def cube_bound(paving: Paving) -> float:
         return 0.0
     cells = lattice(paving)
     widest = float((cells.size * cells.possible.shape).min() + 2.0 * cells.size.max())
-    edge = bisected(lambda edge: _has_block(cells, edge), 0.0, widest, _HALVINGS)[1]
+    edge = bisect_condition(lambda edge: _has_block(cells, edge), 0.0, widest, _HALVINGS)[1]
     return float(edge) * (1.0 + _WIDER)
 
 

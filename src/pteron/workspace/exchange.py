@@ -16,7 +16,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.kernels.bisection import bisected
+from pteron.kernels.bisection import bisect_condition
 from pteron.kernels.one_thread import one_thread
 from pteron.workspace.boxes import varied
 from pteron.workspace.lattice_minima import failing_between
@@ -186,7 +186,9 @@ def _feasible_step(program: Program, samples: Samples, good: Array, z: Array) ->
     if program.keeps(samples, z):
         return 1.0
     way = z - good
-    kept = bisected(lambda share: program.keeps(samples, good + share * way), 0.0, 1.0, _HALVINGS)
+    kept = bisect_condition(
+        lambda share: program.keeps(samples, good + share * way), 0.0, 1.0, _HALVINGS
+    )
     return float(kept[0])
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of, numbers
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, bounds, numeric
-from pteron.kernels.bisection import bisected
+from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace.boxes import halved
@@ -165,7 +165,7 @@ def _sampled(robot: Manipulator, region: Array) -> Array | None:
     count = min(len(one), len(other))
     if not count:
         return None
-    negative, _ = bisected(
+    negative, _ = bisect_condition(
         lambda poses: (_in_reach(robot, poses) < 0.0)[:, None],
         one[:count],
         other[:count],

@@ -11,7 +11,7 @@ from pteron.dynamics import inverse_dynamics
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
 from pteron.kinematics.ram_figures import similarity
-from pteron.kinematics.sampling import drawn_poses
+from pteron.kinematics.sampling import draw_poses
 from pteron.kinematics.singular_distance import coordinate_distances
 from pteron.kinematics.unit_rows import least_singular_values, unit_rows
 from pteron.manipulator import Manipulator
@@ -92,7 +92,7 @@ def holding(robot: Manipulator, home: Array) -> Holding:
 def _singular_distances(robot: Manipulator, home: tuple[float, ...]) -> tuple[float, float, float]:
     """Return L, the changes of coordinates that make home and any pose at all singular, m."""
     poses = np.array([home])
-    drawn = drawn_poses(robot, _POSES, np.random.default_rng(0), limits=False)
+    drawn = draw_poses(robot, _POSES, np.random.default_rng(0), limits=False)
     distances = coordinate_distances(robot, np.vstack([poses, drawn]))
     length = unit_rows(robot, poses).length
     return length, float(distances[0]), float(np.nanmax(distances))

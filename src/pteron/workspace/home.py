@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
-from pteron.kernels.kept import kept_result
+from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
 from pteron.kinematics.singularities import best_type_ii
@@ -202,7 +202,7 @@ def expect_usable(robot: Manipulator, pose: Array) -> None:
 def _stored(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
     """Return both poses, worked out before, in another process too, or now."""
     key, packages = ("home_poses", bare(robot)), ("kinematics", "workspace")
-    return kept_result(key, packages, lambda: _both_sides(robot))
+    return cached_result(key, packages, lambda: _both_sides(robot))
 
 
 def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:

@@ -11,7 +11,7 @@ from pteron.arguments import expect, expect_share
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -101,7 +101,7 @@ def largest_cube(
     (0.2, True)
     """
     robot = as_manipulator(robot)
-    at = checked_one(robot, pose, "pose")
+    at = finite_pose(robot, pose, "pose")
     count = len(robot.platform.lengths)
 
     def region(center: Array, size: float) -> Region:
@@ -150,7 +150,7 @@ def largest_cylinder(
         no share between 0 and 1.
     """
     robot = as_manipulator(robot)
-    at = checked_one(robot, pose, "pose")
+    at = finite_pose(robot, pose, "pose")
     expect_space(robot, "robot")
     expect(ratio > 0.0, "ratio", repr(ratio), "a number above 0")
     unit = np.array(Cylinder((0.0, 0.0, 0.0), 1.0, 1.0, axis).axis)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from pteron.kernels import Array
-from pteron.kernels.bisection import bisected
+from pteron.kernels.bisection import bisect_condition
 from pteron.manipulator import Manipulator
 from pteron.workspace.conditions import Condition, keeps
 from pteron.workspace.proofs import Proof, prove
@@ -31,7 +31,9 @@ def largest_proved(
     not hold where none does.
     """
     size = float(
-        bisected(lambda size: keeps(robot, given, poses(size)).all(), 0.0, most, halvings)[0]
+        bisect_condition(lambda size: keeps(robot, given, poses(size)).all(), 0.0, most, halvings)[
+            0
+        ]
     )
     for share in shares:
         proof = prove(robot, region(share * size), given=given)

@@ -13,7 +13,7 @@ import numpy as np
 
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import told_legs
+from pteron.manipulator.manipulator import legs_text
 from pteron.thresholds import CROSSING, ENDS, SAME_PLACE
 
 _FEWEST = 3
@@ -47,7 +47,7 @@ def _swapped(robot: Manipulator) -> Iterator[str]:
         return
     moved = [i + 1 for i in identity if order[i] != i]
     yield (
-        f"{told_legs(moved)}: look swapped: with their platform_points exchanged {best} turns"
+        f"{legs_text(moved)}: look swapped: with their platform_points exchanged {best} turns"
         f"{' and reflections' if reflections else ''} about the axis leave the machine as it is, "
         f"now {own}: is each joined to the right place on the platform?"
     )

@@ -11,8 +11,8 @@ from itertools import combinations
 import numpy as np
 
 from pteron.kernels import Array
-from pteron.kernels.bisection import bisected
-from pteron.kinematics.evaluate import checked_one
+from pteron.kernels.bisection import bisect_condition
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halved
@@ -73,7 +73,7 @@ def mode_pavings(
     dict of tuple of int to Paving
     """
     robot = as_manipulator(robot)
-    at = checked_one(robot, pose, "pose")
+    at = finite_pose(robot, pose, "pose")
     return {
         tuple(leg.elbow for leg in mode.legs): paving(mode, at, tolerance=tolerance)
         for mode in working_modes(robot)
@@ -142,7 +142,7 @@ def _crossing(one: Paving, own: IntervalTest, k: int, low: Array, high: Array) -
         if not ((least > 0.0).any() and (most < 0.0).any()):
             continue
         ends = poses[least.argmax()], poses[most.argmin()]
-        return bisected(
+        return bisect_condition(
             lambda pose: condition_margins(one.robot, one.conditions, pose)[k] >= 0.0,
             *ends,
             _HALVINGS,

@@ -20,7 +20,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.architecture import architecture, expect_regular
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -121,7 +121,7 @@ def nearest_singularities(
     True
     """
     robot = as_manipulator(robot)
-    at = checked_one(robot, pose, "pose")
+    at = finite_pose(robot, pose, "pose")
     expect(most >= 1, "most", most, "1 box at least")
     expect_regular(robot)
     inverse_kinematics(robot, at)

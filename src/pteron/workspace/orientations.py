@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike
 from pteron.workspace.paving import paving
@@ -80,7 +80,7 @@ def over_angles(
     ((1, 2), 'm^2')
     """
     robot = as_manipulator(robot)
-    at = checked_one(robot, pose, "pose")
+    at = finite_pose(robot, pose, "pose")
     if len(robot.platform.angles) != 1:
         raise ModelError("the platform does not turn: it has one orientation", subject=robot.name)
     given = np.asarray(angles, dtype=float)

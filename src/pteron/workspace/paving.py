@@ -15,7 +15,7 @@ from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.kinematics.architecture import expect_regular
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halved, varied
@@ -216,7 +216,7 @@ def paving(
     (True, True)
     """
     robot = as_manipulator(robot)
-    at = checked_one(robot, pose, "pose")
+    at = finite_pose(robot, pose, "pose")
     # The undecided part may be larger than what is inside: a tolerance above 1.
     expect(0.0 < tolerance < np.inf, "tolerance", repr(tolerance), "a share above 0")
     expect_regular(robot)

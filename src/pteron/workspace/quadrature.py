@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from pteron.arguments import expect, expect_to_fit
 from pteron.kernels import Array
-from pteron.kernels.bisection import bisected
-from pteron.kinematics.evaluate import checked_one
+from pteron.kernels.bisection import bisect_condition
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
@@ -81,7 +81,7 @@ def quadrature_volume(
     """
     robot = as_manipulator(robot)
     expect(lines >= 2 and not lines % 2, "lines", lines, "an even number of them")
-    at = checked_one(robot, pose, "pose")
+    at = finite_pose(robot, pose, "pose")
     box = bounding_box(robot, at)
     across = box.shape[1] - 1
     expect_to_fit("lines", lines, 3.0 * float(lines) ** across * across)
@@ -123,7 +123,7 @@ def _lengths(
     line, k = np.nonzero(seen[:, 1:] != seen[:, :-1])
     leaves = seen[line, k]
     low, high = x[np.maximum(k - 1, 0)], x[np.minimum(k, _SAMPLES - 1)]
-    low, high = bisected(lambda x: inside(x, line) == leaves, low, high, _HALVINGS)
+    low, high = bisect_condition(lambda x: inside(x, line) == leaves, low, high, _HALVINGS)
     found = np.zeros(len(places))
     np.add.at(found, line, np.where(leaves, 1.0, -1.0) * 0.5 * (low + high))
     return found

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pteron.arguments import expect, expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import varied
@@ -145,7 +145,7 @@ def reach_slice(
         raise DataError(f"plane: {plane!r} is not one of {valid}")
     expect(points >= 2, "points", points, "at least 2")
     expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + robot.joint_count))
-    pose = checked_one(robot, center, "center")
+    pose = finite_pose(robot, center, "center")
     i, j = (robot.coordinates.index(name) for name in names)
     if extent is None and robot.platform.angular[[i, j]].any():
         wide = reach_slice(robot, pose, plane, extent=_wide(robot, pose, i, j), points=points)

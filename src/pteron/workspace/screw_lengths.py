@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pteron.kinematics.evaluate import checked
-from pteron.kinematics.sampling import drawn_poses
+from pteron.kinematics.evaluate import finite_rows
+from pteron.kinematics.sampling import draw_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PerJoint, PoseLike
 
@@ -46,7 +46,7 @@ def screw_lengths(robot: RobotLike, pose: PoseLike) -> PerJoint:
     array([0., 0., 0.])
     """
     robot = as_manipulator(robot)
-    poses = checked(robot, pose, "pose")
+    poses = finite_rows(robot, pose, "pose")
     found = np.zeros((*poses.shape[:-1], robot.joint_count))
     place, axes = robot.platform.at(poses)
     start = robot.platform.at(np.zeros(robot.freedom))[1]
@@ -68,7 +68,7 @@ def screw_warnings(robot: Manipulator) -> tuple[str, ...]:
     """Return a warning of the length that screws may add to a machine's rams, if it has screws."""
     if all(leg.screw_lead is None for leg in robot.legs):
         return ()
-    added = np.abs(screw_lengths(robot, drawn_poses(robot, _POSES, np.random.default_rng(0))))
+    added = np.abs(screw_lengths(robot, draw_poses(robot, _POSES, np.random.default_rng(0))))
     leg = int(added.max(axis=0).argmax())
     return (
         "screw_lead: lengths are told as if no piston spun about its axis, which ball joints leave "

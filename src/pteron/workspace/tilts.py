@@ -14,7 +14,7 @@ from pteron.arguments import expect, expect_share
 from pteron.bodies.vectors import PARALLEL_TOLERANCE, dot
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
@@ -225,7 +225,7 @@ def _checked(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
             + ("" if upright else ": its axes are not level and at right angles"),
             subject=machine.name,
         )
-    return machine, checked_one(machine, pose, "pose")
+    return machine, finite_pose(machine, pose, "pose")
 
 
 def _largest(

@@ -9,7 +9,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import told_legs
+from pteron.manipulator.manipulator import legs_text
 from pteron.workspace.margins import distance_to_limits
 from pteron.workspace.volume import deepest
 
@@ -43,7 +43,7 @@ def nowhere(robot: Manipulator) -> ModelError:
             missed.setdefault(f"{max(-m, 0.0):.3g} m", []).append(i)
     return ModelError(
         "no pose is in reach of all legs: at the best one they miss by "
-        f"{', '.join(f'{way} ({told_legs(legs)})' for way, legs in missed.items())}; bring the "
+        f"{', '.join(f'{way} ({legs_text(legs)})' for way, legs in missed.items())}; bring the "
         "guide points nearer or lengthen the links",
         subject=robot.name,
     )
@@ -85,5 +85,5 @@ def _values(joints: list[LimitedJoint]) -> str:
     """Say at what values joints of one noun are."""
     first, values = joints[0], [at.value for at in joints]
     low, high = (f"{value:.4g}" for value in (min(values), max(values)))
-    legs = f"{told_legs([at.leg for at in joints])}: " if first.leg else ""
+    legs = f"{legs_text([at.leg for at in joints])}: " if first.leg else ""
     return f"{legs}{first.noun} at {low if low == high else f'{low} to {high}'} {first.unit}"

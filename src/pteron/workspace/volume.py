@@ -11,7 +11,7 @@ import scipy  # type: ignore[import-untyped]
 from pteron.arguments import expect, expect_to_fit
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike, Seed
@@ -124,7 +124,7 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
            [ 0.3 ,  0.3 ,  0.3 ]])
     """
     robot = as_manipulator(robot)
-    given = checked_one(robot, pose, "pose")
+    given = finite_pose(robot, pose, "pose")
     count = len(robot.platform.lengths)
 
     def depths(p: Array) -> Array:
@@ -252,7 +252,7 @@ def reach_volume(
     robot = as_manipulator(robot)
     expect(count >= 1, "count", count, "at least 1")
     expect_to_fit("count", count, 4.0 * count * robot.freedom)
-    given = checked_one(robot, pose, "pose")
+    given = finite_pose(robot, pose, "pose")
     box = bounding_box(robot, given)
     size = (count, len(box[0]))
     poses = varied(given, np.random.default_rng(seed).uniform(box[0], box[1], size))

@@ -23,8 +23,8 @@ from pteron.design.choosing.search import search_kind
 from pteron.design.processes import Pool
 from pteron.errors import DataError, PteronError
 from pteron.json_values import json_ready
-from pteron.kernels.kept import EQUATIONS, name_of
 from pteron.kernels.one_thread import one_thread
+from pteron.kernels.program_cache import EQUATIONS, name_of
 from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
 

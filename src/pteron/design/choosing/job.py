@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from pteron.bodies.tables import Table, key
+from pteron.bodies.tables import TomlTable, key
 from pteron.design.choosing.job_tables import (
     AccuracyTable,
     BoundTable,
@@ -55,7 +55,7 @@ def _named_once(names: list[str], known: Collection[str]) -> list[str]:
     return names
 
 
-class Job(Table):
+class Job(TomlTable):
     """A job that a machine must do, as its file has it."""
 
     workspace: WorkspaceTable

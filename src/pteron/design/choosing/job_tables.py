@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
-from pteron.bodies.tables import Count, Number, Table, Three, Two, key
+from pteron.bodies.tables import Count, Number, Three, TomlTable, Two, key
 from pteron.design.loads import Least, PayloadTable, Positive, listed
 from pteron.design.spec import Floor
 from pteron.errors import ModelError
@@ -67,7 +67,7 @@ Place = Annotated[Three, AfterValidator(_near)]
 """A place in a cell, m."""
 
 
-class WorkspaceTable(Table):
+class WorkspaceTable(TomlTable):
     """`[workspace]`: the positions of the tool's centre point: a box, a cylinder or a list."""
 
     size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = key(
@@ -155,7 +155,7 @@ class LoadTable(PayloadTable):
     )
 
 
-class CycleTable(Table):
+class CycleTable(TomlTable):
     """`[[cycles]]`: a path of the tool through points, repeated without end."""
 
     name: str | None = None
@@ -179,14 +179,14 @@ class CycleTable(Table):
     )
 
 
-class MotionTable(Table):
+class MotionTable(TomlTable):
     """`[motion]`: speed and acceleration that are required everywhere, in every direction."""
 
     speed: Least = key("of P, m/s", 0.0)
     acceleration: Least = key("of P, m/s^2", 0.0)
 
 
-class AccuracyTable(Table):
+class AccuracyTable(TomlTable):
     """`[accuracy]`: the greatest position error of the tool, and the tolerances of parts."""
 
     most: Fine = key("m")
@@ -205,14 +205,14 @@ class AccuracyTable(Table):
         return bool(self.point or self.length or self.angle)
 
 
-class StiffnessTable(Table):
+class StiffnessTable(TomlTable):
     """`[stiffness]`: the greatest deflection of the tool under a force."""
 
     force: Positive = key("in any direction, N")
     most: Fine = key("m")
 
 
-class KeepOutTable(Table):
+class KeepOutTable(TomlTable):
     """`[[keep_out]]`: a box in which no part of the machine may be."""
 
     low: Place = key("m; from the middle of a workspace that floats")
@@ -225,7 +225,7 @@ class KeepOutTable(Table):
         return self
 
 
-class CellTable(Table):
+class CellTable(TomlTable):
     """`[cell]`: the space for the machine."""
 
     footprint: tuple[Near, Near] | None = key("along x and y, m", None)
@@ -235,7 +235,7 @@ class CellTable(Table):
     margin: Least = key("half the width of bodies about their middle lines, m", 0.03)
 
 
-class MotorsTable(Table):
+class MotorsTable(TomlTable):
     """`[motors]`: the lists of motors and gearboxes to choose from."""
 
     list: str | None = key("CSV or TOML file; else the package's examples", None)
@@ -248,7 +248,7 @@ class MotorsTable(Table):
     )
 
 
-class LinksTable(Table):
+class LinksTable(TomlTable):
     """`[links]`: the materials and sizes of the moving parts."""
 
     upper: Names = key("stock of cranks, to choose", ["aluminium-tube:40x2", "aluminium-tube:60x3"])
@@ -262,13 +262,13 @@ class LinksTable(Table):
     def _known(cls, names: list[str]) -> list[str]:
         for name in names:
             try:
-                Stock.of(name)
+                Stock.parse(name)
             except ModelError as error:
                 raise ValueError(error.message) from None
         return names
 
 
-class FloorsTable(Table):
+class FloorsTable(TomlTable):
     """`[floors]`: least measures of every pose of the workspace, each 1 at best."""
 
     type_i: Floor = 0.1
@@ -276,14 +276,14 @@ class FloorsTable(Table):
     clearance: Least = key("least distance of two bodies from surface to surface, m", 0.0)
 
 
-class SearchTable(Table):
+class SearchTable(TomlTable):
     """`[search]`: the length of the search, and its seed of random numbers."""
 
     evaluations: Count = key("designs of each kind", 800)
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
-class BoundTable(Table):
+class BoundTable(TomlTable):
     """`[most]`: greatest values of other quantities."""
 
     price: Positive | None = None

@@ -145,7 +145,7 @@ class Kind:
         return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
     def _stock(self, values: Array) -> dict[str, Stock]:
-        return {key: Stock.of(name) for key, name in self.cut(values).items()}
+        return {key: Stock.parse(name) for key, name in self.cut(values).items()}
 
     def with_travel(self, leg: Any, travel: tuple[float, float], values: Array) -> Any:
         """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""

@@ -83,7 +83,7 @@ def link_sections(robot: Manipulator, stocks: Mapping[str, str]) -> dict[str, Se
     """Return the sections of links made of stock; `stocks` has its name for "upper", "lower"."""
     sections = {}
     for key, name in stocks.items():
-        stock = Stock.of(name)
+        stock = Stock.parse(name)
         wall = 0.5 * (stock.outer - stock.inner)
         tube = Section.tube(stock.outer, wall, MATERIALS[name.split("-")[0]])
         rods = getattr(robot.legs[0], "rods", 1) if key == "lower" else 1

@@ -111,7 +111,7 @@ def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tu
 @lru_cache(maxsize=64)
 def _states(robot: Manipulator) -> tuple[Any, State]:
     pose = ca.SX.sym("pose", robot.freedom)
-    return pose, Machine.of(robot).state(pose)
+    return pose, Machine.numeric(robot).state(pose)
 
 
 @lru_cache(maxsize=64)

@@ -10,7 +10,7 @@ import numpy as np
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import direct_kinematics, inverse_kinematics, random_poses
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
@@ -42,7 +42,7 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     if home is None:
         named = robot.platform.tilts or robot.home is not None
         return home_pose(robot) if named else np.array(_middle(robot))
-    pose = checked_one(robot, home, "home")
+    pose = finite_pose(robot, home, "home")
     inverse_kinematics(robot, pose)
     return pose.copy()
 

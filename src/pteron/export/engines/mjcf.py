@@ -24,7 +24,7 @@ from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.kernels import Array
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
@@ -89,7 +89,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
     roots: list[int] = []
     for k, body in enumerate(opened.bodies):
         (roots if body.parent == BASE else children[body.parent]).append(k)
-    return rendered(
+    return render_template(
         "pteron.export",
         "robot.mjcf.j2",
         **FORMATS,

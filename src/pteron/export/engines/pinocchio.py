@@ -20,7 +20,7 @@ from pteron.export.engines.parts import Tree, TreeBody, at_zero
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.extras import install_command
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
@@ -130,7 +130,7 @@ def pinocchio_source(opened: Tree) -> str:
         notes.append(
             "What gears turn is in the platform's inertia: the square of its ratio times its own."
         )
-    return rendered(
+    return render_template(
         "pteron.export",
         "robot.pinocchio.j2",
         **FORMATS,

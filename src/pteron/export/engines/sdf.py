@@ -12,7 +12,7 @@ from pteron.export.engines.parts import Tree
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
@@ -61,7 +61,7 @@ def export_sdf(
 def sdf(opened: Tree) -> str:
     """Return a machine as SDF."""
     opened = dressed(opened)
-    return rendered(
+    return render_template(
         "pteron.export",
         "robot.sdf.j2",
         **FORMATS,

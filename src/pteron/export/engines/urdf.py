@@ -21,7 +21,7 @@ from pteron.export.engines.parts import Tree, at_zero
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
@@ -78,7 +78,7 @@ def urdf(opened: Tree) -> str:
     """Return the opened machine as URDF."""
     opened = dressed(opened)
     bodies = at_zero(opened)
-    return rendered(
+    return render_template(
         "pteron.export",
         "robot.urdf.j2",
         **FORMATS,
@@ -98,7 +98,7 @@ def urdf(opened: Tree) -> str:
 
 def closure_yaml(opened: Tree) -> str:
     """Return the text of the closure file: pairs of points of the URDF's links that coincide."""
-    return rendered(
+    return render_template(
         "pteron.export",
         "closure.yaml.j2",
         head=head(opened, "loops of the URDF"),

@@ -21,7 +21,7 @@ from pteron.export.printers.sections import (
 )
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, jacobian
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 
 ZERO = 5e-13
@@ -44,7 +44,7 @@ def cartesian(robot: Manipulator) -> dict[str, Any]:
     tool = tool_of(robot)
     # The joints where the tool is at zero.
     offsets = 1000.0 * (
-        np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3))) - rows @ tool
+        np.asarray(evaluate_unchecked(robot, "joint_coordinates", np.zeros(3))) - rows @ tool
     )
     size = float(np.linalg.det(rows.T @ rows))
     if size < _LEAST_DETERMINANT:

@@ -45,7 +45,7 @@ class Center:
         if not isinstance(locus, Sphere):
             return None
         function = ca.Function(
-            "center", [q], [locus.center - offset.a - offset.still, locus.radius]
+            "center", [q], [locus.center - offset.a - offset.constant, locus.radius]
         )
 
         def center(value: float) -> Array:

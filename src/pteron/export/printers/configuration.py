@@ -20,7 +20,7 @@ from pteron.export.printers.centers import Center
 from pteron.export.printers.delta import delta
 from pteron.export.printers.rotary_delta import rotary
 from pteron.export.printers.sections import INSTEAD
-from pteron.kernels.code import rendered
+from pteron.kernels.code import render_template
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 
@@ -68,7 +68,7 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
             f"{robot.name}: Klipper moves x, y and z alone, and this machine's pose is {pose}; "
             f"{INSTEAD}"
         )
-    text = rendered(
+    text = render_template(
         "pteron.export",
         "klipper.cfg.j2",
         banner=[line for line in banner(robot, "Klipper configuration") if "SI units" not in line],
@@ -80,7 +80,7 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 
 def _values(robot: Manipulator) -> dict[str, Any]:
     """Return the values of the template of the kinematics that the machine has."""
-    machine = Machine.of(robot)
+    machine = Machine.numeric(robot)
     if all(leg.row_is_constant for leg in machine.legs):
         return cartesian(robot)
     centers = [Center.of(machine, i) for i in range(3)]

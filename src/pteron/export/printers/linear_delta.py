@@ -92,7 +92,7 @@ class LinearDelta:
         ModelError
             If it is no linear Delta with three upright guides, its carriages above the platform.
         """
-        machine = Machine.of(robot)
+        machine = Machine.numeric(robot)
         centers = [Center.of(machine, i) for i in range(len(robot.legs))]
         sliding_centers = [center for center in centers if center is not None and center.slides]
         if robot.platform.coordinates != ("x", "y", "z") or len(sliding_centers) != 3:

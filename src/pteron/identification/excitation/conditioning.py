@@ -9,7 +9,7 @@ import numpy as np
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.observation import triangle
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.reduction import BaseParameters
 
 _ROWS = 100
@@ -143,7 +143,7 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
     """Return the base regressors at times (T,) below one another, (T n, rank)."""
     state = motion.states(times)
     path = state.pose, state.velocity, state.acceleration
-    found: Array = unchecked(motion.robot, "base_regressor", *path, base=base)
+    found: Array = evaluate_unchecked(motion.robot, "base_regressor", *path, base=base)
     return found.reshape(-1, base.rank)
 
 

@@ -13,7 +13,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
 from pteron.identification.signals.states import FullMotion, home_mode
 from pteron.kernels import Array, as_array
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
 from pteron.motion.trajectories.fourier import fourier_curve
@@ -157,12 +157,12 @@ class FourierMotion:
         dq, ddq = first * rate, second * rate**2 + first * gain
         if self.space == "platform":
             return FullMotion.of_platform(robot, q, dq, ddq)
-        poses: Array = unchecked(robot, "closure_poses", np.vstack([self.center, q]))
+        poses: Array = evaluate_unchecked(robot, "closure_poses", np.vstack([self.center, q]))
         center, pose = poses[0, self.mode], poses[1:, self.mode]
         # Within a mode angles stay on one side of the singular orientations, half a turn at most.
         apart = (pose - center + np.pi) % (2.0 * np.pi) - np.pi
         pose = np.where(robot.wraps, center + apart, pose)
-        velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
+        velocity, acceleration = evaluate_unchecked(robot, "platform_motion", pose, dq, ddq)
         return FullMotion(pose, velocity, acceleration, q, dq, ddq)
 
     def uniform_times(self, count: int) -> Array:

@@ -22,7 +22,7 @@ from pteron.identification.excitation.limits import (
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.signals.states import FullMotion, home
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
@@ -166,23 +166,23 @@ def _limits_passive(robot: Manipulator) -> bool:
 
 def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[str, Array]:
     """Return every limit's margins (T, n) or (T, 1), -inf at poses out of reach."""
-    found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
+    found = {"type_i": evaluate_unchecked(robot, "reach", state.pose)[1] - limits.type_i}
     if closure_of(robot).vanishes() is None or robot.platform.angles:
-        type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
+        type_ii = np.abs(evaluate_unchecked(robot, "type_ii", state.pose))[:, None]
         found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
     if any(leg.limits for leg in robot.legs):
         clearances = joint_clearances(limits, robot)
         found["joint_clearance"] = joint_distances(robot, state.joints) - clearances
     if _limits_passive(robot):
-        passive = unchecked(robot, "passive_room", state.pose)[0]
+        passive = evaluate_unchecked(robot, "passive_room", state.pose)[0]
         found["passive_clearance"] = passive - limits.passive_clearance
     found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
     found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
     if limits.force is not None:
         drives, still = drives_of(robot), np.zeros_like(state.pose)
-        moving = unchecked(robot, "inverse_dynamics", *state[:3])
+        moving = evaluate_unchecked(robot, "inverse_dynamics", *state[:3])
         moving = moving + drives.inertia * state.accelerations + drives.viscous * state.rates
-        held = unchecked(robot, "inverse_dynamics", state.pose, still, still)
+        held = evaluate_unchecked(robot, "inverse_dynamics", state.pose, still, still)
         needed = np.maximum(np.abs(moving + drives.offset), np.abs(held + drives.offset))
         # Dry friction counts in full, whichever way a joint moves.
         dry = drives.coulomb + drives.stribeck

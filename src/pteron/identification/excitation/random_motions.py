@@ -14,7 +14,7 @@ from pteron.identification.excitation.margins import check_rest, relative_margin
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.signals.states import home
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Seed
 
@@ -112,7 +112,9 @@ def random_excitation(
     shape = rng.normal(size=(2 * harmonics, n)) * sizes(robot, space)
 
     def still(pose: Array) -> FourierMotion:
-        center = pose if space == "platform" else unchecked(robot, "joint_coordinates", pose)
+        center = (
+            pose if space == "platform" else evaluate_unchecked(robot, "joint_coordinates", pose)
+        )
         return FourierMotion(robot, space, period, center, *np.zeros((2, harmonics, n)))
 
     for _ in range(_HALVINGS):

@@ -28,7 +28,7 @@ from pteron.identification.excitation.random_motions import sizes
 from pteron.identification.excitation.sequential import NonlinearProgram, sequential_minimum
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, parameters
 from pteron.motion.trajectories.fourier import fourier_bases
@@ -194,7 +194,7 @@ def _path(
     squares = program(robot, "squared_type_i").function(pose).T
     found["type_i"] = squares, (limits.type_i + _BACK_OFF) ** 2, np.inf
     # An assembly mode keeps the sign that the measure has in the home pose.
-    sign = float(np.sign(unchecked(robot, "type_ii", np.array(home(robot)))))
+    sign = float(np.sign(evaluate_unchecked(robot, "type_ii", np.array(home(robot)))))
     type_ii = sign * program(robot, "type_ii").function(pose)
     found["type_ii"] = type_ii / best_type_ii(robot), limits.type_ii + _BACK_OFF, np.inf
     if setting.space == "joints":

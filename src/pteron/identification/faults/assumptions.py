@@ -23,7 +23,7 @@ from pteron.identification.signals import Preprocessing
 from pteron.json_values import picked
 from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import working_modes
 
@@ -167,7 +167,7 @@ def _tried(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["ratio", "gravity", "mode"], tuple[str, str], Manipulator, _Samples]]:
     """Yield assumptions: gear ratios, gravity along other axes, working modes."""
-    at_home = unchecked(robot, "joint_coordinates", np.array(s.start))
+    at_home = evaluate_unchecked(robot, "joint_coordinates", np.array(s.start))
     for factor in _FACTORS:
         for middle, where in ((at_home, "home"), (np.zeros_like(at_home), "zero")):
             moved = replace(
@@ -264,14 +264,14 @@ def _residual(robot: Manipulator, pose: Array, s: _Samples) -> float:
     if good.mean() < 1.0 - _MOST_LOST:
         return np.inf
     pose = np.ascontiguousarray(pose[good])
-    joints = unchecked(robot, "joint_coordinates", pose)
+    joints = evaluate_unchecked(robot, "joint_coordinates", pose)
     # Modes that direct kinematics does not tell apart have other joints.
     if not np.abs(joints - s.joints[good]).max() < 1e-3 * max(1.0, np.abs(s.joints).max()):
         return np.inf
-    velocity, acceleration = unchecked(
+    velocity, acceleration = evaluate_unchecked(
         robot, "platform_motion", pose, s.rates[good], s.accelerations[good]
     )
-    rigid = unchecked(robot, "regressor", pose, velocity, acceleration)
+    rigid = evaluate_unchecked(robot, "regressor", pose, velocity, acceleration)
     rates, n = s.rates[good], s.rates.shape[1]
     diagonal = np.eye(n)
     friction = [part[..., None] * diagonal for part in (np.sign(rates), rates, np.ones_like(rates))]

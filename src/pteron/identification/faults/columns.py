@@ -20,7 +20,7 @@ from pteron.identification.model import Model, diagonal, extended, identificatio
 from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 
 _STRIBECK = (0.05, 0.15, 0.4)
@@ -122,7 +122,7 @@ def _passive_legs(model: Model) -> Sequence[str]:
 
 def _passive(m: FittedMotion) -> Array:
     s = m.states
-    return np.asarray(unchecked(m.model.robot, "passive_friction", s.pose, s.velocity))
+    return np.asarray(evaluate_unchecked(m.model.robot, "passive_friction", s.pose, s.velocity))
 
 
 DELAY = Family(

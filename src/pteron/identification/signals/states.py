@@ -19,7 +19,7 @@ from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow, mode_of
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike, Poses
 from pteron.workspace import home_pose
@@ -48,10 +48,10 @@ class FullMotion(NamedTuple):
     ) -> FullMotion:
         """Return the motion of platform and joints for a motion of the platform, (T, m) each."""
         # A slider's motion is finite out of the legs' reach too; that of the links is not.
-        joints = unchecked(robot, "joint_coordinates", pose)
-        rates = unchecked(robot, "joint_rates", pose, velocity)[0]
+        joints = evaluate_unchecked(robot, "joint_coordinates", pose)
+        rates = evaluate_unchecked(robot, "joint_rates", pose, velocity)[0]
         path = pose, velocity, acceleration
-        return cls(*path, joints, rates, unchecked(robot, "joint_accelerations", *path)[0])
+        return cls(*path, joints, rates, evaluate_unchecked(robot, "joint_accelerations", *path)[0])
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,9 @@ class States:
         if lost.any():
             raise _no_pose(robot, joints, lost, source, first_row)
         _check_regular(robot, pose, source, first_row)
-        velocity, acceleration = unchecked(robot, "platform_motion", pose, rates, accelerations)
+        velocity, acceleration = evaluate_unchecked(
+            robot, "platform_motion", pose, rates, accelerations
+        )
         return cls.of(time, FullMotion(pose, velocity, acceleration, *motion), payload)
 
     @classmethod
@@ -233,9 +235,13 @@ def _no_pose(
 
 
 def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int) -> None:
-    measures = {"a leg is all but stretched or folded": unchecked(robot, "reach", pose)[1].min(-1)}
+    measures = {
+        "a leg is all but stretched or folded": evaluate_unchecked(robot, "reach", pose)[1].min(-1)
+    }
     if robot.platform.angles or closure_of(robot).vanishes() is None:
-        measures["the pose is all but singular"] = np.abs(unchecked(robot, "type_ii", pose))
+        measures["the pose is all but singular"] = np.abs(
+            evaluate_unchecked(robot, "type_ii", pose)
+        )
     for what, size in measures.items():
         lost = ~(size >= _REGULAR)  # NaN is none
         if lost.any():

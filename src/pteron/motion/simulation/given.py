@@ -6,7 +6,7 @@ import numpy as np
 
 from pteron.equations.transmissions import DriveKind
 from pteron.kernels import Array
-from pteron.legs.motor_limits import within_motor
+from pteron.legs.motor_limits import limit_to_motor
 from pteron.manipulator import Manipulator
 
 
@@ -27,7 +27,9 @@ def given_forces(
         Forces of the currents, where some lag.
     """
     limited = within_motors(robot, forces, motor_rates)
-    return limited if currents is None else np.where(DriveKind.of(robot).lag, currents, limited)
+    if currents is None:
+        return limited
+    return np.where(DriveKind.from_robot(robot).lag, currents, limited)
 
 
 def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Array:
@@ -45,5 +47,5 @@ def within_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Arra
     limited = np.array(forces, dtype=float)
     for i, leg in enumerate(robot.legs):
         if leg.drive:
-            limited[..., i] = within_motor(leg.drive, limited[..., i], motor_rates[..., i])
+            limited[..., i] = limit_to_motor(leg.drive, limited[..., i], motor_rates[..., i])
     return limited

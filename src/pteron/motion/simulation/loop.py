@@ -214,7 +214,7 @@ def _run_loop(
 
 def _columns(robot: Manipulator, samples: dict[str, Array]) -> dict[str, Array]:
     """Return samples (T, ...) as a simulation names them, motors' coordinates and forces too."""
-    kind, columns = DriveKind.of(robot), dict(samples)
+    kind, columns = DriveKind.from_robot(robot), dict(samples)
     parts = kind.parts(columns.pop("states"))
     columns |= {"pose": parts["pose"], "velocity": parts["velocity"]}
     columns |= {"memory": columns.pop("memories"), "joint_rates": columns.pop("rates")}

@@ -116,7 +116,7 @@ def advance(
     }
     general = machines is not None and machines.geometry is not None
     control_loop = loop(robot, general=general)
-    count_drives = robot.joint_count * len(control_loop.kind.more)
+    count_drives = robot.joint_count * len(control_loop.kind.extra_states)
     if drives is None:
         drives = drive_states(robot, flat["pose"], flat["velocity"]).reshape(*lead, count_drives)
     begun = as_array(drives, "drives", (count_drives,))
@@ -153,8 +153,8 @@ def motor_states(
     robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
 ) -> dict[str, Array]:
     """Return the states of drives that bend or lag, (..., n) each, as a motion needs them."""
-    kind = DriveKind.of(robot)
-    if not kind.more:
+    kind = DriveKind.from_robot(robot)
+    if not kind.extra_states:
         return {}
     force = inverse_dynamics(robot, pose, velocity, acceleration, on_failure="nan")
     force, motor = np.nan_to_num(force), inverse_kinematics(robot, pose)
@@ -167,7 +167,7 @@ def motor_states(
     slid = [leg.drive.coulomb / leg.drive.lugre.stiffness if leg.drive and leg.drive.lugre else 0.0
             for leg in robot.legs]  # fmt: skip
     states["bristle"] = np.sign(rates) * np.array(slid)
-    return {name: states[name] for name, _ in kind.more}
+    return {name: states[name] for name, _ in kind.extra_states}
 
 
 _PIECE = 200_000

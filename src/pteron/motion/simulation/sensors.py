@@ -84,7 +84,7 @@ def encoder_arrays(
     steps, noises, fine = (_per_joint(value, key, len(joints)) for key, value in numbers.items())
     round_ = np.array([float(leg.goes_round) for leg in robot.legs])
     if "motor" in state:
-        soft = DriveKind.of(robot).elastic
+        soft = DriveKind.from_robot(robot).elastic
         joints = np.concatenate([joints, np.where(soft, state["motor"], joints)])
         rates = np.concatenate([rates, np.where(soft, state["motor_rate"], rates)])
         steps, noises = np.concatenate([steps, fine]), np.tile(noises, 2)
@@ -118,7 +118,7 @@ def encoder_noise(
     sensors: Sensors, robot: Manipulator, samples: int, machines: range | None = None
 ) -> dict[str, Array]:
     """Return the noise of the samples over its deviation: of one machine, or of numbered ones."""
-    count = robot.joint_count * (2 if DriveKind.of(robot).bends else 1)
+    count = robot.joint_count * (2 if DriveKind.from_robot(robot).bends else 1)
     if not np.any(sensors.noise):
         return {"noise": np.zeros((1, 1, count))}
     seeds = [sensors.seed] if machines is None else [(sensors.seed, i) for i in machines]

@@ -12,8 +12,8 @@ from pteron.arguments import expect
 from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
-from pteron.kernels.named_columns import by_name
-from pteron.kinematics.evaluate import checked, checked_one
+from pteron.kernels.named_columns import pick_columns
+from pteron.kinematics.evaluate import finite_pose, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
@@ -167,7 +167,7 @@ def simulate(
     check_delay(delay)
     expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
 
-    if method == "dop853" and not DriveKind.of(robot).plain:
+    if method == "dop853" and not DriveKind.from_robot(robot).plain:
         raise DataError(
             f'method: "dop853" given, but the drives of {robot.name} bend, lag or ripple; "rk4" '
             "has them"
@@ -255,7 +255,7 @@ def check_positive(**positive: float) -> None:
 def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array, Array]:
     """Return a pose and a velocity, (m,) each."""
     expect(len(start) == len(_STATE), "start", f"{len(start)} parts", "a pose and a velocity")
-    pose, velocity = (checked_one(robot, v, name) for v, name in zip(start, _STATE, strict=True))
+    pose, velocity = (finite_pose(robot, v, name) for v, name in zip(start, _STATE, strict=True))
     return pose, velocity
 
 
@@ -285,7 +285,7 @@ def reference_of(
     if motion is not None:
         names = ("motion.pose", "motion.velocity", "motion.acceleration")
         parts = zip(motion.at(motion.time[0] + time), names, strict=True)
-        return Motion(time, *(checked(robot, part, name) for part, name in parts))
+        return Motion(time, *(finite_rows(robot, part, name) for part, name in parts))
     if start is None:
         raise DataError("start: not given, nor a motion to start on; give a pose and a velocity")
     zeros = np.zeros((len(time), robot.freedom))
@@ -321,7 +321,7 @@ def _of_time(
     size = len(columns)
 
     def numbers(value: PoseLike, label: str) -> Array:
-        array = as_array(by_name(value, columns, label), label, (size,))
+        array = as_array(pick_columns(value, columns, label), label, (size,))
         expect(array.ndim == 1, label, f"shape {array.shape}", f"({size},)")
         expect(np.isfinite(array).all(), label, shown(array.tolist()), "finite numbers")
         return array

@@ -43,7 +43,7 @@ def _fastest(
     robot: Manipulator, poses: PoseLike, machines: Machines | None = None
 ) -> tuple[float, str]:
     """Return the longest stable step, s, and its cause as the beginning of a sentence."""
-    kind, drives = DriveKind.of(robot), drives_of(robot)
+    kind, drives = DriveKind.from_robot(robot), drives_of(robot)
     if machines is not None:
         parts = machines.drives.reshape(len(machines), len(drives), -1)
         drives = Drives(*np.moveaxis(parts, 1, 0))
@@ -80,7 +80,7 @@ def _braking(robot: Manipulator) -> Array:
 
 def _longest(robot: Manipulator, rows: Array, mass: Array, drives: Drives) -> tuple[float, str]:
     """Return the longest step and its cause, from J, M and drives of poses or of machines."""
-    kind, longest = DriveKind.of(robot), (float("inf"), "")
+    kind, longest = DriveKind.from_robot(robot), (float("inf"), "")
     if drives.viscous.any() or kind.bends:
         system, bent = _linear(robot, rows, mass, drives)
         if kind.bends:
@@ -151,7 +151,7 @@ def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
     rows, mass = jacobian(robot, poses), mass_matrix(robot, poses)
     system, bent = _linear(robot, rows, mass, drives_of(robot))
     rates, vectors = np.linalg.eig(system)
-    soft = np.array(DriveKind.of(robot).elastic)
+    soft = np.array(DriveKind.from_robot(robot).elastic)
     return rates, np.where(soft[:, None], bent @ vectors[..., : bent.shape[-1], :], 0.0)
 
 

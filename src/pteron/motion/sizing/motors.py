@@ -11,7 +11,7 @@ import polars as pl
 from pydantic import create_model
 
 from pteron.arguments import checked_arguments
-from pteron.bodies.tables import Number, Table
+from pteron.bodies.tables import Number, TomlTable
 from pteron.errors import DataError, warn_unlikely
 from pteron.renamed import former_attribute
 from pteron.tables import read_table
@@ -139,10 +139,10 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
 
 _NAMED: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
 _NAMED["price"] = Number | None, None  # for who chooses among them
-_MotorTable: Any = create_model("_MotorTable", __base__=Table, **_NAMED)
+_MotorTable: Any = create_model("_MotorTable", __base__=TomlTable, **_NAMED)
 
 
-class _MotorsFile(Table):
+class _MotorsFile(TomlTable):
     motors: list[_MotorTable]
 
 

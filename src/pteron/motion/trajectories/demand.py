@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from pteron.equations.drives import drives_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.kernels.bisection import bisected
-from pteron.kinematics.evaluate import unchecked
+from pteron.kernels.bisection import bisect_condition
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -79,12 +79,12 @@ class Demand(NamedTuple):
 def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Demand:
     """Return the demand of poses (K, m) on a curve with these derivatives by p."""
     zeros = np.zeros_like(pose)
-    weight = unchecked(robot, "inverse_dynamics", pose, zeros, zeros)
-    rates = unchecked(robot, "joint_rates", pose, first)[0]
-    bends = unchecked(robot, "joint_accelerations", pose, first, second)[0]
+    weight = evaluate_unchecked(robot, "inverse_dynamics", pose, zeros, zeros)
+    rates = evaluate_unchecked(robot, "joint_rates", pose, first)[0]
+    bends = evaluate_unchecked(robot, "joint_accelerations", pose, first, second)[0]
     drives = drives_of(robot)
-    pushed = unchecked(robot, "inverse_dynamics", pose, zeros, first)
-    swept = unchecked(robot, "inverse_dynamics", pose, first, second)
+    pushed = evaluate_unchecked(robot, "inverse_dynamics", pose, zeros, first)
+    swept = evaluate_unchecked(robot, "inverse_dynamics", pose, first, second)
     _, speed, bend = tool_path(robot.platform, pose, first, second)
     return Demand(
         rates,
@@ -123,14 +123,14 @@ def _reversals(
     """Return where (R,) joints reverse between places (K,) or on them, and which (R,)."""
 
     def rates(places: Array) -> Array:
-        return np.asarray(unchecked(robot, "joint_rates", *states(places)[:2])[0])
+        return np.asarray(evaluate_unchecked(robot, "joint_rates", *states(places)[:2])[0])
 
     known = rates(at)
     k, joints = np.nonzero(known[1:] * known[:-1] < 0.0)
     ahead, low, high = known[k, joints] > 0.0, at[k], at[k + 1]
     if len(k):
         each = np.arange(len(k))
-        low, _ = bisected(
+        low, _ = bisect_condition(
             lambda places: (rates(places)[each, joints] > 0.0) == ahead, low, high, _HALVINGS
         )
     touching, touching_joints = np.nonzero((known[1:-1] == 0.0) & (known[2:] * known[:-2] < 0.0))

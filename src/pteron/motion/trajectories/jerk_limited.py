@@ -14,7 +14,7 @@ from pteron.errors import DataError, PteronError, UnreachablePose
 from pteron.extras import of_extra
 from pteron.kernels import Array
 from pteron.kinematics import follow, inverse_kinematics
-from pteron.kinematics.evaluate import checked_one, unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked, finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
@@ -89,7 +89,7 @@ def jerk_limited(
     array([ 0.2,  0.1, -0.8])
     """
     robot = as_manipulator(robot)
-    ends = [checked_one(robot, start, "start"), checked_one(robot, end, "end")]
+    ends = [finite_pose(robot, start, "start"), finite_pose(robot, end, "end")]
     bounds = limits_of(robot) if limits is None else limits
     jerks = per_joint(robot, "jerk", jerk, [None] * robot.joint_count)
     if not np.isfinite([*bounds.acceleration, *jerks]).all():
@@ -120,7 +120,7 @@ def jerk_limited(
                 f"to the joint coordinates {[round(float(q), 6) for q in joints[k]]}: its "
                 "assembly mode ends before; go there by way of another pose"
             )
-        velocity, acceleration = unchecked(robot, "platform_motion", poses, rates, gains)
+        velocity, acceleration = evaluate_unchecked(robot, "platform_motion", poses, rates, gains)
         return poses, planned.duration * velocity, planned.duration**2 * acceleration
 
     course = Timed(curve, planned.duration)

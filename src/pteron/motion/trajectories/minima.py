@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pteron.kernels import Array
-from pteron.kernels.bisection import bisected
+from pteron.kernels.bisection import bisect_condition
 
 _VALLEYS = 3
 """Number of a measure's lowest local minima that are refined."""
@@ -64,5 +64,7 @@ def first_below(
     i = int(below[k].argmax())
     low, high = all_marks[max(k - 1, 0)], all_marks[k]
     if k:
-        _, high = bisected(lambda at: measure(at[None])[0, i] >= least, low, high, _HALVINGS)
+        _, high = bisect_condition(
+            lambda at: measure(at[None])[0, i] >= least, low, high, _HALVINGS
+        )
     return float(high), i, float(measure(np.array([high]))[0, i])

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 from pteron.platforms import Platform
@@ -148,7 +148,7 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
     (0.0, 0.2)
     """
     robot = as_manipulator(robot)
-    corners = checked(robot, poses, "poses")
+    corners = finite_rows(robot, poses, "poses")
     if corners.ndim != 2 or len(corners) < 2:
         raise DataError(
             f"poses: shape {corners.shape} given, (K, {robot.freedom}) expected, K at least 2"

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pteron.arguments import expect, expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import Cycle, moves
@@ -121,7 +121,7 @@ def pick_and_place(
             raise DataError(f"{name}: {value} given, a number above 0 expected")
     expect(samples >= 2, "samples", samples, "at least 2")
     expect_to_fit("samples", samples, 10.0 * samples * robot.freedom)
-    middle = home_pose(robot) if around is None else checked_one(robot, around, "around")
+    middle = home_pose(robot) if around is None else finite_pose(robot, around, "around")
     if scale is None:
         scale, direction = scaled_to_reach(
             robot, middle, direction=direction, turn=turn, least=least

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.limits import MotionLimits
@@ -56,6 +56,6 @@ def point_to_point(
     array([ 0.05,  0.  , -0.85])
     """
     robot = as_manipulator(robot)
-    ends = np.stack([checked_one(robot, start, "start"), checked_one(robot, end, "end")])
+    ends = np.stack([finite_pose(robot, start, "start"), finite_pose(robot, end, "end")])
     path = line_path(robot, ends)
     return along(robot, path, duration=duration, limits=limits, law=law, step=step)

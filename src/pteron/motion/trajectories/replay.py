@@ -14,7 +14,7 @@ from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import follow
-from pteron.kinematics.evaluate import checked, unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings
 from pteron.motion.motion import Motion
@@ -155,5 +155,5 @@ def _followed(robot: Manipulator, time: Array, joints: Array, start: PoseLike | 
     cranks = [leg.goes_round for leg in robot.legs]
     joints = from_readings(robot, np.where(cranks, np.unwrap(joints, axis=0), joints))
     _, rates, gains = _spline(time, joints)
-    poses = follow(robot, joints, checked(robot, start, "start"))
-    return Motion(time, poses, *unchecked(robot, "platform_motion", poses, rates, gains))
+    poses = follow(robot, joints, finite_rows(robot, start, "start"))
+    return Motion(time, poses, *evaluate_unchecked(robot, "platform_motion", poses, rates, gains))

@@ -12,7 +12,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import type_ii_sizes
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -62,7 +62,7 @@ def least_margin(robot: RobotLike, around: PoseLike) -> float:
         Of the margins of `pteron.workspace.pose_margins`, without unit.
     """
     robot = as_manipulator(robot)
-    middle = checked_one(robot, around, "around")
+    middle = finite_pose(robot, around, "around")
     return min(_LEAST_RESERVE, float(pose_margins(robot, middle).least) / 2.0)
 
 
@@ -119,7 +119,7 @@ def scaled_to_reach(
     True
     """
     robot = as_manipulator(robot)
-    middle = checked_one(robot, around, "around")
+    middle = finite_pose(robot, around, "around")
     if least is None:
         least = least_margin(robot, middle)
     scale, best = 0, None

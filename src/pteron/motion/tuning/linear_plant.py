@@ -15,7 +15,7 @@ from pteron.equations.transmissions import DriveKind, actuator_numbers
 from pteron.kernels import Array, bare, program
 from pteron.kernels.programs import motion_program
 from pteron.kinematics import jacobian
-from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.evaluate import finite_pose
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 from pteron.motion.simulation.plant import motor_states
@@ -113,15 +113,15 @@ def linearised(
     motion = (pose, velocity, acceleration)
     names = ("pose", "velocity", "acceleration")
     state = [
-        checked_one(robot, zeros if value is None else value, name)
+        finite_pose(robot, zeros if value is None else value, name)
         for value, name in zip(motion, names, strict=True)
     ]
     smooth = with_linear_drives(robot)
-    kind, n = DriveKind.of(smooth), robot.joint_count
+    kind, n = DriveKind.from_robot(smooth), robot.joint_count
     motors = motor_states(smooth, *state)
     values = {
         **dict(zip(("pose", "velocity"), state, strict=False)),
-        **{name: motors[name] for name, _ in kind.more},
+        **{name: motors[name] for name, _ in kind.extra_states},
         "forces": drive_forces(smooth, *state),
         "wrench": np.zeros(len(robot.column_names["wrench"])),
         "parameters": parameters(robot),
@@ -133,7 +133,7 @@ def linearised(
     system, driven, turned = (np.asarray(part, dtype=float) for part in derivatives)
     rows, m = jacobian(robot, state[0]), robot.freedom
     # A motor that moves with its joint, and a current that does not lag, are no states.
-    is_state = [kind.lag if name == "current" else kind.elastic for name, _ in kind.more]
+    is_state = [kind.lag if name == "current" else kind.elastic for name, _ in kind.extra_states]
     states = np.flatnonzero([*[True] * (2 * m), *np.ravel(is_state)])
     system, driven = system[np.ix_(states, states)], driven[states]
     # From the platform's (x, x') to the joints' (q, q'): q' = J x' changes with x too.
@@ -183,8 +183,8 @@ def _derivatives(robot: Manipulator, kind: DriveKind) -> ca.Function:
     vectors = (ca.vec(part) for part in plant.function.call(symbols))
     results = zip((port.name for port in plant.outputs), vectors, strict=True)
     every = by_name | dict(results)
-    state = ca.vertcat(*(by_name[name] for name in ("pose", "velocity", *dict(kind.more))))
-    moved = ("velocity", "acceleration", *dict(kind.more).values())
+    state = ca.vertcat(*(by_name[name] for name in ("pose", "velocity", *dict(kind.extra_states))))
+    moved = ("velocity", "acceleration", *dict(kind.extra_states).values())
     rates = ca.vertcat(*(every[name] for name in moved))
     pose, velocity = by_name["pose"], by_name["velocity"]
     joint_rates = ca.mtimes(program(robot, "jacobian", plain=True).function(pose).T, velocity)

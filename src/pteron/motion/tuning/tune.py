@@ -15,7 +15,7 @@ from pteron.controllers.joint_masses import light_poses
 from pteron.errors import DataError, shown
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, told_pose
 from pteron.motion.payload import with_payload
@@ -238,7 +238,7 @@ def _states(robot: Manipulator, motion: Motion | None, poses: Array | None) -> t
         poses = light_poses(robot)
         within = (joint_distances(robot, inverse_kinematics(robot, poses)) >= 0.0).all(axis=-1)
         poses = poses[within][:_PLACES]
-    poses = checked(robot, poses, "poses").reshape(-1, robot.freedom)
+    poses = finite_rows(robot, poses, "poses").reshape(-1, robot.freedom)
     zeros = np.zeros_like(poses)
     states, times = np.stack([poses, zeros, zeros], axis=1), np.full(len(poses), np.nan)
     if motion is not None:

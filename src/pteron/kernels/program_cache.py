@@ -1,8 +1,8 @@
-"""Programs (CasADi functions of a machine) and results kept on disk, to be read next time.
+"""The cache on disk of programs (CasADi functions of a machine) and results.
 
-Reading takes 1 ms, building 100 ms or more. A name on disk is a digest of the machine, of what is
-asked for, and of the source of all that it depends on. Of a machine with a leg from outside this
-package, whose source is not known, nothing is kept.
+Reading takes 1 ms, building 100 ms or more. A name on disk is a digest of the machine, of the
+requested function, and of the source that it depends on. Machines with a leg from outside this
+package, whose source is unknown, are not cached.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 from pteron.kernels import cache
 from pteron.kernels.kernel import Port
-from pteron.kernels.passes import optimised
+from pteron.kernels.passes import optimise_function
 
 _PACKAGE = Path(__file__).parent.parent
 
@@ -42,7 +42,7 @@ class Program:
     outputs: tuple[Port, ...]
 
     @classmethod
-    def of(
+    def from_expressions(
         cls,
         name: str,
         symbols: Sequence[Expression],
@@ -55,114 +55,120 @@ class Program:
         return cls(name, ca.Function(name, symbols, results, *names), (*inputs,), (*outputs,))
 
     @classmethod
-    def of_named(
+    def from_symbols(
         cls,
         name: str,
-        given: Mapping[str, Expression],
-        found: Mapping[str, Expression],
+        inputs_by_name: Mapping[str, Expression],
+        outputs_by_name: Mapping[str, Expression],
         shared: Collection[str] = (),
     ) -> Self:
-        """Return the same of expressions by name, a column as a vector, matrices by rows."""
-        inputs = [Port(key, value.shape[:1], key in shared) for key, value in given.items()]
-        outputs = [Port(key, shape_of(value)) for key, value in found.items()]
-        dense = ca.cse([ca.densify(value).T for value in found.values()])
-        return cls.of(name, list(given.values()), inputs, dense, outputs)
+        """Return the program of expressions by name; columns become vectors, matrices row-major."""
+        inputs = [
+            Port(key, element.shape[:1], key in shared) for key, element in inputs_by_name.items()
+        ]
+        outputs = [Port(key, shape_of(element)) for key, element in outputs_by_name.items()]
+        dense = ca.cse([ca.densify(element).T for element in outputs_by_name.values()])
+        return cls.from_expressions(name, list(inputs_by_name.values()), inputs, dense, outputs)
 
     @property
     def text(self) -> str:
         """The program as it is written on disk; equal programs have equal texts."""
-        return _written(self)
+        return _serialise_program(self)
 
-    def optimised(self) -> Self:
+    def optimise(self) -> Self:
         """Return the program after the passes that save operations."""
-        return replace(self, function=optimised(self.function))
+        return replace(self, function=optimise_function(self.function))
 
 
-def shape_of(value: Expression) -> tuple[int, ...]:
+def shape_of(element: Expression) -> tuple[int, ...]:
     """Return the shape of an expression: a column is a vector, and of one element a number."""
-    rows, columns = value.shape
+    rows, columns = element.shape
     return (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
 
 
-def kept(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
-    """Return the program of a key: the one on disk, or one that is built now, and then kept."""
+def cached_program(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
+    """Return the program of a key, read from disk or built and stored."""
     name = name_of("program", *key)
     text = None if name is None else cache.find_text(name)
-    found = None if text is None else _read(text)
-    if found is None:
-        found = build()
+    program = None if text is None else _parse_program(text)
+    if program is None:
+        program = build()
         if name is not None:
-            cache.keep_text(name, _written(found))
-    return found
+            cache.store_text(name, _serialise_program(program))
+    return program
 
 
-def kept_result(
+def cached_result(
     key: tuple[Any, ...],
     packages: tuple[str, ...],
     find: Callable[[], _Result],
     *,
     keeps: Callable[[_Result], bool] = lambda _: True,
 ) -> _Result:
-    """Return the result of a key: the one on disk, or one that is found now, and then kept.
+    """Return the result of a key, read from disk or computed by `find` and stored.
 
-    It depends on the source of `packages`, or of modules at the top, and of all equations. It is
-    pickled: the cache is the user's alone and holds code that is run. What `keeps` is false of is
-    not kept.
+    It depends on the source of `packages`, or of top-level modules, and of all equations. It is
+    pickled: the cache is private to the user and holds executable code. Results for which `keeps`
+    is false are not stored.
     """
     name = name_of(*key, sources=(*EQUATIONS, *packages))
     text = None if name is None else cache.find_text(name)
     if text is not None:
         with suppress(Exception):
-            found: _Result = pickle.loads(text.encode("latin-1"))
-            return found
-    found = find()
-    if name is not None and keeps(found):
-        cache.keep_text(name, pickle.dumps(found).decode("latin-1"))
-    return found
+            computed: _Result = pickle.loads(text.encode("latin-1"))
+            return computed
+    computed = find()
+    if name is not None and keeps(computed):
+        cache.store_text(name, pickle.dumps(computed).decode("latin-1"))
+    return computed
 
 
 def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
-    """Return the name under which the text of a key is kept, see `cache`; None for a foreign leg.
+    """Return the name of a key's cached text, see `cache`; None for a foreign leg.
 
-    It changes with the source of each of the packages, or modules at the top, `sources`.
+    It changes with the source of each of the packages, or top-level modules, `sources`.
     """
-    told = _told(key)
-    return None if told is None else cache.digest(told, _source(sources), ca.__version__)
+    canonical_key = _canonical_key(key)
+    return (
+        None
+        if canonical_key is None
+        else cache.digest(canonical_key, _source(sources), ca.__version__)
+    )
 
 
-def _read(text: str) -> Program | None:
+def _parse_program(text: str) -> Program | None:
     try:
-        data = json.loads(text)
+        record = json.loads(text)
         ports = (
             tuple(
                 Port(p["name"], tuple(p["shape"]), p["shared"], tuple(p["columns"])) for p in part
             )
-            for part in (data["inputs"], data["outputs"])
+            for part in (record["inputs"], record["outputs"])
         )
-        return Program(data["name"], ca.Function.deserialize(data["function"]), *ports)
+        return Program(record["name"], ca.Function.deserialize(record["function"]), *ports)
     except (ValueError, KeyError, TypeError, RuntimeError):
         return None
 
 
-def _written(given: Program) -> str:
+def _serialise_program(program: Program) -> str:
     ports = {
         name: [asdict(port) for port in part]
-        for name, part in (("inputs", given.inputs), ("outputs", given.outputs))
+        for name, part in (("inputs", program.inputs), ("outputs", program.outputs))
     }
-    return json.dumps({"name": given.name, "function": given.function.serialize(), **ports})
+    return json.dumps({"name": program.name, "function": program.function.serialize(), **ports})
 
 
-def _told(value: Any) -> str | None:
-    """Return a text that differs for values that differ; None where there may be no such text."""
-    if value is None or isinstance(value, bool | int | float | str):
-        return repr(value)
-    if isinstance(value, tuple):
-        parts = [_told(part) for part in value]
+def _canonical_key(part_: Any) -> str | None:
+    """Return a canonical cache key of a value; None if it has none (a foreign leg)."""
+    if part_ is None or isinstance(part_, bool | int | float | str):
+        return repr(part_)
+    if isinstance(part_, tuple):
+        parts = [_canonical_key(part) for part in part_]
         return None if None in parts else f"({', '.join(map(str, parts))})"
-    kind = type(value)
-    if not is_dataclass(value) or not kind.__module__.startswith("pteron."):
+    kind = type(part_)
+    if not is_dataclass(part_) or not kind.__module__.startswith("pteron."):
         return None
-    parts = [_told(getattr(value, field.name)) for field in fields(value)]
+    parts = [_canonical_key(getattr(part_, field.name)) for field in fields(part_)]
     return None if None in parts else f"{kind.__module__}.{kind.__qualname__}{parts}"
 
 

@@ -1,4 +1,4 @@
-"""`explained`: the text of a robot file with a comment that explains each key, to begin with."""
+"""`commented_text`: a template of a robot file, with a comment on each key."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.manipulator.files import DEFAULT_KIND, document, load
 from pteron.manipulator.manipulator import Manipulator
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import document_of
-from pteron.manipulator.writing import written
+from pteron.manipulator.writing import robot_text
 
 _FOLLOWS = {
     "base_radius": "Base radius {} m: every guide_point follows from it.",
@@ -25,14 +25,14 @@ _FOLLOWS = {
     "stock": "Masses and inertias of links from {}: a first guess, without their ends and joints.",
     "platform_mass": "Platform of {} kg: its inertia is in proportion.",
 }
-"""The sentence of the file for each argument of `with_dimensions`."""
+"""The file's comment for each argument of `with_dimensions`."""
 
 LEVEL = "horizontal"
 """The direction, in words, of cranks that point neither up nor down at 0."""
 
 
-def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
-    """Return the text of a robot file like a given one, with a comment that explains each key.
+def commented_text(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
+    """Return the text of a robot file made from another, with a comment on each key.
 
     Parameters
     ----------
@@ -46,58 +46,61 @@ def explained(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = N
     ModelError
         As `load` and `with_dimensions`.
     """
-    robot, given = load(name_or_path), document(name_or_path)
+    robot, tables = load(name_or_path), document(name_or_path)
     name = robot.name
     about = [f"Made after {shown(name, bare=True)}. Put in your numbers, then: pteron check FILE"]
     if dimensions:
-        given = document_of(with_dimensions(robot, **dimensions))
-        about += [_FOLLOWS[key].format(_told(value)) for key, value in dimensions.items()]
-        about += kept(robot, dimensions)
-    legs = [{"type": DEFAULT_KIND, **leg} for leg in given["legs"]]
-    document_ = {**given, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}
-    return written(_with_centers(document_), explained=True, about=about)
+        tables = document_of(with_dimensions(robot, **dimensions))
+        about += [
+            _FOLLOWS[key].format(_dimension_text(dimension))
+            for key, dimension in dimensions.items()
+        ]
+        about += kept_numbers_sentence(robot, dimensions)
+    legs = [{"type": DEFAULT_KIND, **leg} for leg in tables["legs"]]
+    document_ = {**tables, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}
+    return robot_text(_with_centers(document_), explained=True, about=about)
 
 
 def _with_centers(table: Any) -> Any:
     """Return a file's tables with each body's centre of mass in place of its first moment.
 
-    So an edit of the mass alone leaves the centre of mass where it is. A body without mass keeps
-    its first moment.
+    An edit of the mass alone then keeps the centre of mass. A body without mass keeps its first
+    moment.
     """
     if isinstance(table, list | tuple):
-        return [_with_centers(value) for value in table]
+        return [_with_centers(content) for content in table]
     if not isinstance(table, Mapping):
         return table
-    mass, made = table.get("mass"), {}
-    for key, value in table.items():
+    mass, converted = table.get("mass"), {}
+    for key, content in table.items():
         if key == "first_moment" and mass:
-            center = [float(f"{moment / mass:.12g}") + 0.0 for moment in value]
-            made["center_of_mass"] = center
+            center = [float(f"{moment / mass:.12g}") + 0.0 for moment in content]
+            converted["center_of_mass"] = center
         else:
-            made[key] = _with_centers(value)
-    return made
+            converted[key] = _with_centers(content)
+    return converted
 
 
-def kept(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
-    """Return a sentence on the numbers of a machine that a change of dimensions keeps.
+def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
+    """Return a sentence on a machine's numbers that do not depend on the changed dimensions.
 
-    The list is empty where nothing is changed, or nothing kept.
+    The list is empty where nothing is changed, or nothing independent.
     """
     if not dimensions:
         return []
-    made = with_dimensions(robot, **dimensions)
-    mass = made.platform.inertia.mass + sum(bar.mass for bar in made.platform.bars)
-    links, zero = _masses(made, dimensions.get("stock", {})), pointing(made)
-    told = []
+    changed = with_dimensions(robot, **dimensions)
+    mass = changed.platform.inertia.mass + sum(bar.mass for bar in changed.platform.bars)
+    links, zero = _masses(changed, dimensions.get("stock", {})), crank_direction_text(changed)
+    phrases = []
     if "platform_mass" not in dimensions:
-        told.append(f"the platform of {mass:.4g} kg (--platform-mass)")
+        phrases.append(f"the platform of {mass:.4g} kg (--platform-mass)")
     if links:
-        told.append(f"sections of links, {links} (--mass-from)")
+        phrases.append(f"sections of links, {links} (--mass-from)")
     if "limits" not in dimensions:
-        told.append("the joints' limits (--limits)")
+        phrases.append("the joints' limits (--limits)")
     if zero not in ("", LEVEL):
-        told.append(f"where a crank is at 0, {zero}")
-    return [f"As in {shown(robot.name, bare=True)} still: {'; '.join(told)}."] if told else []
+        phrases.append(f"where a crank is at 0, {zero}")
+    return [f"As in {shown(robot.name, bare=True)} still: {'; '.join(phrases)}."] if phrases else []
 
 
 def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
@@ -107,7 +110,7 @@ def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
     return " and ".join(f"{mass:.4g} kg ({key})" for key, mass in links.items() if key not in stock)
 
 
-def pointing(robot: Manipulator) -> str:
+def crank_direction_text(robot: Manipulator) -> str:
     """Return the direction of cranks at 0 in words: "5.33 deg below horizontal"; "" without cranks.
 
     It is "" without gravity, too.
@@ -120,10 +123,15 @@ def pointing(robot: Manipulator) -> str:
     angles = np.degrees(np.arcsin(np.clip(sines, -1.0, 1.0))).round(2) + 0.0
     if not angles.any():
         return LEVEL
-    return f"{', '.join(f'{one:g}' for one in dict.fromkeys(angles.tolist()))} deg below horizontal"
+    distinct = dict.fromkeys(angles.tolist())
+    return f"{', '.join(f'{angle:g}' for angle in distinct)} deg below horizontal"
 
 
-def _told(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return ", ".join(f"{stock} ({key})" for key, stock in value.items())
-    return " to ".join(f"{one:g}" for one in value) if isinstance(value, tuple) else f"{value:g}"
+def _dimension_text(dimension: Any) -> str:
+    if isinstance(dimension, Mapping):
+        return ", ".join(f"{stock} ({key})" for key, stock in dimension.items())
+    return (
+        " to ".join(f"{number:g}" for number in dimension)
+        if isinstance(dimension, tuple)
+        else f"{dimension:g}"
+    )

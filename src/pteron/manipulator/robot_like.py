@@ -1,4 +1,4 @@
-"""`as_manipulator`: the machine that a call is given by value, catalog name or file path."""
+"""`as_manipulator`: the machine of an argument `robot`, a value, catalog name or file path."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def as_manipulator(robot: RobotLike) -> Manipulator:
     Parameters
     ----------
     robot : Manipulator, str or Path
-        The machine, a catalog name, or the path of a TOML file. A file is looked at again at every
-        call, so that a change of it counts.
+        The machine, a catalog name, or the path of a TOML file. A file is read again at every call,
+        so that changes take effect.
 
     Returns
     -------
