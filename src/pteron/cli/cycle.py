@@ -132,14 +132,9 @@ def cycle(
         from pteron.tables import check_output
 
         check_output(out)
-    limits = limits_of(
-        machine,
-        speed=parsed_list(speed, "--speed"),
-        acceleration=parsed_list(acceleration, "--acceleration"),
-        force=parsed_list(force, "--force"),
-        tool_speed=tool_speed,
-        tool_acceleration=tool_acceleration,
-    )
+    joint_limits = {"speed": speed, "acceleration": acceleration, "force": force}
+    lists = {name: parsed_list(text, f"--{name}") for name, text in joint_limits.items()}
+    limits = limits_of(machine, **lists, tool_speed=tool_speed, tool_acceleration=tool_acceleration)
     way = kind or ("replay" if table else "line" if to or via else "adept")
     options: dict[str, object] = {
         "to": to,
@@ -150,13 +145,11 @@ def cycle(
     }
     options |= {"around": around, "scale": scale, "table": table, "optimal": optimal}
     _expect_fitting(way, options | {"duration": duration, "jerk": jerk})
-    if optimal and duration is not None:
-        raise DataError("--duration and --optimal given; give one of them")
+    if way == "replay" and table is None:
+        raise DataError("no motion given; give --table FILE")
     with spinner(f"A motion of {machine.name}"):
         step = 1.0 / rate
-        if way == "replay":
-            if table is None:
-                raise DataError("no motion given; give --table FILE")
+        if table is not None:
             start = None if from_ is None else given_pose(machine, from_, "--from")
             motion = replayed(machine, table, start)
         elif way == "joints":
@@ -171,7 +164,9 @@ def cycle(
 
 
 def _expect_fitting(way: str, options: Mapping[str, object]) -> None:
-    """Refuse options of another kind of motion."""
+    """Refuse options of another kind of motion, and two that set its duration."""
+    if options["optimal"] and options["duration"] is not None:
+        raise DataError("--duration and --optimal given; give one of them")
     for name, value in options.items():
         if value not in (None, False, 0.0) and way not in _KINDS_OF[name]:
             raise DataError(

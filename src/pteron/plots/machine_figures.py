@@ -238,13 +238,8 @@ def poses_figure(
             draw_path(sheet, path)
         draw_directions(sheet, scene)
         if titles:
-            style: dict[str, Any] = {
-                "ha": "center",
-                "va": "bottom",
-                "fontsize": FONT_SIZE,
-                "color": INK,
-            }
-            figure.text(left + 0.5 / columns, below + share, titles[k], **style)
+            style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": FONT_SIZE}
+            figure.text(left + 0.5 / columns, below + share, titles[k], color=INK, **style)
         sheets.append(sheet)
     together = np.vstack([sheet.drawn for sheet in sheets])
     for sheet in sheets:

@@ -248,11 +248,8 @@ class Case:
             good = np.flatnonzero(least >= 1.0)
             if not len(good):
                 best = int(least.argmax())
-                for name, share in shares.items():
-                    if (part := float(share[best])) < 1.0:
-                        much = f"{part:.0%}" if part >= 0.01 else "less than 1%"
-                        words = f"{name} {much} of what is asked, with {all_.all[best].name}"
-                        _miss(rating, name, 1.0 / max(part, 1e-3) - 1.0, words)
+                parts = {name: float(share[best]) for name, share in shares.items()}
+                _miss_parts(rating, parts, all_.all[best].name)
                 return
             first = int(good[0])
             if first:
@@ -373,6 +370,15 @@ def _miss(rating: Rating, name: str, share: float, words: str) -> None:
     """Note that a bound is missed."""
     if share > rating.misses.get(name, 0.0):
         rating.misses[name], rating.told[name] = float(share), words
+
+
+def _miss_parts(rating: Rating, parts: Mapping[str, float], option: str) -> None:
+    """Note the requirements that the best drive meets in part alone."""
+    for name, part in parts.items():
+        if part < 1.0:
+            much = f"{part:.0%}" if part >= 0.01 else "less than 1%"
+            words = f"{name} {much} of what is asked, with {option}"
+            _miss(rating, name, 1.0 / max(part, 1e-3) - 1.0, words)
 
 
 def _below(rating: Rating, name: str, value: float, least: float, unit: str = "") -> None:

@@ -9,7 +9,7 @@ stand on different radii, gets those with the least error of its tool's position
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -134,19 +134,9 @@ class LinearDelta:
             level, good = bed(robot, most, float(low.max()), float(high.min()))
         angles = np.radians([degrees(tower) for tower in towers])
         start = np.array([radius, *angles, *arms, *(feet[:, 2] + highest - level)])
-        solution = start
-        off, errors = 0.0, _errors(robot, start, level, rises, highest, good)
-        if np.abs(errors).max() > 0.1 * SAME:
-            fitted = scipy.optimize.least_squares(
-                lambda p: _errors(robot, p, level, rises, highest, good).ravel(),
-                start,
-                x_scale=radius,
-                xtol=1e-14,
-                ftol=1e-14,
-                gtol=1e-14,
-            )
-            solution = fitted.x
-            off = float(np.linalg.norm(fitted.fun.reshape(-1, 3), axis=1).max())
+        solution, off = _fitted(
+            lambda p: _errors(robot, p, level, rises, highest, good), start, radius
+        )
         if off > _WORST:  # then they may be anything
             i = int(np.argmax(np.abs(radii - np.median(radii)))) + 1
             reason = (
@@ -168,6 +158,17 @@ class LinearDelta:
             most,
             off,
         )
+
+
+def _fitted(errors: Callable[[Array], Array], start: Array, size: float) -> tuple[Array, float]:
+    """Return the numbers for which errors (K, 3) are least, and the greatest that is left, m."""
+    if np.abs(errors(start)).max() <= 0.1 * SAME:
+        return start, 0.0
+    accuracy = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-14)
+    fit = scipy.optimize.least_squares(
+        lambda numbers: errors(numbers).ravel(), start, x_scale=size, **accuracy
+    )
+    return fit.x, float(np.linalg.norm(fit.fun.reshape(-1, 3), axis=1).max())
 
 
 def _above(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:

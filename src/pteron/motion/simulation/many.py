@@ -150,16 +150,12 @@ def simulate_many(
     check_delay(delay)
     check_positive(step=step)
     sensors = sensors or Sensors()
+    sensing = sensors.delay + sensors.samples * controller.period
     reference = reference_of(robot, motion, None, duration, controller.period)
     count = len(reference.time)
     about = reference.pose[:: max(1, count // 64)]
-    timing = Timing(
-        delay,
-        "rk4",
-        allowed_step(robot, about, step, usual=step == STEP, machines=machines),
-        1e-10,
-        sensors.delay + sensors.samples * controller.period,
-    )
+    length = allowed_step(robot, about, step, usual=step == STEP, machines=machines)
+    timing = Timing(delay, "rk4", length, 1e-10, sensing)
     law = controller.law(robot if model is None else as_manipulator(model))
     expect_sensed(robot, law.program)
     control_loop = loop(robot, law.program, general=machines.geometry is not None)

@@ -165,14 +165,7 @@ def simulate(
     period = period if controller is None else controller.period
     check_positive(period=period, step=step, tolerance=tolerance)
     check_delay(delay)
-    expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
-
-    if method == "dop853" and not DriveKind.from_robot(robot).plain:
-        raise DataError(
-            f'method: "dop853" given, but the drives of {robot.name} bend, lag or ripple; "rk4" '
-            "has them"
-        )
-
+    _expect_method(robot, method)
     reference = reference_of(robot, motion, start, duration, period)
     pose, velocity = reference.pose[0], reference.velocity[0]
     if start is not None:
@@ -192,11 +185,11 @@ def simulate(
     timing = Timing(delay, method, length, tolerance, sensing)
     loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench", reference.time))
 
-    def made(timing: Timing) -> Simulation:
+    def simulated(timing: Timing) -> Simulation:
         settings = (pose, velocity), reference, source, loads, sensors, timing
         return run(robot, *settings, limits=limits and controller is not None)
 
-    return made(timing) if error is None else _within(made, timing, error, period)
+    return simulated(timing) if error is None else _within(simulated, timing, error, period)
 
 
 def _within(
@@ -227,6 +220,16 @@ def _within(
         f"by {changes[-1]:.2g}, {min(changes):.2g} at best: encoders that round, or a loop that is "
         "unstable, make much of the smallest difference; ask for less"
     )
+
+
+def _expect_method(robot: Manipulator, method: str) -> None:
+    """Refuse a method of integration that is none, or that the machine's drives rule out."""
+    expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
+    if method == "dop853" and not DriveKind.from_robot(robot).plain:
+        raise DataError(
+            f'method: "dop853" given, but the drives of {robot.name} bend, lag or ripple; "rk4" '
+            "has them"
+        )
 
 
 def _expect_controller(controller: object) -> None:
