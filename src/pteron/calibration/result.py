@@ -104,17 +104,17 @@ class Finding:
 
 @dataclass(frozen=True)
 class HiddenOrder:
-    """Two legs whose readings could be swapped and nothing would show.
+    """Legs whose readings could stand in another order and nothing would show.
 
     Attributes
     ----------
     legs : tuple of int
         Their numbers, from 1.
     error : float
-        Greatest further error of the tool on the calibrated machine if they are swapped, m.
+        Greatest further error of the tool on the calibrated machine in such an order, m.
     """
 
-    legs: tuple[int, int]
+    legs: tuple[int, ...]
     error: float
 
 

@@ -177,8 +177,8 @@ def _open_errors(evidence: Evidence) -> Iterator[_Reason]:
             hidden = evidence.hidden_order
             if hidden and kind == "position":
                 order = (
-                    f", nor the order of the legs {hidden.legs[0]} and {hidden.legs[1]}: if they "
-                    f"are swapped, by {_sized(hidden.error, 'position')} more"
+                    f", nor the order of the legs {_listed([*map(str, hidden.legs)])}: if it is "
+                    f"another, by up to {_sized(hidden.error, 'position')} more"
                 )
             yield _Reason(
                 f"{_listed(far)} may be off by {_sized(most, kind)} (95 %): "
