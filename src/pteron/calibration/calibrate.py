@@ -13,7 +13,7 @@ from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import describe_mistake, hidden_order, raw_mistake
-from pteron.calibration.residual_faults import residual_faults, zero_faults
+from pteron.calibration.residual_faults import hidden_tilt, residual_faults, zero_faults
 from pteron.calibration.result import (
     Calibration,
     Finding,
@@ -158,8 +158,9 @@ def _calibrate(
     )
     possible = open_errors(measurements, fit, blocks)
     hidden = None if mistakes else hidden_order(measurements, blocks, start, fit)
+    tilt = hidden_tilt(fitter, fit)
     evidence = Evidence(
-        measurements, fit, blocks, shown, judged, findings, possible, hidden, checked
+        measurements, fit, blocks, shown, judged, findings, possible, hidden, tilt, checked
     )
     return Calibration(
         robot,

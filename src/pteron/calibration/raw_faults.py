@@ -98,10 +98,13 @@ def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Fin
     sizes = []
     for kind, error in after.items():
         unit = "mrad" if kind == "angle" else "mm"
-        was = f", as logged within {1e3 * before[kind]:.3g} {unit}" if kind in before else ""
-        sizes.append(f"nine in ten {kind}s are within {1e3 * error:.3g} {unit}{was}")
+        logged = f" (as logged within {1e3 * before[kind]:.3g} {unit})" if kind in before else ""
+        sizes.append(f"nine in ten {kind}s are within {1e3 * error:.3g} {unit}{logged}")
     none = "" if before else "; as logged, most readings lead to no pose"
-    text += f" With this undone, as in what follows, {' and '.join(sizes)}{none} (as drawn)."
+    text += (
+        f" With this undone, as in what follows, {' and '.join(sizes)} of the machine as "
+        f"drawn{none}."
+    )
     return Finding("mistake", text, effect=float("inf"))
 
 
@@ -234,7 +237,8 @@ def _quick_misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess, mos
 
     Of these no other assembly modes are sought: of readings that lead to no pose that takes long.
     """
-    some = np.arange(len(rows)) < _FIRST
+    measured = ~np.isnan(np.hstack([*rows.parts.values()])).all(axis=1)
+    some = measured & (np.cumsum(measured) <= _FIRST)
     if (
         len(rows) > 2 * _FIRST
         and _misfit(rows.rows(some), blocks, guess, modes=False) > 10.0 * most
@@ -251,7 +255,8 @@ def _misfit(
         poses = _trial_poses(guess, rows, modes=modes)
     except DataError:
         return np.inf
-    return float(np.median(row_misfits(guess, rows, blocks, poses)))
+    measured = ~np.isnan(np.hstack([*rows.parts.values()])).all(axis=1)
+    return float(np.median(row_misfits(guess, rows, blocks, poses)[measured]))
 
 
 def _trial_poses(guess: Guess, rows: Measurements, *, modes: bool = True) -> Array:

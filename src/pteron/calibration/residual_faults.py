@@ -35,6 +35,9 @@ _CHANCE = 1e-6
 _HEAVIEST = 3.0
 """Most that a row may be off, in what a middle row is off: a few rows alone are no such fault."""
 
+_TRIED = 300
+"""Faults that are tried of a log of 60 rows, about: their logarithm counts."""
+
 _SHARE = 0.2
 """Least share of the squared residuals that a reported fault explains."""
 
@@ -314,10 +317,28 @@ def _scale_trials(test: _ScoreTest) -> Iterator[Trial]:
     yield Trial("scale", text, 1, fall, column @ amounts)
 
 
+def hidden_tilt(fitter: Fitter, fit: Fit) -> float | None:
+    """Return the greatest tilt by unequal rods of a pair that does not show, rad; None: no pairs.
+
+    Two machines, one of which has such rods and the geometry that hides them best, give the same
+    measurements to within the noise.
+    """
+    test = _ScoreTest(fitter, fit)
+    columns = _rod_columns(test)
+    if not columns:
+        return None
+    least = float(scipy.stats.chi2.isf(_CHANCE / _TRIED, 1))
+    tilts = []
+    for column, turns in columns:
+        fall = float((test.remaining(column[..., 0]) ** 2).sum()) / test.variance
+        tilts.append(float(np.sqrt(least / max(fall, 1e-300))) * turns)
+    return max(tilts)
+
+
 def _rod_trials(test: _ScoreTest) -> Iterator[Trial]:
     """Try parallel rods of one leg that differ in length, and so tilt the platform."""
     robot = test.fit.guess.robot
-    for i, column in enumerate(_rod_columns(test)):
+    for i, (column, _) in enumerate(_rod_columns(test)):
         leg = robot.legs[i]
         fall, amounts = test.score(column)
         share = abs(amounts[0]) / leg.size
@@ -331,8 +352,10 @@ def _rod_trials(test: _ScoreTest) -> Iterator[Trial]:
         yield Trial("unequal rods", text, 1, fall, column @ amounts)
 
 
-def _rod_columns(test: _ScoreTest) -> list[Array]:
-    """Return the columns (N, K, 1) of rods that differ, a leg each; none where no rods can.
+def _rod_columns(test: _ScoreTest) -> list[tuple[Array, float]]:
+    """Return the columns (N, K, 1) of rods that differ and their tilts, rad, a leg each.
+
+    None where no rods can differ.
 
     With the rod u from a bar b of length w, ends of the rods that differ by d turn the platform by
     theta so that theta . (b x u) = |u| d / w, for each leg. A column is for d / w = 1 / |u|.
@@ -367,7 +390,8 @@ def _rod_columns(test: _ScoreTest) -> list[Array]:
                 mine = alone & np.array([given.marks[k] == block.name for k in test.rows])
                 slopes = test.slopes[..., block.where]
                 column += mine[:, None] * np.einsum("nkx,nx->nk", slopes, moved)
-        columns.append(column[..., None])
+        tilt = float(np.median(np.linalg.norm(turn[test.rows], axis=1)))
+        columns.append((column[..., None], tilt))
     return columns
 
 
