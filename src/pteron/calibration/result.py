@@ -226,6 +226,7 @@ class Calibration:
         return {
             "name": self.drawn.name,
             "machine": machine_record(self.drawn),
+            "calibrated_geometry": machine_record(self.robot)["geometry"],
             "values": values,
             **picked(self.fit.guess, "zeros scales"),
             "noise": self.noise,

@@ -72,6 +72,11 @@ def notes(result: Calibration) -> tuple[str, ...]:
     """Return what a user of the found machine must know: its zeros, and its bodies' parameters."""
     kept = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
     found = []
+    if any(finding.kind == "mistake" for finding in result.findings):
+        found.append(
+            "The machine as found belongs to the log with its mistake undone: mend the log, or the "
+            "controller that wrote it, before readings lead to poses."
+        )
     if any(value.group in ("zeros", "scales") for value in result.values):
         found.append(
             f"Zeros and scales of joints {', '.join(kept)} are the legs' reading in robot.toml: "
