@@ -85,10 +85,10 @@ def raw_mistake(
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
-        now = _misfit(_some_rows(given), blocks, robot_guess)
-        if not fitted and now < _FAR:
+        misfit = _misfit(_some_rows(given), blocks, robot_guess)
+        if not fitted and misfit < _FAR:
             return None
-        return _best_mistake(given, blocks, robot_guess, min(_NEAR, _FALLEN * now))
+        return _best_mistake(given, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
 
 
 def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Finding:
@@ -109,7 +109,7 @@ def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Fin
 
 
 def _drawing_errors(given: Measurements, guess: Guess) -> dict[str, float]:
-    """Return the size of nine in ten residuals by kind on the drawn machine, m and rad."""
+    """Return the bound of nine in ten residuals by kind on the drawn machine, m and rad."""
     rows = _some_rows(given)
     try:
         residuals, measured = _drawing_residuals(guess, rows)
@@ -117,7 +117,7 @@ def _drawing_errors(given: Measurements, guess: Guess) -> dict[str, float]:
         return {}
     kinds = {kind: measured & (given.kind_of == kind) for kind in given.kinds}
     return {
-        kind: float(np.median(np.abs(residuals[here])))
+        kind: float(np.quantile(np.abs(residuals[here]), 0.9))
         for kind, here in kinds.items()
         if here.any()
     }
@@ -143,12 +143,12 @@ def hidden_order(
     """
     if not set(given.kinds) <= {"height", "distance"}:
         return None
-    now = _misfit(_some_rows(given), blocks, robot_guess)
+    misfit = _misfit(_some_rows(given), blocks, robot_guess)
     legs: set[int] = set()
     error = 0.0
     for order in leg_orders(robot_guess):
         rows = _some_rows(reordered(given, order))
-        if _misfit(rows, blocks, robot_guess) < max(_CLEAR, 1.5 * now):
+        if _misfit(rows, blocks, robot_guess) < max(_CLEAR, 1.5 * misfit):
             legs |= {i + 1 for i, k in enumerate(order) if i != k}
             error = max(error, _change_by_order(given, robot_guess, fit, order))
     return HiddenOrder(tuple(sorted(legs)), error) if legs else None

@@ -367,7 +367,7 @@ def _rod_columns(test: _ScoreTest) -> list[tuple[Array, float]]:
     couples: Array = evaluated(robot, "beams", "nan", fit.poses)[-1]
     if couples.shape[1] != 3 or not np.isfinite(couples).all(axis=(1, 2)).any():
         return []
-    good = np.isfinite(couples).all(axis=(1, 2))
+    good: NDArray[np.bool_] = np.asarray(np.isfinite(couples).all(axis=(1, 2)))
     size = np.linalg.norm(couples, axis=-1).max(axis=-1)
     flat = np.abs(np.linalg.det(np.where(good[:, None, None], couples, np.eye(3))))
     good &= flat > _FLAT * size**3
