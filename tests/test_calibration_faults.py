@@ -14,7 +14,7 @@ from calibration_plants import CASES, FAULTS, NOISE, WORDS, starts, trial
 from mechanisms import CATALOG, CLIENTS
 
 import pteron
-from pteron.calibration import Measurements, calibrate
+from pteron.calibration import Measurements, Place, Setup, calibrate
 from pteron.calibration.guess import Guess
 from pteron.calibration.mistakes import reordered
 from pteron.calibration.residuals import MachineSlopes
@@ -39,6 +39,7 @@ GATE = {
     ("wide printer by distances", "beyond the reach"),
     ("wide printer by distances", "zero off"),
     ("rams by poses", "shifted rows"),
+    ("printer by heights", "shifted rows"),
 }
 
 
@@ -177,6 +178,25 @@ def test_heights_of_unequal_rods_are_to_the_noise_those_of_a_machine_with_equal_
     assert result.findings == ()
     first = result.verdict.reasons[0]
     assert "heights do not show them, nor rods of one pair that differ and tilt" in first
+
+
+def test_marks_away_from_the_middle_show_a_platform_that_stands_tilted():
+    """A turn of rods' ends and marks together by (12, -9, 0) mrad."""
+    sample = trial("printer by positions", "none")
+    marks = {"a": (0.03, 0.02, -0.05), "b": (-0.04, 0.01, 0.03), "c": (0.0, -0.05, -0.02)}
+    names = tuple("abc"[i % 3] for i in range(60))
+    arms = np.array([marks[name] for name in names])
+    setup = Setup(marks={name: Place(at) for name, at in marks.items()})
+    results = []
+    for tilt in (np.zeros(3), np.array([0.012, -0.009, 0.0])):
+        positions = sample.given.positions + arms + np.cross(tilt, arms)
+        given = replace(sample.given, positions=positions, marks=names, setup=setup)
+        results.append(calibrate(sample.robot, given))
+    assert results[0].verdict.grade == "trustworthy"
+    text = results[1].findings[0].text
+    assert text.startswith("The platform stands tilted against the drawing (")
+    about_x, about_y = map(float, re.findall(r"([-+][\d.]+) mrad about [xy]", text))
+    assert (about_x, about_y) == pytest.approx((12.0, -9.0), abs=0.3)
 
 
 def test_a_mark_away_from_the_middle_shows_rods_that_differ():

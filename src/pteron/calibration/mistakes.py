@@ -71,9 +71,22 @@ class Mistake(NamedTuple):
 
 def likely_mistakes(given: Measurements, guess: Guess) -> Iterator[list[Mistake]]:
     """Yield groups of likely mistakes, the likeliest first; zeros and scales are fitted to rows."""
-    for kind in (_units, _marks, _frames, _orders, _reversed, _mirrored_frames, _shifted_rows):
+    kinds = (
+        *(_units, _signs, _marks, _frames, _orders),
+        *(_reversed, _mirrored_frames, _shifted_rows),
+    )
+    for kind in kinds:
         yield list(kind(given, guess))
     yield [*_scaled(given, guess), *_fitted(given, guess)]
+
+
+def order_mistakes(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+    """Yield mistakes in the order of rows, legs and marks, and in the sign of heights.
+
+    Of small residuals they make other small ones, which may look like noise.
+    """
+    for kind in (_signs, _marks, _orders, _shifted_rows):
+        yield from kind(given, guess)
 
 
 def leg_orders(guess: Guess) -> Iterator[tuple[int, ...]]:
@@ -144,6 +157,10 @@ def _units(given: Measurements, guess: Guess) -> Iterator[Mistake]:
     if "angle" in given.kinds:
         text = "the measured angles are in degrees: give them in radians"
         yield Mistake(text, _of_parts({"angles": np.pi / 180.0}))
+
+
+def _signs(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+    """Yield heights that perhaps count downwards."""
     if "height" in given.kinds:
         text = "the heights count downwards: reverse their signs"
         yield Mistake(text, _of_parts({"heights": -1.0}))

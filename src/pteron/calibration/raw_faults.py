@@ -21,6 +21,7 @@ from pteron.calibration.mistakes import (
     Mistake,
     leg_orders,
     likely_mistakes,
+    order_mistakes,
     reordered,
 )
 from pteron.calibration.residuals import MachineSlopes
@@ -89,6 +90,19 @@ def raw_mistake(
         if not fitted and misfit < _FAR:
             return None
         return _best_mistake(given, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
+
+
+def order_mistake(
+    given: Measurements, blocks: Sequence[Block], robot_guess: Guess
+) -> Mistake | None:
+    """Return the mistake in an order or a sign without which a fit leaves far less; else None.
+
+    Heights that differ by less than tolerances are near the drawing in any order of their rows.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnlikelyValue)
+        mistakes = list(order_mistakes(given, robot_guess))
+        return _best_together(given, blocks, robot_guess, mistakes)
 
 
 def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Finding:
@@ -200,19 +214,24 @@ def _best_mistake(
             clear |= misfit < min(_CLEAR, most)
         if clear:
             break
-    finalists = sorted(tried, key=lambda trial: trial[:2])[:_FINALISTS]
-    compared = []
-    for misfit, k, mistake in finalists:
-        if misfit < most:
-            cost = _cost_together(mistake.undo(given), blocks, guess)
-            compared.append((cost + _ALIKE * mistake.freedom, k, mistake))
-    if not compared:
+    near = sorted((t for t in tried if t[0] < most), key=lambda t: t[:2])[:_FINALISTS]
+    finalists = sorted(near, key=lambda trial: trial[1])
+    return _best_together(given, blocks, guess, [mistake for *_, mistake in finalists])
+
+
+def _best_together(
+    given: Measurements, blocks: Sequence[Block], guess: Guess, mistakes: Sequence[Mistake]
+) -> Mistake | None:
+    """Return the mistake that, undone, leaves least of all rows in a fit, if that is far less."""
+    costs = [
+        _cost_together(mistake.undo(given), blocks, guess) + _ALIKE * mistake.freedom
+        for mistake in mistakes
+    ]
+    least = min(costs, default=np.inf)
+    if not least < np.inf or not least < _LEFT_TOGETHER * _cost_together(given, blocks, guess):
         return None
-    least = min(cost for cost, *_ in compared)
-    if not least < _LEFT_TOGETHER * _cost_together(given, blocks, guess):
-        return None
-    alike = [(k, mistake) for cost, k, mistake in compared if cost <= least + _ALIKE]
-    return min(alike, key=lambda trial: trial[0])[1]
+    pairs = zip(mistakes, costs, strict=True)
+    return next(mistake for mistake, cost in pairs if cost <= least + _ALIKE)
 
 
 def _cost_together(given: Measurements, blocks: Sequence[Block], guess: Guess) -> float:

@@ -222,7 +222,7 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
     """Return the fault, if any, that best explains what noise does not, and the rows (N,) so."""
     test = _ScoreTest(fitter, fit)
     tried, best, gain = 0, None, -np.inf
-    for trial in (*_trials(test), *_scale_trials(test), *_rod_trials(test)):
+    for trial in (*_trials(test), *_scale_trials(test), *_rod_trials(test), *_tilt_trials(test)):
         tried += 1
         more_than_chance = trial.fall - float(scipy.stats.chi2.isf(0.5, trial.freedom))
         if more_than_chance > gain:
@@ -233,8 +233,9 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
         return (), explained
     after = np.linalg.norm(test.left + test.remaining(best.moved), axis=-1)
     explained[test.rows] = after < _EXPLAINED * np.linalg.norm(test.left, axis=-1)
-    # Rods that differ the geometry takes; what it does not take of them is left.
-    moved = test.remaining(best.moved) if best.kind == "unequal rods" else best.moved
+    # Rods that differ, and a tilt, the geometry takes; what it does not take of them is left.
+    follows = best.kind in ("unequal rods", "tilted platform")
+    moved = test.remaining(best.moved) if follows else best.moved
     kinds = [str(kind) for kind in fitter.given.kind_of]
     limits = np.array([ORDINARY_ERROR[kind] / fit.noise[kind] for kind in kinds])
     effect = float((np.abs(moved) / limits)[fit.kept[test.rows]].max(initial=0.0))
@@ -360,8 +361,7 @@ def _rod_columns(test: _ScoreTest) -> list[tuple[Array, float]]:
     With the rod u from a bar b of length w, ends of the rods that differ by d turn the platform by
     theta so that theta . (b x u) = |u| d / w, for each leg. A column is for d / w = 1 / |u|.
     """
-    given, fit = test.given, test.fit
-    robot = fit.guess.robot
+    fit, robot = test.fit, test.fit.guess.robot
     if robot.platform.angular.any():
         return []
     couples: Array = evaluated(robot, "beams", "nan", fit.poses)[-1]
@@ -372,27 +372,51 @@ def _rod_columns(test: _ScoreTest) -> list[tuple[Array, float]]:
     flat = np.abs(np.linalg.det(np.where(good[:, None, None], couples, np.eye(3))))
     good &= flat > _FLAT * size**3
     turns = np.linalg.inv(np.where(good[:, None, None], couples, np.eye(3)))  # a column a leg
-    arms = np.array([leg.platform_point for leg in robot.legs]) @ np.array(robot.platform.frame)
-    arms += np.array([leg.fixed_offset for leg in robot.legs])
-    against = MachineSlopes(robot, ()).jacobian(fit.guess, fit.poses) @ robot.platform.directions
-    marks = fit.guess.marked(given.marks) @ np.array(robot.platform.frame)
-    alone = given.origins[test.rows] < 0
     columns = []
     for i in range(len(robot.legs)):
         turn = np.where(good[:, None], turns[:, :, i], 0.0)
-        shifts = np.cross(turn[:, None], arms)
-        steps = np.nan_to_num(np.einsum("njx,njx->nj", against, shifts))
-        column = -test.joint_columns(steps).sum(axis=-1)
-        # A mark's slopes are along the platform's frame.
-        moved = (np.cross(turn, marks) @ np.array(robot.platform.frame).T)[test.rows]
-        for block in test.more:
-            if block.kind == "mark":
-                mine = alone & np.array([given.marks[k] == block.name for k in test.rows])
-                slopes = test.slopes[..., block.where]
-                column += mine[:, None] * np.einsum("nkx,nx->nk", slopes, moved)
         tilt = float(np.median(np.linalg.norm(turn[test.rows], axis=1)))
-        columns.append((column[..., None], tilt))
+        columns.append((_turned_column(test, turn)[..., None], tilt))
     return columns
+
+
+def _tilt_trials(test: _ScoreTest) -> Iterator[Trial]:
+    """Try a platform that is held by pairs of rods and stands tilted against the drawing."""
+    if not _rod_columns(test):
+        return
+    turns = [np.broadcast_to(axis, (len(test.given), 3)) for axis in np.eye(3)]
+    columns = np.stack([_turned_column(test, turn) for turn in turns], axis=-1)
+    fall, amounts = test.score(columns)
+    angles = ", ".join(
+        f"{1e3 * angle:+.3g} mrad about {axis}" for angle, axis in zip(amounts, "xyz", strict=True)
+    )
+    text = (
+        f"The platform stands tilted against the drawing ({angles}), as with a bent joint or rods "
+        "of all pairs that differ: level it, and measure anew."
+    )
+    yield Trial("tilted platform", text, 3, fall, columns @ amounts)
+
+
+def _turned_column(test: _ScoreTest, turn: Array) -> Array:
+    """Return the column (N, K) of a platform that stands turned by vectors (M, 3) in all rows."""
+    given, guess, poses = test.given, test.fit.guess, test.fit.poses
+    robot = guess.robot
+    frame = np.array(robot.platform.frame)
+    arms = np.array([leg.platform_point for leg in robot.legs]) @ frame
+    arms += np.array([leg.fixed_offset for leg in robot.legs])
+    against = MachineSlopes(robot, ()).jacobian(guess, poses) @ robot.platform.directions
+    shifts = np.cross(turn[:, None], arms)
+    steps = np.nan_to_num(np.einsum("njx,njx->nj", against, shifts))
+    column: Array = -test.joint_columns(steps).sum(axis=-1)
+    # A mark's slopes are along the platform's frame.
+    moved = (np.cross(turn, guess.marked(given.marks) @ frame) @ frame.T)[test.rows]
+    alone = given.origins[test.rows] < 0
+    for block in test.more:
+        if block.kind == "mark":
+            mine = alone & np.array([given.marks[k] == block.name for k in test.rows])
+            slopes = test.slopes[..., block.where]
+            column += mine[:, None] * np.einsum("nkx,nx->nk", slopes, moved)
+    return column
 
 
 def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
