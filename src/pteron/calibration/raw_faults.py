@@ -111,15 +111,20 @@ def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Fin
     text = f"{mistake.text[0].upper()}{mistake.text[1:]}."
     sizes = []
     for kind, error in after.items():
-        unit = "mrad" if kind == "angle" else "mm"
-        logged = f" (as logged within {1e3 * before[kind]:.3g} {unit})" if kind in before else ""
-        sizes.append(f"nine in ten {kind}s are within {1e3 * error:.3g} {unit}{logged}")
+        logged = f" (as logged within {_sized(before[kind], kind)})" if kind in before else ""
+        sizes.append(f"nine in ten {kind}s are within {_sized(error, kind)}{logged}")
     none = "" if before else "; as logged, most readings lead to no pose"
     text += (
         f" With this undone, as in what follows, {' and '.join(sizes)} of the machine as "
         f"drawn{none}."
     )
     return Finding("mistake", text, effect=float("inf"))
+
+
+def _sized(error: float, kind: str) -> str:
+    if kind == "angle":
+        return f"{1e3 * error:.3g} mrad"
+    return f"{1e3 * error:.3g} mm" if error < 1.0 else f"{error:.4g} m"
 
 
 def _drawing_errors(given: Measurements, guess: Guess) -> dict[str, float]:
@@ -258,11 +263,11 @@ def _quick_misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess, mos
     """
     measured = ~np.isnan(np.hstack([*rows.parts.values()])).all(axis=1)
     some = measured & (np.cumsum(measured) <= _FIRST)
-    if (
-        len(rows) > 2 * _FIRST
-        and _misfit(rows.rows(some), blocks, guess, modes=False) > 10.0 * most
-    ):
-        return np.inf
+    modes = not rows.setup.frame_known  # which the poses of these few rows have to fix
+    if len(rows) > 2 * _FIRST:
+        misfit = _misfit(rows.rows(some), blocks, guess, modes=modes)
+        if misfit > 10.0 * most:
+            return np.inf
     return _misfit(rows, blocks, guess)
 
 
