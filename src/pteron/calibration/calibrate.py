@@ -12,12 +12,7 @@ from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
-from pteron.calibration.raw_faults import (
-    describe_mistake,
-    hidden_order,
-    order_mistake,
-    raw_mistake,
-)
+from pteron.calibration.raw_faults import describe_mistake, hidden_order, raw_mistake
 from pteron.calibration.residual_faults import hidden_tilt, residual_faults, zero_faults
 from pteron.calibration.result import (
     Calibration,
@@ -29,7 +24,7 @@ from pteron.calibration.result import (
 )
 from pteron.calibration.set_aside import rows_set_aside
 from pteron.calibration.start import placed, starting_poses
-from pteron.calibration.thresholds import FALLEN_SHARE, FEW_LEFT_OUT, ordinary_error
+from pteron.calibration.thresholds import FEW_LEFT_OUT, ordinary_error
 from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
 from pteron.errors import DataError
@@ -115,10 +110,9 @@ def calibrate(
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
         result = _calibrate(robot, measurements, blocks, held_out, seed)
-        if _far_off(result.fit, measurements):
-            mistake = raw_mistake(measurements, blocks, start, fitted=True)
-        elif not _fell(result.held_out):
-            mistake = order_mistake(measurements, blocks, start)
+        if not _far_off(result.fit, measurements):
+            return result
+        mistake = raw_mistake(measurements, blocks, start, fitted=True)
         if mistake is None:
             return result
     finding = describe_mistake(mistake, measurements, start)
@@ -204,13 +198,6 @@ def _far_off(fit: Fit, given: Measurements) -> bool:
     return not fit.settled or any(
         error > ordinary_error(kind, stated.get(kind))
         for kind, error in fitted_errors(fit, given).items()
-    )
-
-
-def _fell(held_out: HeldOut | None) -> bool:
-    """Return whether errors at held-out rows fell, all of them; True where none were held out."""
-    return held_out is None or all(
-        after <= FALLEN_SHARE * held_out.before[kind] for kind, after in held_out.after.items()
     )
 
 

@@ -81,11 +81,11 @@ def likely_mistakes(given: Measurements, guess: Guess) -> Iterator[list[Mistake]
 
 
 def order_mistakes(given: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield mistakes in the order of rows, legs and marks, and in the sign of heights.
+    """Yield mistakes in the order of rows and the sign of heights.
 
     Of small residuals they make other small ones, which may look like noise.
     """
-    for kind in (_signs, _marks, _orders, _shifted_rows):
+    for kind in (_signs, _shifted_rows):
         yield from kind(given, guess)
 
 

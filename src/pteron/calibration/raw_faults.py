@@ -21,7 +21,6 @@ from pteron.calibration.mistakes import (
     Mistake,
     leg_orders,
     likely_mistakes,
-    order_mistakes,
     reordered,
 )
 from pteron.calibration.residuals import MachineSlopes
@@ -90,19 +89,6 @@ def raw_mistake(
         if not fitted and misfit < _FAR:
             return None
         return _best_mistake(given, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
-
-
-def order_mistake(
-    given: Measurements, blocks: Sequence[Block], robot_guess: Guess
-) -> Mistake | None:
-    """Return the mistake in an order or a sign without which a fit leaves far less; else None.
-
-    Heights that differ by less than tolerances are near the drawing in any order of their rows.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnlikelyValue)
-        mistakes = list(order_mistakes(given, robot_guess))
-        return _best_together(given, blocks, robot_guess, mistakes)
 
 
 def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Finding:
@@ -221,13 +207,7 @@ def _best_mistake(
             break
     near = sorted((t for t in tried if t[0] < most), key=lambda t: t[:2])[:_FINALISTS]
     finalists = sorted(near, key=lambda trial: trial[1])
-    return _best_together(given, blocks, guess, [mistake for *_, mistake in finalists])
-
-
-def _best_together(
-    given: Measurements, blocks: Sequence[Block], guess: Guess, mistakes: Sequence[Mistake]
-) -> Mistake | None:
-    """Return the mistake that, undone, leaves least of all rows in a fit, if that is far less."""
+    mistakes = [mistake for *_, mistake in finalists]
     costs = [
         _cost_together(mistake.undo(given), blocks, guess) + _ALIKE * mistake.freedom
         for mistake in mistakes

@@ -7,6 +7,7 @@ squared residuals would fall if it were sought too (a score test).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
 from pteron.calibration.guess import Block, Unknown, numbered
 from pteron.calibration.measurements import Measurements, evenly
+from pteron.calibration.mistakes import order_mistakes
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
 from pteron.calibration.thresholds import OFF_TOLERANCES, ORDINARY_ERROR
@@ -138,6 +140,8 @@ class _ScoreTest:
         Against the unknowns of the fit and, behind them, those of `more`.
     more : tuple of Block
         Every joint's zero, each mark, and the instrument's frame, where it is not sought.
+    weights : array, shape (N,)
+        Less than 1 of rows that are far off.
     left : array, shape (N, K)
         Residuals after the fit.
     variance : float
@@ -160,6 +164,7 @@ class _ScoreTest:
         off = np.sqrt(np.einsum("nk,nk->n", r, r) / np.maximum(at.measured.sum(axis=1), 1))
         weights = np.minimum(1.0, _HEAVIEST * np.median(off) / np.maximum(off, 1e-12))
         weights[~np.isfinite(slopes).all(axis=(1, 2))] = 0.0  # no pose
+        self.weights = weights
         r = weights[:, None] * r
         self.slopes = weights[:, None, None] * np.nan_to_num(slopes)
         self._joints = weights[:, None, None] * np.nan_to_num(joints)
@@ -222,7 +227,8 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
     """Return the fault, if any, that best explains what noise does not, and the rows (N,) so."""
     test = _ScoreTest(fitter, fit)
     tried, best, gain = 0, None, -np.inf
-    for trial in (*_trials(test), *_scale_trials(test), *_rod_trials(test), *_tilt_trials(test)):
+    trials = (_trials, _scale_trials, _rod_trials, _tilt_trials, _order_trials)
+    for trial in chain.from_iterable(tries(test) for tries in trials):
         tried += 1
         more_than_chance = trial.fall - float(scipy.stats.chi2.isf(0.5, trial.freedom))
         if more_than_chance > gain:
@@ -316,6 +322,19 @@ def _scale_trials(test: _ScoreTest) -> Iterator[Trial]:
         "allow: check leads, gear ratios or steps, or the unit of what is measured."
     )
     yield Trial("scale", text, 1, fall, column @ amounts)
+
+
+def _order_trials(test: _ScoreTest) -> Iterator[Trial]:
+    """Try measurements that stand beside their readings, and heights of the other sign."""
+    given, noise = test.given, test.fit.noise
+    sizes = np.array([noise[str(kind)] for kind in given.kind_of])
+    logged = np.hstack([*given.parts.values()])
+    for mistake in order_mistakes(given, test.start):
+        change = logged - np.hstack([*mistake.undo(given).parts.values()])
+        moved = test.weights[:, None] * np.nan_to_num(change / sizes)[test.rows]
+        after = test.left + test.remaining(moved)
+        fall = float((test.left**2).sum() - (after**2).sum()) / test.variance
+        yield Trial("order", f"{mistake.text[0].upper()}{mistake.text[1:]}.", 1, fall, moved)
 
 
 def hidden_tilt(fitter: Fitter, fit: Fit) -> float | None:
