@@ -110,7 +110,8 @@ def calibrate(
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
         result = _calibrate(robot, measurements, blocks, held_out, seed)
-        if not _far_off(result.fit, measurements):
+        explained = any(finding.kind not in ("zero", "outlier") for finding in result.findings)
+        if explained or not _far_off(result.fit, measurements):
             return result
         mistake = raw_mistake(measurements, blocks, start, fitted=True)
         if mistake is None:

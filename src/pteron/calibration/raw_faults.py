@@ -81,12 +81,12 @@ def raw_mistake(
 ) -> Mistake | None:
     """Return the mistake that explains measurements far from the drawing; else None.
 
-    After a fit that left errors beyond ordinary tolerances (`fitted`) they are far in any case.
+    After a fit that left errors beyond ordinary tolerances (`fitted`), of those that are near.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
         misfit = _misfit(_some_rows(given), blocks, robot_guess)
-        if not fitted and misfit < _FAR:
+        if fitted == (misfit >= _FAR):  # what is far was searched before the fit
             return None
         return _best_mistake(given, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
 
@@ -206,16 +206,15 @@ def _best_mistake(
         if clear:
             break
     near = sorted((t for t in tried if t[0] < most), key=lambda t: t[:2])[:_FINALISTS]
-    finalists = sorted(near, key=lambda trial: trial[1])
-    mistakes = [mistake for *_, mistake in finalists]
+    finalists = [mistake for *_, mistake in sorted(near, key=lambda t: t[1])]
     costs = [
         _cost_together(mistake.undo(given), blocks, guess) + _ALIKE * mistake.freedom
-        for mistake in mistakes
+        for mistake in finalists
     ]
     least = min(costs, default=np.inf)
     if not least < np.inf or not least < _LEFT_TOGETHER * _cost_together(given, blocks, guess):
         return None
-    pairs = zip(mistakes, costs, strict=True)
+    pairs = zip(finalists, costs, strict=True)
     return next(mistake for mistake, cost in pairs if cost <= least + _ALIKE)
 
 
