@@ -38,6 +38,9 @@ _TRIED_ROWS = 5000
 _RANK_ROWS = 400
 """Rows, evenly spread, at which the singular values are taken."""
 
+_IN_TIME = ("slipped zero", "backlash", "drift")
+"""Faults that differ from row to row, so that none of the whole log explains them."""
+
 
 def calibrate(
     robot: RobotLike,
@@ -110,7 +113,7 @@ def calibrate(
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
         result = _calibrate(robot, measurements, blocks, held_out, seed)
-        explained = any(finding.kind not in ("zero", "outlier") for finding in result.findings)
+        explained = any(finding.kind in _IN_TIME for finding in result.findings)
         if explained or not _far_off(result.fit, measurements):
             return result
         mistake = raw_mistake(measurements, blocks, start, fitted=True)

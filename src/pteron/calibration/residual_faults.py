@@ -40,6 +40,9 @@ _HEAVIEST = 3.0
 _TRIED = 300
 """Faults that are tried of a log of 60 rows, about: their logarithm counts."""
 
+_GREATEST_TILT = 0.1
+"""Tilt of a platform, rad, above which it is no fault of its joints: rods would come off."""
+
 _SHARE = 0.2
 """Least share of the squared residuals that a reported fault explains."""
 
@@ -406,6 +409,8 @@ def _tilt_trials(test: _ScoreTest) -> Iterator[Trial]:
     turns = [np.broadcast_to(axis, (len(test.given), 3)) for axis in np.eye(3)]
     columns = np.stack([_turned_column(test, turn) for turn in turns], axis=-1)
     fall, amounts = test.score(columns)
+    if np.abs(amounts).max() > _GREATEST_TILT:
+        return
     angles = ", ".join(
         f"{1e3 * angle:+.3g} mrad about {axis}" for angle, axis in zip(amounts, "xyz", strict=True)
     )
