@@ -165,12 +165,65 @@ def built(robot, rng, share=0.3):
     return made, zeros
 
 
+def wide_printer():
+    """Return a printer of other dimensions than the catalog's: radius 141 mm, rods of 291 mm."""
+    base, legs = pteron.load("linear-delta"), []
+    for angle, leg in zip(np.radians([210.0, 330.0, 90.0]), base.legs, strict=True):
+        x, y = np.cos(angle), np.sin(angle)
+        legs.append(
+            replace(
+                leg,
+                guide_point=(0.141 * x, 0.141 * y, 0.0),
+                platform_point=(0.027 * x, 0.027 * y, 0.0),
+                bar_direction=(-y, x, 0.0),
+                lower_length=0.291,
+                limits=(0.05, 0.9),
+            )
+        )
+    return replace(base, name="wide-printer", legs=tuple(legs))
+
+
+def small_delta():
+    """Return a Delta of other dimensions than the catalog's: cranks of 210 mm, rods of 520 mm."""
+    base, legs = pteron.load("delta"), []
+    for angle, leg in zip(np.radians([30.0, 150.0, 270.0]), base.legs, strict=True):
+        x, y = np.cos(angle), np.sin(angle)
+        legs.append(
+            replace(
+                leg,
+                guide_point=(0.17 * x, 0.17 * y, 0.0),
+                direction=(y, -x, 0.0),
+                zero_direction=(x, y, 0.0),
+                platform_point=(0.05 * x, 0.05 * y, 0.0),
+                upper_length=0.21,
+                lower_length=0.52,
+                limits=(-1.4, 1.0),
+            )
+        )
+    return replace(base, name="small-delta", legs=tuple(legs))
+
+
+MACHINES = {"wide-printer": wide_printer, "small-delta": small_delta}
+"""Machines beside those of the catalog."""
+
+BOXES = {
+    "linear-delta": ((-0.055, -0.055, 0.0), (0.055, 0.055, 0.08)),
+    "wide-printer": ((-0.08, -0.08, 0.0), (0.08, 0.08, 0.1)),
+    "delta": ((-0.25, -0.25, -0.15), (0.25, 0.25, 0.05)),
+    "small-delta": ((-0.12, -0.12, -0.06), (0.12, 0.12, 0.06)),
+}
+"""Corners of what is measured; of machines that are no printers about home."""
+
+PRINTERS = ("linear-delta", "wide-printer")
+
 CASES = {
     "printer by heights": ("linear-delta", "heights"),
     "printer by positions": ("linear-delta", "positions"),
     "cranks by positions": ("delta", "positions"),
     "cranks by heights": ("delta", "heights"),
     "rams by poses": ("stewart", "poses"),
+    "wide printer by distances": ("wide-printer", "distances"),
+    "small cranks by positions": ("small-delta", "positions"),
 }
 
 FAULTS = (
@@ -179,7 +232,11 @@ FAULTS = (
     "one reversed",
     "swapped",
     "half the lead",
+    "other pulleys",
+    "all pulleys",
     "millimetres",
+    "inches or degrees",
+    "shifted rows",
     "row 195 mm off",
     "beyond the reach",
     "slipped zero",
@@ -188,18 +245,22 @@ FAULTS = (
 )
 
 WORDS = {
-    "reversed": ("reversed",),
-    "one reversed": ("reversed",),
-    "swapped": ("swapped", "nor the order of the legs"),
-    "half the lead": ("half as large", "reads 0.5", "half the lead"),
-    "millimetres": ("millimetres",),
-    "row 195 mm off": ("row 18",),
-    "beyond the reach": ("row 18",),
-    "slipped zero": ("slipped",),
-    "unequal rods": ("parallel rods of leg 2", "do not show"),
-    "zero off": ("the zero of", "The zero of joint 2"),
+    "reversed": ("of all joints are reversed",),
+    "one reversed": ("of joint 2 (",),
+    "swapped": ("legs 1 and 2 (", "nor the order of the legs"),
+    "half the lead": ("are half as large",),
+    "other pulleys": ("joint 2 (rho2) are 1.25 times", "joint 2 (theta2) are 1.25 times"),
+    "all pulleys": ("all joints are 1.25 times",),
+    "millimetres": ("in millimetres",),
+    "inches or degrees": ("in inches", "in degrees"),
+    "shifted rows": ("stands a row before its readings",),
+    "row 195 mm off": ("row 18 ",),
+    "beyond the reach": ("row 18 ",),
+    "slipped zero": ("The zero of joint 2 (rho2) slipped", "The zero of joint 2 (theta2) slipped"),
+    "unequal rods": ("parallel rods of leg 2", "nor rods of one pair that differ"),
+    "zero off": ("zero of joint 2 (",),
 }
-"""Words of which one names the cause."""
+"""Words of which one names the cause, in the first sentence or the first finding."""
 
 
 @dataclass
@@ -247,10 +308,10 @@ def starts(robot, poses):
 def workspace(robot, rng, count, level=None):
     """Return poses about the middle of the work space: of a printer those over its bed."""
     home = np.array(pteron.workspace.home_pose(robot))
-    if robot.name == "linear-delta":
-        low, high = np.array([-0.055, -0.055, 0.0]), np.array([0.055, 0.055, 0.08])
-    elif len(home) == 3:
-        low, high = np.add(home, [(-0.25, -0.25, -0.15), (0.25, 0.25, 0.05)])
+    if robot.name in BOXES:
+        low, high = map(np.array, BOXES[robot.name])
+        if robot.name not in PRINTERS:
+            low, high = home + low, home + high
     else:
         size = 0.1 * max(leg.limits[1] for leg in robot.legs)
         half = np.repeat([size, 0.15], 3)
@@ -264,8 +325,11 @@ def workspace(robot, rng, count, level=None):
 def trial(case, fault, seed=0, count=60):
     """Return a trial of a case with a fault; None where the machine cannot have it."""
     name, measure = CASES[case]
-    robot, rng = pteron.load(name), np.random.default_rng(seed)
+    robot = MACHINES[name]() if name in MACHINES else pteron.load(name)
+    rng = np.random.default_rng(seed)
     plant, zeros = built(robot, rng)
+    if fault == "shifted rows" and measure == "distances":
+        return None
     if fault == "unequal rods":
         if not plant.paired:
             return None
@@ -273,7 +337,7 @@ def trial(case, fault, seed=0, count=60):
         rods[1] += [1e-3, -1e-3]
         plant = replace(plant, rods=rods)
     heights = measure == "heights"
-    level = 0.0 if name == "linear-delta" else float(pteron.workspace.home_pose(robot)[2])
+    level = 0.0 if name in PRINTERS else float(pteron.workspace.home_pose(robot)[2])
     poses = workspace(robot, rng, count, level if heights else None)
     desired = workspace(robot, rng, 80, level if heights else None)
     readings = pteron.inverse_kinematics(robot, poses)  # as the controller of the drawn machine
@@ -283,14 +347,24 @@ def trial(case, fault, seed=0, count=60):
     measured = {}
     if heights:
         measured["heights"] = tool[:, 2] - level
+    elif measure == "distances":
+        measured["distances"] = np.linalg.norm(tool - tool[origins_of(count)], axis=1)
     else:
         measured["positions"] = tool
     if measure == "poses":
         measured["poses"] = angles_of(robot, poses, matrices, rng)
     readings, measured, zeros = spoil(fault, robot, readings, measured, zeros, count)
+    distances = measured.pop("distances", None)
     plane = {"": pteron.calibration.Plane(offset=level)} if heights else {}
     given = Measurements.of(robot, readings, setup=Setup(planes=plane), **measured)
+    if distances is not None:
+        given = replace(given, distances=distances, origins=origins_of(count))
     return Trial(given, robot, plant, zeros, desired)
+
+
+def origins_of(count):
+    """Return the rows (N,) from which distances are measured, none its own: each is used once."""
+    return np.roll(np.arange(count), 23)
 
 
 def angles_of(robot, poses, matrices, rng):
@@ -328,12 +402,20 @@ def spoil(fault, robot, readings, measured, zeros, count):
         readings[:, [0, 1]] = readings[:, [1, 0]]
     elif fault == "half the lead":
         readings[:, 1] *= 0.5
+    elif fault == "other pulleys":
+        readings[:, 1] *= 1.25
+    elif fault == "all pulleys":
+        readings *= 1.25
     elif fault == "millimetres":
-        for name in ("positions", "heights"):
+        for name in ("positions", "heights", "distances"):
             if name in measured:
                 measured[name] *= 1e3
         if linear:
             readings *= 1e3
+    elif fault == "inches or degrees":
+        readings = readings / 25.4e-3 if linear else np.degrees(readings)
+    elif fault == "shifted rows":
+        measured = {name: np.roll(values, -1, axis=0) for name, values in measured.items()}
     elif fault == "row 195 mm off":
         measured[key][17] -= 0.195
     elif fault == "beyond the reach":

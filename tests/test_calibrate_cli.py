@@ -107,3 +107,21 @@ def test_what_is_not_trustworthy_is_written_anyway_only_on_demand():
     ]
     text = done("calibrate mixed.csv --robot linear-delta --out found --anyway")
     assert "Written: found/robot.toml" in text
+
+
+def test_a_mistake_of_the_whole_log_is_the_first_sentence_and_undone_on_the_page():
+    log().rename({"rho1": "rho2", "rho2": "rho1"}).write_csv("swapped.csv")
+    text = done("calibrate swapped.csv --robot linear-delta --out found")
+    assert text.startswith("linear-delta: not trustworthy, ")
+    first = json.loads(Path("found/calibration.json").read_text("utf-8"))["verdict"]["reasons"][0]
+    assert first.startswith("The readings of legs 1 and 2 (rho1 and rho2) are swapped: exchange")
+    assert f"{first}\n" in text
+    assert "(--anyway writes it)" in text
+    assert not Path("found/robot.toml").exists()
+    text = done("calibrate swapped.csv --robot linear-delta --out found --anyway")
+    assert "belongs to the log with its mistake undone: mend the log" in text
+    found, sound = pteron.load("found/robot.toml"), Path("sound/robot.toml")
+    done("calibrate log.csv --robot linear-delta --out sound")
+    poses = log().select("x", "y", "z").to_numpy()
+    joints = [pteron.inverse_kinematics(robot, poses) for robot in (found, pteron.load(sound))]
+    np.testing.assert_allclose(*joints, rtol=0.0, atol=1e-8)

@@ -15,6 +15,7 @@ from test_report import HOSTILE, Reader, strict
 import pteron
 from pteron.calibration import Measurements, calibrate
 from pteron.errors import DataError, OutputError
+from pteron.manipulator.machine_record import machine_record
 from pteron.motion import joint_points
 from pteron.motion.enlarged_points import enlarged_points, greatest_difference
 from pteron.report.calibration import firmware_fit, value_rows, write_calibration
@@ -75,6 +76,9 @@ def test_the_file_holds_the_machine_as_found(tmp_path: Path):
     model = write_calibration(calibration(), tmp_path).model
     found = pteron.load(model)
     assert found == calibration().robot
+    data = strict(model.with_name("calibration.json").read_text("utf-8"))
+    assert data["calibrated_geometry"] == machine_record(found)["geometry"]
+    assert data["machine"] == machine_record(DRAWN)
     comments = [line for line in model.read_text("utf-8").splitlines() if line.startswith("#")]
     assert any("Verdict: " in line for line in comments)
     assert any("identify them again" in line for line in comments)

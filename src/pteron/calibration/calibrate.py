@@ -12,16 +12,23 @@ from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements, evenly
 from pteron.calibration.observability import observability_of
-from pteron.calibration.raw_faults import hidden_order, raw_fault
-from pteron.calibration.residual_faults import residual_faults, zero_faults
-from pteron.calibration.result import Calibration, HeldOut, calibrated, open_errors, values_of
+from pteron.calibration.raw_faults import describe_mistake, hidden_order, raw_mistake
+from pteron.calibration.residual_faults import hidden_tilt, residual_faults, zero_faults
+from pteron.calibration.result import (
+    Calibration,
+    Finding,
+    HeldOut,
+    calibrated,
+    open_errors,
+    values_of,
+)
 from pteron.calibration.set_aside import rows_set_aside
 from pteron.calibration.start import placed, starting_poses
 from pteron.calibration.thresholds import FEW_LEFT_OUT, ordinary_error
 from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
 from pteron.errors import DataError
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 Array = NDArray[np.float64]
 
@@ -30,6 +37,9 @@ _TRIED_ROWS = 5000
 
 _RANK_ROWS = 400
 """Rows, evenly spread, at which the singular values are taken."""
+
+_IN_TIME = ("slipped zero", "backlash", "drift")
+"""Faults that differ from row to row, so that none of the whole log explains them."""
 
 
 def calibrate(
@@ -74,11 +84,13 @@ def calibrate(
     Raises
     ------
     DataError
-        If most readings lead to no pose, a name is unknown, or a mistake in the whole log, such as
-        swapped or reversed readings, explains the measurements.
+        If most readings lead to no pose, or a name is unknown.
 
     Notes
     -----
+    A mistake in the whole log that explains the measurements, such as swapped or reversed readings,
+    is undone before the fit: the result is not trustworthy, and its first reason names the mistake.
+
     Residuals are weighted by their noise, given or found; readings' noise is carried to them. Rows
     beyond what noise explains count less (Huber), and, far beyond, not at all. Intervals are those
     of measurements and tolerances together. See docs/theory/calibration.
@@ -98,8 +110,34 @@ def calibrate(
     _check(robot.joint_count, measurements)
     blocks = blocks_of(robot, measurements, free, prior)
     start = Guess.drawn(robot, measurements)
-    if fault := raw_fault(measurements, blocks, start):
-        raise DataError(fault)
+    mistake = raw_mistake(measurements, blocks, start)
+    if mistake is None:
+        result = _calibrate(robot, measurements, blocks, held_out, seed)
+        explained = any(finding.kind in _IN_TIME for finding in result.findings)
+        if explained or not _far_off(result.fit, measurements):
+            return result
+        mistake = raw_mistake(measurements, blocks, start, fitted=True)
+        if mistake is None:
+            return result
+    finding = describe_mistake(mistake, measurements, start)
+    undone = mistake.undo(measurements)
+    other = None if held_out is None else mistake.undo(held_out)
+    try:
+        return _calibrate(robot, undone, blocks, other, seed, [finding])
+    except DataError as error:
+        raise DataError(finding.text) from error
+
+
+def _calibrate(
+    robot: Manipulator,
+    measurements: Measurements,
+    blocks: tuple[Block, ...],
+    held_out: Measurements | None,
+    seed: int,
+    mistakes: Sequence[Finding] = (),
+) -> Calibration:
+    """Return the calibration of a log without a mistake, or in which these are undone."""
+    start = Guess.drawn(robot, measurements)
     poses = starting_poses(start, measurements)
     start = placed(start, measurements, poses)
     checked = rows_for_check(measurements, blocks)
@@ -112,20 +150,21 @@ def calibrate(
     aside = rows_set_aside(start, measurements, blocks, poses)
     fitter = Fitter(measurements, blocks, start, poses, aside.aside, aside.barred)
     fit = fitter.run(partial)
-    if _far_off(fit, measurements) and (
-        fault := raw_fault(measurements, blocks, Guess.drawn(robot, measurements), fitted=True)
-    ):
-        raise DataError(fault)
     judged = None
     if partial is not None:
         other = held_out if held_out is not None else _fitting(measurements, fit, ~kept)
         judged = _held_out(start, partial, blocks, other)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
-    findings = (*zero_faults(fitter, fit), *residual_faults(fitter, fit, aside.reasons))
+    findings = (
+        *mistakes,
+        *zero_faults(fitter, fit),
+        *residual_faults(fitter, fit, aside.reasons),
+    )
     possible = open_errors(measurements, fit, blocks)
-    hidden = hidden_order(measurements, blocks, start, fit)
+    hidden = None if mistakes else hidden_order(measurements, blocks, start, fit)
+    tilt = hidden_tilt(fitter, fit)
     evidence = Evidence(
-        measurements, fit, blocks, shown, judged, findings, possible, hidden, checked
+        measurements, fit, blocks, shown, judged, findings, possible, hidden, tilt, checked
     )
     return Calibration(
         robot,
@@ -209,7 +248,9 @@ def _scaled_slopes(fitter: Fitter, fit: Fit) -> Array:
     slopes, start, given = fitter.slopes, fitter.begin, fitter.given
     chosen = evenly(len(given), _RANK_ROWS)
     poses = slopes.poses(start, start.joints(given.readings), fit.poses)
-    chosen = chosen[np.isfinite(poses[chosen]).all(axis=1)]
+    reached: NDArray[np.bool_] = np.asarray(np.isfinite(poses).all(axis=1))
+    reached &= (given.origins < 0) | reached[given.origins]
+    chosen = chosen[reached[chosen]]
     at = slopes.rows(start, given, poses, chosen)
     sizes = np.array([fit.noise[kind] for kind in given.kind_of])
     tolerances = tolerances_of(fitter.blocks)

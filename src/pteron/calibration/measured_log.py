@@ -176,7 +176,7 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
         return np.stack([column(name) for name in names], axis=-1) if names else np.empty((n, 0))
 
     def fault(row: np.integer[Any], text: str) -> None:
-        faults.append(f"{table.place(int(row))}{text}".removeprefix(f"{table.source}: "))
+        faults.append(f"{table.place_in_file(int(row))}{text}")
 
     readings = several(robot.joint_names)
     for i, j in np.argwhere(np.isnan(readings)):
@@ -214,7 +214,7 @@ def _numbers(table: Table, column: str, faults: list[str]) -> Array:
         return np.asarray(table.numbers([column], "nan")[:, 0])
     except DataError as error:
         if len(table) == 1:
-            faults.append(str(error).removeprefix(f"{table.source}: "))
+            faults.append(error.message)
             return np.zeros(1)
     half, first, line_of = len(table) // 2, table.first_row, table.line_of
     later = line_of and (lambda i: line_of(half + i))

@@ -6,7 +6,8 @@ squared residuals would fall if it were sought too (a score test).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,9 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
-from pteron.calibration.guess import Block, Guess, Unknown, numbered
+from pteron.calibration.guess import Block, Unknown, numbered
 from pteron.calibration.measurements import Measurements, evenly
+from pteron.calibration.mistakes import order_mistakes
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
 from pteron.calibration.thresholds import OFF_TOLERANCES, ORDINARY_ERROR
@@ -34,6 +36,12 @@ _CHANCE = 1e-6
 
 _HEAVIEST = 3.0
 """Most that a row may be off, in what a middle row is off: a few rows alone are no such fault."""
+
+_TRIED = 300
+"""Faults that are tried of a log of 60 rows, about: their logarithm counts."""
+
+_GREATEST_TILT = 0.1
+"""Tilt of a platform, rad, above which it is no fault of its joints: rods would come off."""
 
 _SHARE = 0.2
 """Least share of the squared residuals that a reported fault explains."""
@@ -124,152 +132,194 @@ def _size(fit: Fit, row: int) -> str:
     return f"off by {1e3 * abs(left[k]):.3g} {'mrad' if angle else 'mm'}"
 
 
-def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
-    """Return the fault, if any, that best explains what noise does not, and the rows (N,) so."""
-    start, blocks, given = fitter.begin, fitter.blocks, fitter.given
-    count = blocks[-1].where.stop
-    more = _extended(blocks, given, len(start.robot.legs))
-    fitter = Fitter(given, (*blocks, *more), start, fit.poses)
-    chosen = np.union1d(evenly(len(given), _ROWS), np.flatnonzero(~fit.kept)[:_ROWS])
-    at = fitter.slopes.rows(fit.guess, given, fit.poses, chosen)
-    r, slopes, _ = fitter.whitened(at, fit.guess, fit.noise)
-    off = np.sqrt(np.einsum("nk,nk->n", r, r) / np.maximum(at.measured.sum(axis=1), 1))
-    weights = np.minimum(1.0, _HEAVIEST * np.median(off) / np.maximum(off, 1e-12))
-    weights[~np.isfinite(slopes).all(axis=(1, 2))] = 0.0  # no pose
-    r = weights[:, None] * r
-    slopes = weights[:, None, None] * np.nan_to_num(slopes)
-    own = slopes[..., :count]
-    flat = own.reshape(-1, count)
-    covariance = np.linalg.inv(flat.T @ flat + np.diag(fitter.prior[:count]))
+class _ScoreTest:
+    """Rows in standard deviations, and how far one more unknown would lower their squares.
 
-    def remaining(moved: Array) -> Array:
+    Attributes
+    ----------
+    rows : array of int, shape (N,)
+        Those that are examined.
+    slopes : array, shape (N, K, p)
+        Against the unknowns of the fit and, behind them, those of `more`.
+    more : tuple of Block
+        Every joint's zero, each mark, and the instrument's frame, where it is not sought.
+    weights : array, shape (N,)
+        Less than 1 of rows that are far off.
+    left : array, shape (N, K)
+        Residuals after the fit.
+    variance : float
+        Of these, as a middle row shows it.
+    least : float
+        Rounding in them, as a variance.
+    """
+
+    def __init__(self, fitter: Fitter, fit: Fit) -> None:
+        start, blocks, given = fitter.begin, fitter.blocks, fitter.given
+        self.start, self.given, self.fit = start, given, fit
+        count = blocks[-1].where.stop
+        self.more = _extended(blocks, given, len(start.robot.legs))
+        self.frame = [block for block in blocks if block.kind == "frame"]
+        fitter = Fitter(given, (*blocks, *self.more), start, fit.poses)
+        self.rows = np.union1d(evenly(len(given), _ROWS), np.flatnonzero(~fit.kept)[:_ROWS])
+        at = fitter.slopes.rows(fit.guess, given, fit.poses, self.rows)
+        r, slopes, _ = fitter.whitened(at, fit.guess, fit.noise)
+        joints = fitter.whitened(at._replace(slopes=at.by_reading), fit.guess, fit.noise)[1]
+        off = np.sqrt(np.einsum("nk,nk->n", r, r) / np.maximum(at.measured.sum(axis=1), 1))
+        weights = np.minimum(1.0, _HEAVIEST * np.median(off) / np.maximum(off, 1e-12))
+        weights[~np.isfinite(slopes).all(axis=(1, 2))] = 0.0  # no pose
+        self.weights = weights
+        r = weights[:, None] * r
+        self.slopes = weights[:, None, None] * np.nan_to_num(slopes)
+        self._joints = weights[:, None, None] * np.nan_to_num(joints)
+        self._fitted = self.slopes[..., :count]
+        self._flat = self._fitted.reshape(-1, count)
+        square = self._flat.T @ self._flat
+        self._covariance = np.linalg.inv(square + np.diag(fitter.prior[:count]))
+        self.left = self.remaining(r)
+        # Noise that was found has the fault in it: a middle row's is nearer the truth.
+        numbers = at.measured.sum(axis=1)
+        self.squares = np.einsum("nk,nk->n", self.left, self.left) / np.maximum(numbers, 1)
+        self.least = min(FLOOR / fit.noise[kind] for kind in given.kinds) ** 2
+        taken = float(np.trace(self._covariance @ square)) / at.measured.sum()  # by the fit
+        self.free = float(at.measured.sum()) * (1.0 - taken)
+        self.variance = max(float(np.median(self.squares)) / (0.6 * (1.0 - taken)), self.least)
+
+    def remaining(self, moved: Array) -> Array:
         """Return what is left of residuals (N, K) where the fit's unknowns follow."""
-        return np.asarray(moved - own @ (covariance @ (flat.T @ moved.reshape(-1))))
+        change = self._covariance @ (self._flat.T @ moved.reshape(-1))
+        return np.asarray(moved - self._fitted @ change)
 
-    left = remaining(r)
-    # Noise that was found has the fault in it: a middle row's is nearer the truth.
-    squares = np.einsum("nk,nk->n", left, left) / np.maximum(at.measured.sum(axis=1), 1)
-    least = min(FLOOR / fit.noise[kind] for kind in given.kinds) ** 2
-    took = float(np.trace(covariance @ (flat.T @ flat))) / at.measured.sum()  # by the fit
-    variance = max(float(np.median(squares)) / (0.6 * (1.0 - took)), least)
-
-    def score(columns: Array) -> tuple[float, Array]:
+    def score(self, columns: Array) -> tuple[float, Array]:
         """Return how the squared residuals fall with columns (N, K, c), and their amounts."""
         wide = columns.reshape(-1, columns.shape[-1])
-        across = flat.T @ wide
-        square = wide.T @ wide - across.T @ covariance @ across
-        right = wide.T @ left.reshape(-1)
+        across = self._flat.T @ wide
+        square = wide.T @ wide - across.T @ self._covariance @ across
+        right = wide.T @ self.left.reshape(-1)
         size = np.sqrt(np.maximum(np.diag(wide.T @ wide), 1e-300))
         scaled = square / np.outer(size, size)
         inverse = np.linalg.pinv(scaled, rcond=1e-6, hermitian=True)
         amounts = -(inverse @ (right / size)) / size
-        return float(-right @ amounts) / variance, amounts
+        return float(-right @ amounts) / self.variance, amounts
 
+    def joint_columns(self, values: Array) -> Array:
+        """Return the columns (N, K, n) of steps of all rows' joint coordinates (M, n).
+
+        A distance between two rows follows the steps of both.
+        """
+        count = values.shape[1]
+        origins = self.given.origins[self.rows]
+        columns: Array = self._joints[..., :count] * values[self.rows][:, None]
+        between = origins >= 0
+        columns[between] += self._joints[between, :, count:] * values[origins[between]][:, None]
+        return columns
+
+    def chance(self, trial: Trial) -> float:
+        """Return the probability that a faultless log seems to have a fault as much."""
+        chance = float(scipy.stats.chi2.sf(trial.fall, trial.freedom))
+        if not set(self.given.kinds) <= set(self.given.setup.noise):
+            # The noise that was found has the fault in it: an F test leaves it out.
+            total = float(np.einsum("nk,nk->", self.left, self.left))
+            fall = trial.fall * self.variance
+            free = max(self.free - trial.freedom, 1.0)
+            ratio = (fall / trial.freedom) / max((total - fall) / free, self.least)
+            chance = min(chance, float(scipy.stats.f.sf(ratio, trial.freedom, free)))
+        return chance
+
+
+def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
+    """Return the fault, if any, that best explains what noise does not, and the rows (N,) so."""
+    test = _ScoreTest(fitter, fit)
     tried, best, gain = 0, None, -np.inf
-    frame = [block for block in blocks if block.kind == "frame"]
-    trials = (
-        *_trials(start, given, chosen, slopes, [*more, *frame], score),
-        *_scale_trials(start, given, chosen, slopes[..., more[0].where], score),
-        *_rod_trials(fit, given, chosen, slopes, more, score),
-    )
-    for trial in trials:
+    trials = (_trials, _scale_trials, _rod_trials, _tilt_trials, _order_trials)
+    for trial in chain.from_iterable(tries(test) for tries in trials):
         tried += 1
         more_than_chance = trial.fall - float(scipy.stats.chi2.isf(0.5, trial.freedom))
         if more_than_chance > gain:
             best, gain = trial, more_than_chance
-    explained = np.zeros(len(given), dtype=bool)
-    share = _SHARE * float(squares.sum()) / variance
-    if best is None or best.fall <= share:
+    explained = np.zeros(len(fitter.given), dtype=bool)
+    share = _SHARE * float(test.squares.sum()) / test.variance
+    if best is None or best.fall <= share or test.chance(best) >= _CHANCE / tried:
         return (), explained
-    chance = float(scipy.stats.chi2.sf(best.fall, best.freedom))
-    if not set(given.kinds) <= set(given.setup.noise):
-        # The noise that was found has the fault in it: an F test leaves it out.
-        total, fall = float(np.einsum("nk,nk->", left, left)), best.fall * variance
-        free = max(float(at.measured.sum()) * (1.0 - took) - best.freedom, 1.0)
-        ratio = (fall / best.freedom) / max((total - fall) / free, least)
-        chance = min(chance, float(scipy.stats.f.sf(ratio, best.freedom, free)))
-    if chance >= _CHANCE / tried:
-        return (), explained
-    after = np.linalg.norm(left + remaining(best.moved), axis=-1)
-    explained[chosen] = after < _EXPLAINED * np.linalg.norm(left, axis=-1)
-    # Rods that differ the geometry takes; what it does not take of them is left.
-    moved = remaining(best.moved) if best.kind == "unequal rods" else best.moved
-    limits = np.array([ORDINARY_ERROR[str(kind)] / fit.noise[str(kind)] for kind in given.kind_of])
-    effect = float((np.abs(moved) / limits)[fit.kept[chosen]].max(initial=0.0))
+    after = np.linalg.norm(test.left + test.remaining(best.moved), axis=-1)
+    explained[test.rows] = after < _EXPLAINED * np.linalg.norm(test.left, axis=-1)
+    # Rods that differ, and a tilt, the geometry takes; what it does not take of them is left.
+    follows = best.kind in ("unequal rods", "tilted platform")
+    moved = test.remaining(best.moved) if follows else best.moved
+    kinds = [str(kind) for kind in fitter.given.kind_of]
+    limits = np.array([ORDINARY_ERROR[kind] / fit.noise[kind] for kind in kinds])
+    effect = float((np.abs(moved) / limits)[fit.kept[test.rows]].max(initial=0.0))
     return (Finding(best.kind, best.text, gain, effect),), explained
 
 
-def _trials(
-    start: Guess,
-    given: Measurements,
-    chosen: NDArray[np.int64],
-    slopes: Array,
-    more: Sequence[Block],
-    score: Callable[[Array], tuple[float, Array]],
-) -> Iterator[Trial]:
-    """Try all faults at chosen rows, with slopes (N, K, p) against all unknowns."""
-    later, places = np.arange(len(chosen)), [given.places[i] for i in chosen]
-    zeros, *others = more
+def _trials(test: _ScoreTest) -> Iterator[Trial]:
+    """Try zeros that slipped, backlash, drift, and marks or instruments that moved."""
+    given, rows = test.given, test.rows
+    places = [given.places[i] for i in rows]
 
-    def since(columns: Array, most: int) -> Iterator[tuple[str, float, Array, Array]]:
-        for t in range(3, len(chosen) - 3, max(1, len(chosen) // most)):
-            part = columns * (later >= t)[:, None, None]
-            fall, amounts = score(part)
-            yield places[t], fall, amounts, part @ amounts
+    def beginnings(most: int) -> range:
+        return range(3, len(rows) - 3, max(1, len(rows) // most))
 
-    joints = slopes[..., zeros.where]
-    for i, (leg, name) in enumerate(zip(start.robot.legs, start.robot.joint_names, strict=True)):
-        column, unit = joints[..., i : i + 1], "mrad" if leg.joint.unit == "rad" else "mm"
-        for place, fall, amounts, moved in since(column, 200):
+    legs = test.start.robot.legs
+    steps = np.ones((len(given), len(legs)))
+    for t in beginnings(200):
+        later = np.arange(len(given)) >= rows[t]
+        columns = test.joint_columns(steps * later[:, None])
+        for i, (leg, name) in enumerate(zip(legs, test.start.robot.joint_names, strict=True)):
+            unit = "mrad" if leg.joint.unit == "rad" else "mm"
+            column = columns[..., i : i + 1]
+            fall, amounts = test.score(column)
             text = (
                 f"The zero of joint {i + 1} ({name}) slipped by {1e3 * amounts[0]:+.3g} {unit} "
-                f"before {place}: home it again, and measure anew from there."
+                f"before {places[t]}: home it again, and measure anew from there."
             )
-            yield Trial("slipped zero", text, 1, fall, moved)
-        read = given.readings[chosen, i]
-        column = column * np.sign(np.diff(read, prepend=read[0]))[:, None, None]
-        fall, amounts = score(column)
+            yield Trial("slipped zero", text, 1, fall, column @ amounts)
+    approach = np.sign(np.diff(given.readings, axis=0, prepend=given.readings[:1]))
+    columns = test.joint_columns(approach)
+    for i, (leg, name) in enumerate(zip(legs, test.start.robot.joint_names, strict=True)):
+        unit = "mrad" if leg.joint.unit == "rad" else "mm"
+        column = columns[..., i : i + 1]
+        fall, amounts = test.score(column)
         text = (
             f"Joint {i + 1} ({name}) stops {2e3 * abs(amounts[0]):.3g} {unit} apart by its "
             "direction of approach: approach poses from one side, or take up its play."
         )
         yield Trial("backlash", text, 1, fall, column @ amounts)
-    times = given.times[chosen] if given.times is not None else chosen.astype(float)
+    times = given.times if given.times is not None else np.arange(float(len(given)))
     if span := np.ptp(times):
-        columns = joints * ((times - times.mean()) / span)[:, None, None]
-        fall, amounts = score(columns)
+        columns = test.joint_columns(steps * ((times - times.mean()) / span)[:, None])
+        fall, amounts = test.score(columns)
         text = (
             "The readings drift from the first row to the last, by up to "
             f"{1e3 * np.abs(amounts).max():.3g} mm or mrad, as a machine's do that grows warm: let "
             "it warm up, and measure quickly."
         )
         yield Trial("drift", text, len(amounts), fall, columns @ amounts)
-    for block in others:
+    for block in (*test.more[1:], *test.frame):
         what, alike = "instrument", ""
         if block.kind == "mark":
             what = f"mark {block.name or 'tool'}"
-            alike = "" if start.robot.platform.angular.any() else ", or the instrument"
-        for place, fall, amounts, moved in since(slopes[..., block.where], 60):
+            alike = "" if test.start.robot.platform.angular.any() else ", or the instrument"
+        for t in beginnings(60):
+            part = test.slopes[..., block.where] * (np.arange(len(rows)) >= t)[:, None, None]
+            fall, amounts = test.score(part)
             text = (
-                f"The {what} moved by {1e3 * np.linalg.norm(amounts[:3]):.3g} mm before {place}"
-                f"{alike}: fix it, and measure anew from there."
+                f"The {what} moved by {1e3 * np.linalg.norm(amounts[:3]):.3g} mm before "
+                f"{places[t]}{alike}: fix it, and measure anew from there."
             )
-            yield Trial(f"moved {block.kind}", text, len(amounts), fall, moved)
+            yield Trial(f"moved {block.kind}", text, len(amounts), fall, part @ amounts)
 
 
-def _scale_trials(
-    start: Guess, given: Measurements, chosen: Numbers, joints: Array, score: Score
-) -> Iterator[Trial]:
-    """Try a scale of each joint, and one of all; slopes (N, K, n) are against the joints' zeros."""
-    scales = joints * given.readings[chosen][:, None]
-    for i, name in enumerate(start.robot.joint_names):
-        fall, amounts = score(column := scales[..., i : i + 1])
+def _scale_trials(test: _ScoreTest) -> Iterator[Trial]:
+    """Try a scale of each joint, and one of all."""
+    scales = test.joint_columns(test.given.readings)
+    for i, name in enumerate(test.start.robot.joint_names):
+        fall, amounts = test.score(column := scales[..., i : i + 1])
         text = (
             f"Joint {i + 1} ({name}) moves {1e2 * amounts[0]:+.3g} % farther than it reads, beyond "
             "what its tolerance allows: check its lead, gear ratio or steps."
         )
         yield Trial("scale", text, 1, fall, column @ amounts)
-    fall, amounts = score(column := scales.sum(axis=-1, keepdims=True))
+    fall, amounts = test.score(column := scales.sum(axis=-1, keepdims=True))
     text = (
         f"All joints move {1e2 * amounts[0]:+.3g} % farther than they read, beyond what tolerances "
         "allow: check leads, gear ratios or steps, or the unit of what is measured."
@@ -277,58 +327,120 @@ def _scale_trials(
     yield Trial("scale", text, 1, fall, column @ amounts)
 
 
-def _rod_trials(
-    fit: Fit,
-    given: Measurements,
-    chosen: Numbers,
-    slopes: Array,
-    more: Sequence[Block],
-    score: Score,
-) -> Iterator[Trial]:
-    """Try parallel rods of one leg that differ in length, and so tilt a platform that does not.
+def _order_trials(test: _ScoreTest) -> Iterator[Trial]:
+    """Try measurements that stand beside their readings, and heights of the other sign."""
+    given, noise = test.given, test.fit.noise
+    sizes = np.array([noise[str(kind)] for kind in given.kind_of])
+    logged = np.hstack([*given.parts.values()])
+    for mistake in order_mistakes(given, test.start):
+        change = logged - np.hstack([*mistake.undo(given).parts.values()])
+        moved = test.weights[:, None] * np.nan_to_num(change / sizes)[test.rows]
+        after = test.left + test.remaining(moved)
+        fall = float((test.left**2).sum() - (after**2).sum()) / test.variance
+        yield Trial("order", f"{mistake.text[0].upper()}{mistake.text[1:]}.", 1, fall, moved)
+
+
+def hidden_tilt(fitter: Fitter, fit: Fit) -> float | None:
+    """Return the greatest tilt by unequal rods of a pair that does not show, rad; None: no pairs.
+
+    Two machines, one of which has such rods and the geometry that hides them best, give the same
+    measurements to within the noise.
+    """
+    test = _ScoreTest(fitter, fit)
+    columns = _rod_columns(test)
+    if not columns:
+        return None
+    least = float(scipy.stats.chi2.isf(_CHANCE / _TRIED, 1))
+    tilts = []
+    for column, turns in columns:
+        fall = float((test.remaining(column[..., 0]) ** 2).sum()) / test.variance
+        tilts.append(float(np.sqrt(least / max(fall, 1e-300))) * turns)
+    return max(tilts)
+
+
+def _rod_trials(test: _ScoreTest) -> Iterator[Trial]:
+    """Try parallel rods of one leg that differ in length, and so tilt the platform."""
+    robot = test.fit.guess.robot
+    for i, (column, _) in enumerate(_rod_columns(test)):
+        leg = robot.legs[i]
+        fall, amounts = test.score(column)
+        share = abs(amounts[0]) / leg.size
+        difference = f"{1e2 * share:.2g} % of their distance"
+        if leg.bar_length is not None:
+            difference = f"{1e3 * share * leg.bar_length:.2g} mm"
+        text = (
+            f"The parallel rods of leg {i + 1} ({robot.joint_names[i]}) differ in length, by about "
+            f"{difference}, and tilt the platform: measure both, and fit a pair of equal ones."
+        )
+        yield Trial("unequal rods", text, 1, fall, column @ amounts)
+
+
+def _rod_columns(test: _ScoreTest) -> list[tuple[Array, float]]:
+    """Return the columns (N, K, 1) of rods that differ and their tilts, rad, a leg each.
+
+    None where no rods can differ.
 
     With the rod u from a bar b of length w, ends of the rods that differ by d turn the platform by
-    theta so that theta . (b x u) = |u| d / w, for each leg.
+    theta so that theta . (b x u) = |u| d / w, for each leg. A column is for d / w = 1 / |u|.
     """
-    robot = fit.guess.robot
+    fit, robot = test.fit, test.fit.guess.robot
     if robot.platform.angular.any():
-        return
-    poses = fit.poses[chosen]
-    couples: Array = evaluate_kernel(robot, "beams", "nan", poses)[-1]
+        return []
+    couples: Array = evaluate_kernel(robot, "beams", "nan", fit.poses)[-1]
     if couples.shape[1] != 3 or not np.isfinite(couples).all(axis=(1, 2)).any():
-        return
-    good = np.isfinite(couples).all(axis=(1, 2)) & (given.origins[chosen] < 0)
+        return []
+    good: NDArray[np.bool_] = np.asarray(np.isfinite(couples).all(axis=(1, 2)))
     size = np.linalg.norm(couples, axis=-1).max(axis=-1)
     flat = np.abs(np.linalg.det(np.where(good[:, None, None], couples, np.eye(3))))
     good &= flat > _FLAT * size**3
     turns = np.linalg.inv(np.where(good[:, None, None], couples, np.eye(3)))  # a column a leg
-    arms = np.array([leg.platform_point for leg in robot.legs]) @ np.array(robot.platform.frame)
-    arms += np.array([leg.fixed_offset for leg in robot.legs])
-    against = MachineSlopes(robot, ()).jacobian(fit.guess, poses) @ robot.platform.directions
-    marks = fit.guess.marked([given.marks[i] for i in chosen]) @ np.array(robot.platform.frame)
-    for i, (leg, name) in enumerate(zip(robot.legs, robot.joint_names, strict=True)):
+    columns = []
+    for i in range(len(robot.legs)):
         turn = np.where(good[:, None], turns[:, :, i], 0.0)
-        shifts = np.cross(turn[:, None], arms)
-        column = -np.einsum(
-            "nkj,nj->nk", slopes[..., more[0].where], np.einsum("njx,njx->nj", against, shifts)
-        )
-        for block in more:
-            if block.kind == "mark":
-                mine = np.array([given.marks[k] == block.name for k in chosen])
-                # A mark's slopes are along the platform's frame.
-                moved = np.cross(turn, marks) @ np.array(robot.platform.frame).T
-                column += mine[:, None] * np.einsum("nkx,nx->nk", slopes[..., block.where], moved)
-        fall, amounts = score(column[..., None])
-        share = abs(amounts[0]) / leg.size
-        bar = leg.bar_length
-        difference = f"{1e2 * share:.2g} % of their distance"
-        if bar is not None:
-            difference = f"{1e3 * share * bar:.2g} mm"
-        text = (
-            f"The parallel rods of leg {i + 1} ({name}) differ in length, by about {difference}, "
-            "and tilt the platform: measure both, and fit a pair of equal ones."
-        )
-        yield Trial("unequal rods", text, 1, fall, column[..., None] @ amounts)
+        tilt = float(np.median(np.linalg.norm(turn[test.rows], axis=1)))
+        columns.append((_turned_column(test, turn)[..., None], tilt))
+    return columns
+
+
+def _tilt_trials(test: _ScoreTest) -> Iterator[Trial]:
+    """Try a platform that is held by pairs of rods and stands tilted against the drawing."""
+    if not _rod_columns(test):
+        return
+    turns = [np.broadcast_to(axis, (len(test.given), 3)) for axis in np.eye(3)]
+    columns = np.stack([_turned_column(test, turn) for turn in turns], axis=-1)
+    fall, amounts = test.score(columns)
+    if np.abs(amounts).max() > _GREATEST_TILT:
+        return
+    angles = ", ".join(
+        f"{1e3 * angle:+.3g} mrad about {axis}" for angle, axis in zip(amounts, "xyz", strict=True)
+    )
+    text = (
+        f"The platform stands tilted against the drawing ({angles}), as with a bent joint or rods "
+        "of all pairs that differ: level it, and measure anew."
+    )
+    yield Trial("tilted platform", text, 3, fall, columns @ amounts)
+
+
+def _turned_column(test: _ScoreTest, turn: Array) -> Array:
+    """Return the column (N, K) of a platform that stands turned by vectors (M, 3) in all rows."""
+    given, guess, poses = test.given, test.fit.guess, test.fit.poses
+    robot = guess.robot
+    frame = np.array(robot.platform.frame)
+    arms = np.array([leg.platform_point for leg in robot.legs]) @ frame
+    arms += np.array([leg.fixed_offset for leg in robot.legs])
+    against = MachineSlopes(robot, ()).jacobian(guess, poses) @ robot.platform.directions
+    shifts = np.cross(turn[:, None], arms)
+    steps = np.nan_to_num(np.einsum("njx,njx->nj", against, shifts))
+    column: Array = -test.joint_columns(steps).sum(axis=-1)
+    # A mark's slopes are along the platform's frame.
+    moved = (np.cross(turn, guess.marked(given.marks) @ frame) @ frame.T)[test.rows]
+    alone = given.origins[test.rows] < 0
+    for block in test.more:
+        if block.kind == "mark":
+            mine = alone & np.array([given.marks[k] == block.name for k in test.rows])
+            slopes = test.slopes[..., block.where]
+            column += mine[:, None] * np.einsum("nkx,nx->nk", slopes, moved)
+    return column
 
 
 def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:

@@ -21,6 +21,7 @@ from pteron.calibration.measurements import (
 )
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
+from pteron.calibration.thresholds import OFF_TOLERANCES
 from pteron.json_values import picked
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
@@ -104,17 +105,17 @@ class Finding:
 
 @dataclass(frozen=True)
 class HiddenOrder:
-    """Two legs whose readings could be swapped and nothing would show.
+    """Legs whose readings could stand in another order and nothing would show.
 
     Attributes
     ----------
     legs : tuple of int
         Their numbers, from 1.
     error : float
-        Greatest further error of the tool on the calibrated machine if they are swapped, m.
+        Greatest further error of the tool on the calibrated machine in such an order, m.
     """
 
-    legs: tuple[int, int]
+    legs: tuple[int, ...]
     error: float
 
 
@@ -225,6 +226,7 @@ class Calibration:
         return {
             "name": self.drawn.name,
             "machine": machine_record(self.drawn),
+            "calibrated_geometry": machine_record(self.robot)["geometry"],
             "values": values,
             **picked(self.fit.guess, "zeros scales"),
             "noise": self.noise,
@@ -242,6 +244,7 @@ def open_errors(given: Measurements, fit: Fit, blocks: Sequence[Block]) -> dict[
     slopes = MachineSlopes(robot, blocks)
     rows = evenly(len(given), _OPEN_ROWS)
     tools = Measurements.of(robot, given.readings[rows])
+    covariance = _contradicted_covariance(fit, blocks)
     poses, moved = slopes.pose_slopes(fit.guess, tools, fit.poses[rows])
     along = position_axes(robot)[length_columns(robot)] @ moved
     of_each = np.concatenate([along, poses[:, along.shape[1] :]], axis=1)
@@ -250,9 +253,30 @@ def open_errors(given: Measurements, fit: Fit, blocks: Sequence[Block]) -> dict[
     names = [*lengths, *(name for name in robot.coordinates if name not in lengths)]
     possible = {}
     for k, name in enumerate(names if len(of_each) else ()):
-        most = variances(of_each[:, k : k + 1], fit.covariance).max()
+        most = variances(of_each[:, k : k + 1], covariance).max()
         possible[name] = _QUANTILE * float(np.sqrt(max(most, 0.0)))
     return possible
+
+
+def _contradicted_covariance(fit: Fit, blocks: Sequence[Block]) -> Array:
+    """Return the covariance (p, p) with tolerances as wide as the values that were found.
+
+    Where a value is far beyond its group's tolerance, measurements contradict that tolerance: its
+    group's is widened by the ratio of both (Birge), so that it does not vouch for what they do not
+    show.
+    """
+    tolerances = tolerances_of(blocks)
+    groups = np.array([unknown.group for block in blocks for unknown in block.unknowns])
+    prior = fit.prior.copy()
+    with np.errstate(invalid="ignore"):  # of a value without a tolerance
+        shares = np.abs(fit.total) / tolerances
+    shown = np.maximum(1.0 - np.diag(fit.covariance) * fit.prior, 0.0)
+    for group in set(groups.tolist()) - {"setup"}:
+        chosen = (groups == group) & np.isfinite(tolerances)
+        if shares[chosen].max(initial=0.0) > OFF_TOLERANCES:
+            ratio = float((shares[chosen] ** 2).sum()) / max(float(shown[chosen].sum()), 1.0)
+            prior[chosen] /= max(ratio, 1.0)
+    return fit.covariance if (prior == fit.prior).all() else replace(fit, prior=prior).covariance
 
 
 def values_of(start: Guess, fit: Fit, blocks: Sequence[Block]) -> tuple[Value, ...]:

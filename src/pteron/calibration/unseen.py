@@ -81,11 +81,12 @@ def told(vector: Array, names: Sequence[str]) -> str:
     parts = vector / vector[np.abs(vector).argmax()]
     order = np.argsort(-np.abs(parts), kind="stable")
     named = [k for k in order if abs(parts[k]) >= _PART]
-    signs = ["-" if parts[k] < 0.0 else "+" for k in named[:_NAMED]]
-    sizes = ["" if abs(parts[k]) > _WHOLE else f"{abs(parts[k]):.2g} " for k in named[:_NAMED]]
-    text = " ".join(
-        f"{sign} {size}{names[k]}" for sign, size, k in zip(signs, sizes, named, strict=False)
-    ).removeprefix("+ ")
+    text = ""
+    for k in named[:_NAMED]:
+        # The greatest part is 1, and comes first without a sign.
+        sign = "" if not text else " - " if parts[k] < 0.0 else " + "
+        size = "" if abs(parts[k]) > _WHOLE else f"{abs(parts[k]):.2g} "
+        text += f"{sign}{size}{names[k]}"
     more = len(named) - _NAMED
     return text + (f" and {more} more" if more > 0 else "")
 

@@ -31,6 +31,9 @@ _UNEXPLAINED = (
 )
 
 
+_GREAT_TILT = 0.1
+"""Tilt, rad, from which its size says no more than that nothing shows it."""
+
 _ROD_ADVICE = (
     "Measure both rods of each pair: rods that differ tilt the platform, and where positions are "
     "not measured a fit takes that for geometry."
@@ -49,6 +52,8 @@ class Evidence(NamedTuple):
     open_errors: Mapping[str, float]
     """Possible error of each coordinate (95 %), m and rad."""
     hidden_order: HiddenOrder | None
+    hidden_tilt: float | None
+    """Greatest tilt by unequal rods of a pair that does not show, rad; None where none can be."""
     rows_for_check: int
     """Rows from which on some are held out."""
 
@@ -75,7 +80,13 @@ def verdict_of(evidence: Evidence) -> Verdict:
     ]
     bad = any(reason.grade == "not trustworthy" for reason in (*errors, *findings))
     first = findings or ([_Reason(_UNEXPLAINED)] if bad else [])
-    reasons = [*_open_errors(evidence), *findings, *errors, *_far_values(evidence)]
+    reasons = [
+        *_open_errors(evidence),
+        *findings,
+        *errors,
+        *_far_values(evidence),
+        *_hidden_rods(evidence),
+    ]
     if bad:
         said = [*first, *_open_errors(evidence)]  # that errors remain needs no other words
         reasons = [*first, *(reason for reason in reasons if reason not in said)]
@@ -177,14 +188,39 @@ def _open_errors(evidence: Evidence) -> Iterator[_Reason]:
             hidden = evidence.hidden_order
             if hidden and kind == "position":
                 order = (
-                    f", nor the order of the legs {hidden.legs[0]} and {hidden.legs[1]}: if they "
-                    f"are swapped, by {_sized(hidden.error, 'position')} more"
+                    f", nor the order of the legs {_listed([*map(str, hidden.legs)])}: if it is "
+                    f"another, {_listed(far)} may be off by {_sized(hidden.error, 'position')} more"
                 )
+            rods = ""
+            if kind == "position" and "position" not in kinds and _rods_hidden(evidence):
+                rods = f", nor rods of one pair that differ and {_tilted(evidence)}"
             yield _Reason(
                 f"{_listed(far)} may be off by {_sized(most, kind)} (95 %): "
-                f"{measured}{where} do not show {them}{order}.",
+                f"{measured}{where} do not show {them}{rods}{order}.",
                 f"Measure {_listed(far)} too: positions, or distances across the work space.",
             )
+
+
+def _rods_hidden(evidence: Evidence) -> bool:
+    """Return whether rods of a pair may tilt the platform by more than ordinary tolerances."""
+    tilt = evidence.hidden_tilt
+    return tilt is not None and tilt > thresholds.ORDINARY_ERROR["angle"]
+
+
+def _tilted(evidence: Evidence) -> str:
+    tilt = evidence.hidden_tilt or 0.0
+    size = f" by up to {_sized(tilt, 'angle')}" if tilt < _GREAT_TILT else ""
+    return f"tilt the platform{size}"
+
+
+def _hidden_rods(evidence: Evidence) -> Iterator[_Reason]:
+    """Yield the tilt by unequal rods that positions do not show."""
+    if "position" in evidence.measurements.kinds and _rods_hidden(evidence):
+        yield _Reason(
+            f"Rods of one pair that differ and {_tilted(evidence)} would not show in these "
+            "positions.",
+            "Measure both rods of each pair, or positions of a mark away from the tool.",
+        )
 
 
 def _far_values(evidence: Evidence) -> Iterator[_Reason]:

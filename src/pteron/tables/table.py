@@ -54,7 +54,11 @@ class Table:
 
     def place(self, index: int) -> str:
         """Return the place of a row: its number from 1 and, in a CSV file, its line."""
-        row = f"{self.source}: row {self.first_row + index + 1}"
+        return f"{self.source}: {self.place_in_file(index)}"
+
+    def place_in_file(self, index: int) -> str:
+        """Return the place of a row, without the file's name."""
+        row = f"row {self.first_row + index + 1}"
         return row if self.line_of is None else f"{row} (line {self.line_of(index)})"
 
     def numbers(self, columns: Sequence[str], on_failure: OnFailure | None = None) -> NDArray[Any]:
@@ -93,7 +97,8 @@ class Table:
                 row, j = (int(i) for i in np.argwhere(bad)[0])
                 is_text = bool(text[row, j])
                 choice = on_failure is not None and not is_text
-                raise DataError(self._fault(row, columns[j], is_text=is_text, choice=choice))
+                fault = self._fault(row, columns[j], is_text=is_text, choice=choice)
+                raise DataError(fault, subject=self.source)
             values[missing] = np.nan
         return values
 
@@ -174,7 +179,7 @@ class Table:
             comma = " with a decimal comma" if is_text and self.decimal == "," else ""
             given = f"{shown(str(cell).strip())} given, {expected}{comma} expected"
         leave = ", or leave such rows empty with --on-failure nan" if choice else ""
-        return f"{self.place(row)}, column {name}: {given}; correct the cell{leave}"
+        return f"{self.place_in_file(row)}, column {name}: {given}; correct the cell{leave}"
 
 
 def listed(names: Sequence[str]) -> str:

@@ -72,6 +72,11 @@ def notes(result: Calibration) -> tuple[str, ...]:
     """Return what a user of the found machine must know: its zeros, and its bodies' parameters."""
     reading_legs = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
     sentences = []
+    if any(finding.kind == "mistake" for finding in result.findings):
+        sentences.append(
+            "The machine as found belongs to the log with its mistake undone: mend the log, or the "
+            "controller that wrote it, before readings lead to poses."
+        )
     if any(value.group in ("zeros", "scales") for value in result.values):
         sentences.append(
             f"Zeros and scales of joints {', '.join(reading_legs)} are the legs' reading in "
