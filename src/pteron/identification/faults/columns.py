@@ -26,6 +26,9 @@ from pteron.manipulator import Manipulator
 _STRIBECK = (0.05, 0.15, 0.4)
 """Speeds at which friction may fall, over each joint's root mean square: all are tried."""
 
+_EIGHTHS = tuple(f"the {k} eighth" for k in "1st 2nd 3rd 4th 5th 6th 7th 8th".split())
+"""Parts of a log in which the platform may carry another mass."""
+
 _DRY = ("coulomb", "stribeck")
 """Kinds of terms that jump where a joint turns round."""
 
@@ -105,6 +108,16 @@ def _drift(m: FittedMotion) -> Array:
     return np.concatenate([diagonal(later * d) for d in (m.direction, m.direction**0)], axis=-1)
 
 
+def _payload(m: FittedMotion) -> Array:
+    """Return the forces (R, n, k) of 1 kg at the platform's point in each eighth of the log."""
+    s, kinds = m.states, m.model.robot.platform.inertia.kinds
+    regressor = unchecked(m.model.robot, "regressor", s.pose, s.velocity, s.acceleration)
+    of_mass = regressor[..., regressor.shape[-1] - len(kinds) + kinds.index("m")]
+    count = len(_EIGHTHS)
+    eighth = np.clip(((m.along + 0.5) * count).astype(int), 0, count - 1)
+    return np.asarray(of_mass[..., None] * np.eye(count)[eighth][:, None, :])
+
+
 def _weight(m: FittedMotion) -> Array:
     rest = {
         name: np.zeros_like(getattr(m.states, name))
@@ -154,6 +167,7 @@ _OTHERS = (
         for share in _STRIBECK
     ),
     Family("elasticity", "m/N", _forces, _elasticity, positive=True),
+    Family("payload", "kg", lambda m: list(_EIGHTHS), _payload),
     Family("drift", "N", lambda m: [*_forces(m), *_forces(m)], _drift),
     Family("load", "", _forces, lambda m: diagonal(m.direction * np.abs(_load(m))), positive=True),
     Family("passive", "N m s", _passive_legs, _passive, positive=True),
