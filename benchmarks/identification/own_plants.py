@@ -573,7 +573,9 @@ def guide_off(case: Case) -> None:
     leg = case.drawn.legs[case.actuator]
     size = {"hexapod": 0.025, "linear-delta": 0.008, "ball-table": 0.006, "five-bar": 0.004}
     way = case.rng.normal(size=3) * (1.0, 1.0, 0.0)
-    point = np.array(leg.guide_point) + case.size * size[case.plant.name] * way / np.linalg.norm(way)
+    point = np.array(leg.guide_point) + case.size * size[case.plant.name] * way / np.linalg.norm(
+        way
+    )
     _with_leg(case, guide_point=tuple(point))
 
 
@@ -583,20 +585,26 @@ def length_off(case: Case) -> None:
     if hasattr(leg, "lower_length"):
         _with_leg(case, lower_length=(1.0 + 0.03 * case.size) * leg.lower_length)
     else:
-        _with_leg(case, platform_point=tuple((1.0 + 0.03 * case.size) * np.array(leg.platform_point)))
+        _with_leg(
+            case, platform_point=tuple((1.0 + 0.03 * case.size) * np.array(leg.platform_point))
+        )
 
 
 def passive(case: Case) -> None:
     """Let the joints between crank, rod and platform have viscous friction."""
     bare = forces_like(case)
     with_one = forces_like(case, passive=1.0)
-    share = 0.1 * case.size * case.motion.load.std(axis=0).mean() / (with_one - bare).std(axis=0).mean()
+    share = (
+        0.1 * case.size * case.motion.load.std(axis=0).mean() / (with_one - bare).std(axis=0).mean()
+    )
     case.forces = case.forces + share * (with_one - bare)
 
 
 def load_friction(case: Case) -> None:
     """Let friction grow with the load: 8 % of it."""
-    case.forces = case.forces + 0.08 * case.size * np.abs(case.motion.load) * np.sign(case.motion.rates)
+    case.forces = case.forces + 0.08 * case.size * np.abs(case.motion.load) * np.sign(
+        case.motion.rates
+    )
 
 
 def flexible(case: Case) -> None:

@@ -61,6 +61,21 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "grow with it, and what it shares with other forces is small beside the noise.",
         "Check each drive's gain by itself, or move more coordinates at once, and faster.",
     ),
+    "ratio": (
+        "These logs cannot show a gear ratio, lead or pulley of the joints that is off by some per "
+        "cent: other values take in what it does, and another motion is off by it.",
+        "Measure how far the joints move for a known number of turns or counts.",
+    ),
+    "zero": (
+        "These logs cannot show a joint's zero that is off by some degrees or mm: other values "
+        "take in what it does, and another motion is off by it.",
+        "Check the joints' zeros, or record a motion that covers more of the workspace.",
+    ),
+    "geometry": (
+        "These logs cannot show that lengths or points of the geometry are off by a hundredth: "
+        "other values take in what that does, and another motion is off by it.",
+        "Measure the geometry, or record a motion that covers more of the workspace.",
+    ),
     "play": (
         "Play in the drives would not be seen: the load of none changes its direction often "
         "enough, four times while the joint moves. While loads stay on one side it does no harm.",

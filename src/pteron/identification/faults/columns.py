@@ -26,8 +26,18 @@ from pteron.manipulator import Manipulator
 _STRIBECK = (0.05, 0.15, 0.4)
 """Speeds at which friction may fall, over each joint's root mean square: all are tried."""
 
-_EIGHTHS = tuple(f"the {k} eighth" for k in "1st 2nd 3rd 4th 5th 6th 7th 8th".split())
+_EIGHTHS = tuple(f"the {k} eighth" for k in ("1st", "2nd", "3rd", *(f"{n}th" for n in range(4, 9))))
 """Parts of a log in which the platform may carry another mass."""
+
+_LENGTH = 0.01
+"""Usual error of a length, over the legs' size: a larger one is more likely another fault."""
+
+_ZERO_OF_SLIDE, _ZERO_OF_CRANK = 0.02, 0.05
+"""Usual errors of a zero: a share of the leg's size, and rad (3 degrees, a tooth of a belt's
+pulley)."""
+
+_RATIO = 0.05
+"""Usual error of a ratio, as by a pulley with a tooth more."""
 
 _DRY = ("coulomb", "stribeck")
 """Kinds of terms that jump where a joint turns round."""
@@ -58,6 +68,8 @@ class Family:
         Speed with which friction falls, over the usual one.
     exact : bool
         Whether its columns have sizes as large as they may be, not to first order.
+    usual_error : float
+        Standard deviation of sizes that such a fault usually has; 0 where it is not known.
     effect : callable, optional
         Returns how the machine's forces change, where that is otherwise than those of the log: by a
         clock that is off all inertia is, and with it the mass that weighs.
@@ -72,6 +84,7 @@ class Family:
     largest: float = np.inf
     speed: float | None = None
     exact: bool = False
+    usual_error: float = 0.0
     effect: Callable[[FittedMotion], Array] | None = None
 
     def of_cycle(self, motion: FittedMotion) -> Array:
@@ -195,8 +208,8 @@ def families_of(model: Model) -> tuple[Family, ...]:
         own = identification_model(model.robot, with_rotors, base=model.base).kept_terms
         rotors = [_ROTORS] * any(term.kind == "rotor" for term in own)
     drives = (_scale(i) for i in range(count))
-    joints = (one for i in range(count) for one in (_ratio((i,)), _zero(i)))
-    legs = (_leg_geometry(i) for i in range(len(model.robot.legs)))
+    joints = (one for i in range(count) for one in (_ratio((i,)), _zero(model.robot, i)))
+    legs = (_leg_geometry(model.robot, i) for i in range(len(model.robot.legs)))
     return (DELAY, *drives, _ratio(range(count)), *joints, *legs, *_OTHERS, *rotors)
 
 
@@ -212,21 +225,28 @@ def _ratio(joints: Sequence[int]) -> Family:
         names = [model.robot.joint_names[i] for i in some]
         return names if len(names) == 1 else ["all joints"]
 
-    return Family("ratio", "", sizes, columns, of_machine=False, largest=1.0)
+    return Family("ratio", "", sizes, columns, of_machine=False, largest=1.0, usual_error=_RATIO)
 
 
-def _zero(i: int) -> Family:
-    one = slice(i, i + 1)
+def usual_length_error(robot: Manipulator) -> float:
+    """Return the usual error of a machine's lengths, m."""
+    return _LENGTH * float(np.mean([leg.size for leg in robot.legs]))
+
+
+def _zero(robot: Manipulator, i: int) -> Family:
+    one, leg = slice(i, i + 1), robot.legs[i]
+    usual_error = _ZERO_OF_SLIDE * leg.size if leg.joint.unit == "m" else _ZERO_OF_CRANK
     return Family(
         "zero",
         "",
         lambda model: model.robot.joint_names[one],
         lambda m: m.by_zeros[..., one],
         of_machine=False,
+        usual_error=usual_error,
     )
 
 
-def _leg_geometry(i: int) -> Family:
+def _leg_geometry(robot: Manipulator, i: int) -> Family:
     def some(robot: Manipulator) -> list[int]:
         return [k for k, (leg, _) in enumerate(lengths_of(robot)) if leg == i]
 
@@ -235,6 +255,7 @@ def _leg_geometry(i: int) -> Family:
         "m",
         lambda m: [f"leg {i + 1}" for _ in some(m.robot)],
         lambda m: m.by_lengths[..., some(m.model.robot)],
+        usual_error=usual_length_error(robot),
     )
 
 

@@ -75,6 +75,25 @@ class ReferenceCycle:
             return cls(States.of(motion.time, gone), rates > _MOVES * rates.max(axis=0))
         return None
 
+    @classmethod
+    def shuffled(cls, robot: Manipulator, states: list[States]) -> ReferenceCycle:
+        """Return states of another motion with the range, speeds and accelerations of a log's.
+
+        Each coordinate is that of another sample, and so is its rate.
+        """
+        rng = np.random.default_rng(0)
+        motion = []
+        for name in ("pose", "velocity", "acceleration"):
+            log = np.concatenate([getattr(s, name) for s in states])
+            rows = rng.integers(len(log), size=(_SAMPLES, log.shape[1]))
+            motion.append(np.take_along_axis(log, rows, axis=0))
+        whole = FullMotion.of_platform(robot, *motion)
+        within = np.isfinite(np.hstack(whole)).all(axis=1)
+        whole = FullMotion(*(np.ascontiguousarray(part[within]) for part in whole))
+        rates = np.abs(whole.rates)
+        time = np.arange(len(rates), dtype=float)
+        return cls(States.of(time, whole), rates > _MOVES * rates.max(axis=0, initial=0.0))
+
     def share(self, error: Array, forces: Array) -> Array:
         """Return the size of an error (R, n), percent of the forces' standard deviation (n,)."""
         count = np.maximum(self.moves.sum(axis=0), 1)

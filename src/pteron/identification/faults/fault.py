@@ -31,7 +31,8 @@ FaultName = Literal[
 """Faults by name: forces that are late, the scale of one force, the gear ratio of one joint or of
 all, the zero of one, the scale of all forces, the direction of gravity, its size or the rate of the
 clock, lengths, friction that falls with speed, elastic drives, a payload that is picked up or put
-down, drifting friction or offsets, friction that grows with load, friction in passive joints, motors' inertia, drives with play."""
+down, drifting friction or offsets, friction that grows with load, friction in passive joints,
+motors' inertia, drives with play."""
 
 ORDER: tuple[FaultName, ...] = (
     *("delay", "clock", "gain", "scale", "ratio", "zero", "gravity", "geometry"),
@@ -73,8 +74,8 @@ _SENTENCES = {
     "{shown_leg}",
     "stribeck": "Friction falls with speed, most clearly at {clearest}",
     "elasticity": "The drives give, most clearly under {clearest}",
-    "payload": "The platform carries about {mass:.2g} kg more in {most} of the log than in {least}, "
-    "as a payload that nobody declared",
+    "payload": "The platform carries about {mass:.2g} kg more in {most} of the log than in "
+    "{least}, as a payload that nobody declared",
     "drift": "Friction or offset changes during the log, most clearly at {clearest}",
     "load": "Friction grows with the load, most clearly at {clearest}",
     "passive": "Passive joints have friction, most clearly in {clearest}",

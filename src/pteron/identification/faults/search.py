@@ -12,10 +12,9 @@ import scipy  # type: ignore[import-untyped]
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.estimators.estimate import wald
 from pteron.identification.estimators.qr import actuator_factors
-from pteron.identification.faults.columns import Family, FaultColumns
+from pteron.identification.faults.columns import Family, FaultColumns, usual_length_error
 from pteron.identification.faults.fault import ORDER, FaultName
 from pteron.identification.observation import Observations, scaled
-from pteron.identification.plausibility import CLEAR, WANTED
 from pteron.kernels import Array
 
 _CHANCE = 1e-6
@@ -46,9 +45,6 @@ _ENOUGH = 2
 _BESIDE = 0.1
 """Least statistic of a further fault, as a share of the first one's."""
 
-_LENGTH = 0.01
-"""Usual error of a length, over the legs' size: a larger one is more likely another fault."""
-
 _MOSTLY = 0.5
 """Least share of the effect of a fault of lengths that errors of the usual size explain too."""
 
@@ -57,12 +53,6 @@ _TIMES = 3.0
 
 _MOST = 3
 """Greatest number of faults that are found."""
-
-_NOISELESS = 1e-9
-"""Least noise of a force, over that of the noisiest one; a smaller one counts as this."""
-
-_INDEPENDENT = 1e-3
-"""Share of a column, independent of the model's columns, from which both can be told apart."""
 
 
 @dataclass(frozen=True)
@@ -170,30 +160,6 @@ def _likeliest(
     return replace(first, as_well=tuple(n for n in names if n != first.family.name)[:_TOLD])
 
 
-def cannot_be_told(
-    model: FaultColumns, observations: Observations, noise: Array
-) -> list[FaultName]:
-    """Return which of the clock and the scale of one force the equations leave open.
-
-    A fault is left open if its column depends on the model's columns, but for a part below the
-    noise (n,) of the forces.
-    """
-    weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
-    flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
-    known = flat[:, : len(model.model.names)]
-    basis = np.linalg.qr(scaled(known)[0])[0]
-    found: dict[FaultName, None] = {}
-    for family, places in zip(model.families, model.places, strict=True):
-        if family.name not in ("clock", "scale"):
-            continue
-        columns = flat[:, places]
-        left = float(np.linalg.norm(columns - basis @ (basis.T @ columns)))
-        independent = left > _INDEPENDENT * float(np.linalg.norm(columns))
-        if not (independent and WANTED * left > CLEAR):
-            found[family.name] = None
-    return list(found)
-
-
 def _taken_in(
     model: FaultColumns,
     observations: Observations,
@@ -254,7 +220,7 @@ def _taken_in(
 
 def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
     """Return the share of Wald's statistic that errors of lengths of the usual size explain."""
-    spread = _LENGTH * float(np.mean([leg.size for leg in model.model.robot.legs]))
+    spread = usual_length_error(model.model.robot)
     back = spread * np.linalg.pinv(mix)
     both = back @ back.T + covariance
     # Of the sizes, C (C0 + C)^-1 remains beside the most likely ones.

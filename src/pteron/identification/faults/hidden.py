@@ -1,0 +1,79 @@
+"""Faults that logs cannot show: those that spoil another motion before residuals tell them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.identification.faults.columns import Family, FaultColumns
+from pteron.identification.faults.cycle import ReferenceCycle
+from pteron.identification.faults.fault import FaultName
+from pteron.identification.faults.fitted_motion import FittedMotion
+from pteron.identification.observation import Observations, scaled
+from pteron.identification.plausibility import CLEAR, WANTED
+from pteron.identification.signals import States
+from pteron.kernels import Array
+
+_INDEPENDENT = 1e-3
+"""Share of a column, independent of the model's columns, from which both can be told apart."""
+
+_NOISELESS = 1e-9
+"""Least noise of a force, over that of the noisiest one; a smaller one counts as this."""
+
+_TRUSTED = 3.0
+"""Error of another motion's forces, percent, from which a fault that makes it is named as hidden:
+up to that a model is trusted."""
+
+
+def hidden_faults(
+    columns: FaultColumns,
+    observations: Observations,
+    noise: Array,
+    states: list[States],
+) -> list[FaultName]:
+    """Return the faults that the equations leave open, beside the noise (n,) of the forces.
+
+    `states` are those of the logs. The clock and the scale of one force are left open if their
+    column depends on the model's columns, but for a part below the noise. Zeros, ratios and lengths
+    are left open if an error of a usual size that residuals do not tell changes the forces of
+    another motion by more than is trusted.
+    """
+    other = ReferenceCycle.shuffled(columns.model.robot, states)
+    motion = columns.motion(other.states, np.full(len(other.states), 0.5))
+    weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
+    flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
+    p = len(columns.model.names)
+    known, lengths = scaled(flat[:, :p])
+    basis, triangle = np.linalg.qr(known)
+    back = np.linalg.pinv(triangle) / lengths[:, None]
+    hidden: dict[FaultName, None] = {}
+    for family, place in zip(columns.families, columns.places, strict=True):
+        own = flat[:, place]
+        taken_in = basis.T @ own
+        left = own - basis @ taken_in
+        if family.name in ("clock", "scale"):
+            size = float(np.linalg.norm(left))
+            independent = size > _INDEPENDENT * float(np.linalg.norm(own))
+            if not (independent and WANTED * size > CLEAR):
+                hidden[family.name] = None
+        elif family.usual_error and len(other.states) > 0:
+            shift = motion.matrix @ (back @ taken_in)
+            if _largest_error(family, left, shift, other, motion) > _TRUSTED:
+                hidden[family.name] = None
+    return list(hidden)
+
+
+def _largest_error(
+    family: Family, left: Array, shift: Array, other: ReferenceCycle, motion: FittedMotion
+) -> float:
+    """Return the error of another motion's forces, percent, by a usual fault that stays hidden.
+
+    `left` (N, k) are its columns over the noise, without what the model's columns take in; `shift`
+    (R, n, k) is the change of that motion's forces by what they take in. A size is told from zero
+    at `CLEAR` standard deviations.
+    """
+    k = left.shape[1]
+    precision = left.T @ left / CLEAR**2 + np.eye(k) / family.usual_error**2
+    spread = np.linalg.cholesky(np.linalg.inv(precision))
+    error = shift - family.of_cycle(motion) if family.of_machine else shift
+    size = np.sqrt(((error @ spread) ** 2).sum(axis=-1))
+    return float(other.share(size, motion.matrix @ motion.values).max())
