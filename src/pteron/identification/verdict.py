@@ -109,7 +109,7 @@ def verdict_of(
     repeats: bool,
     log: Sequence[LogFault] = (),
     factor: float = 1.0,
-    exchangeable: Sequence[str] = (),
+    hidden_orders: str = "",
     followed: frozenset[str] = frozenset(),
     left: str = "",
 ) -> Verdict:
@@ -129,8 +129,8 @@ def verdict_of(
     factor : float
         Forces of the bodies over those of the drawing; other than 1 it is "usable with care" at
         best.
-    exchangeable : sequence of str
-        Pairs of legs whose exchange the logs do not show.
+    hidden_orders : str
+        A sentence on orders of the legs that the logs do not show; empty without any.
     followed : frozenset of str
         Options whose advice is followed already, and not given again.
     left : str
@@ -154,11 +154,8 @@ def verdict_of(
         found.steps += one.steps
     if left and found.grade != "trustworthy" and not (faults is not None and faults.causes):
         found.add(f"{left[0].upper()}{left[1:]}.")
-    if exchangeable:
-        found.add(
-            f"These logs cannot show whether legs {', or '.join(exchangeable)}, are exchanged in "
-            "the file: as mirror images of each other they explain the forces as well."
-        )
+    if hidden_orders:
+        found.add(hidden_orders)
     if repeats:
         found.add(
             "What was held out repeats the motion that was fitted: it tells of noise and drift, "

@@ -246,13 +246,15 @@ class IsolatedFault:
         clock = max(1.0 + first, 1e-300) ** -0.5 - 1.0
         whole = self.labels[0] == "all joints"
         clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
+        # Of the eighths of a log that filters cut off nothing is known.
+        seen = np.flatnonzero(self.deviations) if self.fault == "payload" else np.array([0])
         return _SENTENCES[told].format(
             label=self.labels[0],
             labels=", ".join(self.labels),
             times=float(self.sizes.max()),
-            mass=float(np.ptp(self.sizes)),
-            most=self.labels[int(np.argmax(self.sizes))],
-            least=self.labels[int(np.argmin(self.sizes))],
+            mass=float(np.ptp(self.sizes[seen])),
+            most=self.labels[int(seen[np.argmax(self.sizes[seen])])],
+            least=self.labels[int(seen[np.argmin(self.sizes[seen])])],
             clearest=self.labels[clearest],
             late=late,
             early=early,

@@ -55,7 +55,7 @@ def hidden_faults(
             independent = size > _INDEPENDENT * float(np.linalg.norm(own))
             if not (independent and WANTED * size > CLEAR):
                 hidden[family.name] = None
-        elif family.usual_error and len(other.states) > 0:
+        elif family.tolerance.usual and len(other.states) > 0:
             shift = motion.matrix @ (back @ taken_in)
             if _largest_error(family, left, shift, other, motion) > _TRUSTED:
                 hidden[family.name] = None
@@ -71,9 +71,9 @@ def _largest_error(
     (R, n, k) is the change of that motion's forces by what they take in. A size is told from zero
     at `CLEAR` standard deviations.
     """
-    k = left.shape[1]
-    precision = left.T @ left / CLEAR**2 + np.eye(k) / family.usual_error**2
-    spread = np.linalg.cholesky(np.linalg.inv(precision))
+    usual = family.tolerance.usual
+    seen, directions = np.linalg.eigh((usual / CLEAR) ** 2 * left.T @ left)
+    spread = usual * directions / np.sqrt(1.0 + np.maximum(seen, 0.0))
     error = shift - family.of_cycle(motion) if family.of_machine else shift
     size = np.sqrt(((error @ spread) ** 2).sum(axis=-1))
     return float(other.share(size, motion.matrix @ motion.values).max())

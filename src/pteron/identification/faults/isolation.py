@@ -323,8 +323,10 @@ def _named_faults(
     ]
     faults = []
     for one, shift, spoils in zip(found, shifts, each, strict=True):
-        if not (spoils < _NAMED).all():
-            family, seen = one.family, (one.sizes, one.deviations, one.chance, shift, spoils)
+        family = one.family
+        negligible = np.abs(one.sizes).max() <= family.tolerance.negligible
+        if not (spoils < _NAMED).all() and not negligible:
+            seen = (one.sizes, one.deviations, one.chance, shift, spoils)
             speeds = None if family.speed is None else family.speed * columns.usual
             labels = tuple(family.sizes(columns.model))
             faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, one.as_well))
