@@ -44,6 +44,9 @@ _SEEN = 0.5
 """Difference of the nearest real bodies' forces, percent, from which that distance counts: without
 noise the standard deviations are near zero."""
 
+_TAKEN_IN = "where a log cannot show that, other values take in what it does"
+"""The harm of a fault that a log cannot show."""
+
 _HIDDEN: dict[str, tuple[str, str]] = {
     "gain": (
         "These logs cannot show a factor that all forces have in common (gains, rated torque, gear "
@@ -62,19 +65,28 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "Check each drive's gain by itself, or move more coordinates at once, and faster.",
     ),
     "ratio": (
-        "These logs cannot show a gear ratio, lead or pulley of the joints that is off by some per "
-        "cent: other values take in what it does, and another motion is off by it.",
-        "Measure how far the joints move for a known number of turns or counts.",
+        "These logs cannot show a gear ratio, lead or pulley of the joints that is off by 5 %.",
+        f"Measure how far the joints move for a number of turns or counts: {_TAKEN_IN}.",
     ),
     "zero": (
-        "These logs cannot show a joint's zero that is off by some degrees or mm: other values "
-        "take in what it does, and another motion is off by it.",
-        "Check the joints' zeros, or record a motion that covers more of the workspace.",
+        "These logs cannot show a joint's zero that is off by 3 degrees, or 2 % of a leg's size.",
+        f"Check the joints' zeros, or record a larger or faster motion: {_TAKEN_IN}.",
     ),
     "geometry": (
-        "These logs cannot show that lengths or points of the geometry are off by a hundredth: "
-        "other values take in what that does, and another motion is off by it.",
-        "Measure the geometry, or record a motion that covers more of the workspace.",
+        "These logs cannot show lengths or points of the geometry that are off by 1 %.",
+        f"Measure the geometry, or record a larger or faster motion: {_TAKEN_IN}.",
+    ),
+    "elasticity": (
+        "These logs cannot show drives that give (a resonance at 10 Hz).",
+        f"Measure positions behind the drives, or record a faster motion: {_TAKEN_IN}.",
+    ),
+    "load": (
+        "These logs cannot show friction that grows with the load, by 5 % of it.",
+        f"Record a longer motion, or forces with less noise: {_TAKEN_IN}.",
+    ),
+    "passive": (
+        "These logs cannot show friction in the passive joints of 5 % of the load.",
+        f"Record a faster or longer motion, or forces with less noise: {_TAKEN_IN}.",
     ),
     "play": (
         "Play in the drives would not be seen: the load of none changes its direction often "

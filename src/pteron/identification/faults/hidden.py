@@ -19,6 +19,12 @@ _INDEPENDENT = 1e-3
 _NOISELESS = 1e-9
 """Least noise of a force, over that of the noisiest one; a smaller one counts as this."""
 
+_RESONANCE = 10.0
+"""Frequency, Hz, of a joint's inertia on drives that give as usual."""
+
+_FRICTION = 0.05
+"""Friction of passive joints, or that grows with the load, over the load, as is usual."""
+
 _TRUSTED = 3.0
 """Error of another motion's forces, percent, from which a fault that makes it is named as hidden:
 up to that a model is trusted."""
@@ -33,9 +39,9 @@ def hidden_faults(
     """Return the faults that the equations leave open, beside the noise (n,) of the forces.
 
     `states` are those of the logs. The clock and the scale of one force are left open if their
-    column depends on the model's columns, but for a part below the noise. Zeros, ratios and lengths
-    are left open if an error of a usual size that residuals do not tell changes the forces of
-    another motion by more than is trusted.
+    column depends on the model's columns, but for a part below the noise. Zeros, ratios, lengths,
+    elasticity and friction are left open if an error of a usual size that residuals do not tell
+    changes the forces of another motion by more than is trusted.
     """
     other = ReferenceCycle.shuffled(columns.model.robot, states)
     motion = columns.motion(other.states, np.full(len(other.states), 0.5))
@@ -55,25 +61,40 @@ def hidden_faults(
             independent = size > _INDEPENDENT * float(np.linalg.norm(own))
             if not (independent and WANTED * size > CLEAR):
                 hidden[family.name] = None
-        elif family.tolerance.usual and len(other.states) > 0:
-            shift = motion.matrix @ (back @ taken_in)
-            if _largest_error(family, left, shift, other, motion) > _TRUSTED:
+        elif len(other.states) > 0 and (usual := _usual_sizes(family, motion)) is not None:
+            error = motion.matrix @ (back @ taken_in)
+            if family.of_machine and family.name != "elasticity":
+                error = error - family.of_cycle(motion)
+            if _largest_error(left, error, usual, other, motion) > _TRUSTED:
                 hidden[family.name] = None
     return list(hidden)
 
 
+def _usual_sizes(family: Family, motion: FittedMotion) -> Array | None:
+    """Return the usual sizes of a fault (k,); None where such a fault is not sought."""
+    load = motion.forces(of=["base"]).std(axis=0)
+    if family.name == "elasticity":
+        compliance = motion.states.joint_accelerations.std(axis=0) / np.maximum(load, 1e-300)
+        return np.asarray(compliance / (2.0 * np.pi * _RESONANCE) ** 2)
+    if family.name in ("load", "passive"):
+        sizes = np.abs(family.columns(motion)).mean(axis=(0, 1))
+        return np.asarray(_FRICTION * load.mean() / np.maximum(sizes, 1e-300))
+    if not family.tolerance.usual:
+        return None
+    return np.full(len(family.sizes(motion.model)), family.tolerance.usual)
+
+
 def _largest_error(
-    family: Family, left: Array, shift: Array, other: ReferenceCycle, motion: FittedMotion
+    left: Array, error: Array, usual: Array, other: ReferenceCycle, motion: FittedMotion
 ) -> float:
     """Return the error of another motion's forces, percent, by a usual fault that stays hidden.
 
-    `left` (N, k) are its columns over the noise, without what the model's columns take in; `shift`
-    (R, n, k) is the change of that motion's forces by what they take in. A size is told from zero
-    at `CLEAR` standard deviations.
+    `left` (N, k) are a fault's columns over the noise, without what the model's columns take in;
+    `error` (R, n, k) is that of the other motion's forces per unit of its sizes, and `usual` (k,)
+    are their standard deviations. A size is told from zero at `CLEAR` standard deviations.
     """
-    usual = family.tolerance.usual
-    seen, directions = np.linalg.eigh((usual / CLEAR) ** 2 * left.T @ left)
-    spread = usual * directions / np.sqrt(1.0 + np.maximum(seen, 0.0))
-    error = shift - family.of_cycle(motion) if family.of_machine else shift
+    columns = left * (usual / CLEAR)
+    seen, directions = np.linalg.eigh(columns.T @ columns)
+    spread = usual[:, None] * directions / np.sqrt(1.0 + np.maximum(seen, 0.0))
     size = np.sqrt(((error @ spread) ** 2).sum(axis=-1))
     return float(other.share(size, motion.matrix @ motion.values).max())

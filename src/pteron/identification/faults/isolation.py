@@ -83,11 +83,12 @@ class FaultIsolation:
         Error that all faults together make in the same cycle, percent.
     why_not : str
         The reason why no fault was tried; empty where some were.
-    hidden : tuple of {"gain", "clock", "scale", "ratio", "zero", "geometry", "play"}
-        Faults that these logs cannot show: by the rank of their equations a common factor of all
-        forces, a clock at another rate, a wrong scale of one force; ratios, zeros and lengths of
-        which a usual error changes a cycle's forces by more than is trusted before it is told; and
-        play, where no drive's load changes direction often enough.
+    hidden : tuple of str
+        Faults that these logs cannot show: by the rank of their equations "gain", a common factor
+        of all forces, "clock", at another rate, "scale", of one force; "ratio", "zero", "geometry",
+        "elasticity", "load" and "passive", where a usual one changes the forces of another motion
+        by more than is trusted before it is told; and "play", where no drive's load changes
+        direction often enough.
     late : bool
         Whether forces are late for positions, or early; in a log without noise this changes values,
         even if too little to be named.
