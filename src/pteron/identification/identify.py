@@ -291,6 +291,9 @@ def _identified(
                 raise
         report("Looking for faults", 0, 0)
         faults = isolate(drawn=drawn_values)
+        if faults.matters and not distorted:
+            of_log = log_faults(heads, preprocessing, lost, fits=trusted, doubtful=True)
+            distorted = any(one.distorts for one in of_log)
         if late or given is not None or not faults.late:
             break
         # A delay changes values: fit again with it.

@@ -25,9 +25,9 @@ _RESONANCE = 10.0
 _FRICTION = 0.05
 """Friction of passive joints, or that grows with the load, over the load, as is usual."""
 
-_TRUSTED = 3.0
-"""Error of another motion's forces, percent, from which a fault that makes it is named as hidden:
-up to that a model is trusted."""
+_HARMFUL = 2.0
+"""Error of another motion's forces, percent, from which a fault that makes it is named as hidden: up
+to 3 % is trusted, and a fault may be larger than usual."""
 
 
 def hidden_faults(
@@ -65,7 +65,7 @@ def hidden_faults(
             error = motion.matrix @ (back @ taken_in)
             if family.of_machine and family.name != "elasticity":
                 error = error - family.of_cycle(motion)
-            if _largest_error(left, error, usual, other, motion) > _TRUSTED:
+            if _largest_error(left, error, usual, other, motion) > _HARMFUL:
                 hidden[family.name] = None
     return list(hidden)
 
