@@ -293,7 +293,7 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
     worst = int(np.argmax(shown.off))
     off = float(shown.off[worst])
     found.add(
-        f"A pick-and-place cycle as fast as this motion is expected to be up to "
+        f"A pick-and-place cycle, or another motion as fast as this one, is expected to be up to "
         f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
         "not.",

@@ -92,6 +92,8 @@ class Family:
     free : bool
         Whether its sizes vary with time as they like, so that it must explain all that noise does
         not: part of other faults' residuals it always explains.
+    of_path : bool
+        Whether its columns are made of derivatives by time, of states one after the other.
     effect : callable, optional
         Returns how the machine's forces change, where that is otherwise than those of the log: by a
         clock that is off all inertia is, and with it the mass that weighs.
@@ -108,6 +110,7 @@ class Family:
     exact: bool = False
     tolerance: Tolerance = _UNKNOWN
     free: bool = False
+    of_path: bool = False
     effect: Callable[[FittedMotion], Array] | None = None
 
     def of_cycle(self, motion: FittedMotion) -> Array:
@@ -196,7 +199,7 @@ _OTHERS = (
         Family("stribeck", "N", _forces, partial(_stribeck, share), positive=True, speed=share)
         for share in _STRIBECK
     ),
-    Family("elasticity", "m/N", _forces, _elasticity, positive=True),
+    Family("elasticity", "m/N", _forces, _elasticity, positive=True, of_path=True),
     Family("drift", "N", lambda m: [*_forces(m), *_forces(m)], _drift),
     Family("load", "", _forces, lambda m: diagonal(m.direction * np.abs(_load(m))), positive=True),
     Family("passive", "N m s", _passive_legs, _passive, positive=True),

@@ -46,10 +46,14 @@ class Extent(NamedTuple):
 
 @dataclass(frozen=True)
 class ReferenceCycle:
-    """States of a cycle, and where each joint moves (R, n)."""
+    """States of a cycle, and where each joint moves (R, n).
+
+    They may be `in_order`, one after the other, or each by itself.
+    """
 
     states: States
     moves: NDArray[np.bool_]
+    in_order: bool = True
 
     @classmethod
     def within(
@@ -92,7 +96,8 @@ class ReferenceCycle:
         whole = FullMotion(*(np.ascontiguousarray(part[within]) for part in whole))
         rates = np.abs(whole.rates)
         time = np.arange(len(rates), dtype=float)
-        return cls(States.of(time, whole), rates > _MOVES * rates.max(axis=0, initial=0.0))
+        moves = rates > _MOVES * rates.max(axis=0, initial=0.0)
+        return cls(States.of(time, whole), moves, in_order=False)
 
     def share(self, error: Array, forces: Array) -> Array:
         """Return the size of an error (R, n), percent of the forces' standard deviation (n,)."""

@@ -10,7 +10,6 @@ from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion
 from pteron.identification.observation import Observations, scaled
 from pteron.identification.plausibility import CLEAR, WANTED
-from pteron.identification.signals import States
 from pteron.kernels import Array
 
 _INDEPENDENT = 1e-3
@@ -26,24 +25,23 @@ _FRICTION = 0.05
 """Friction of passive joints, or that grows with the load, over the load, as is usual."""
 
 _HARMFUL = 2.0
-"""Error of another motion's forces, percent, from which a fault that makes it is named as hidden: up
-to 3 % is trusted, and a fault may be larger than usual."""
+"""Error of another motion's forces, percent, from which a fault that makes it is named as hidden:
+up to 3 % is trusted, and a fault may be larger than usual."""
 
 
 def hidden_faults(
     columns: FaultColumns,
     observations: Observations,
     noise: Array,
-    states: list[States],
+    other: ReferenceCycle,
 ) -> list[FaultName]:
     """Return the faults that the equations leave open, beside the noise (n,) of the forces.
 
-    `states` are those of the logs. The clock and the scale of one force are left open if their
-    column depends on the model's columns, but for a part below the noise. Zeros, ratios, lengths,
-    elasticity and friction are left open if an error of a usual size that residuals do not tell
-    changes the forces of another motion by more than is trusted.
+    `other` is another motion than that of the logs. The clock and the scale of one force are left
+    open if their column depends on the model's columns, but for a part below the noise. Zeros,
+    ratios, lengths, elasticity and friction are left open if an error of a usual size that
+    residuals do not tell changes the other motion's forces by more than `_HARMFUL`.
     """
-    other = ReferenceCycle.shuffled(columns.model.robot, states)
     motion = columns.motion(other.states, np.full(len(other.states), 0.5))
     weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
     flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
@@ -63,7 +61,7 @@ def hidden_faults(
                 hidden[family.name] = None
         elif len(other.states) > 0 and (usual := _usual_sizes(family, motion)) is not None:
             error = motion.matrix @ (back @ taken_in)
-            if family.of_machine and family.name != "elasticity":
+            if family.of_machine and not family.of_path:
                 error = error - family.of_cycle(motion)
             if _largest_error(left, error, usual, other, motion) > _HARMFUL:
                 hidden[family.name] = None

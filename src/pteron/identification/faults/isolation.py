@@ -15,7 +15,6 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
 from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
-from pteron.identification.faults.fitted_motion import FittedMotion
 from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import Record, knocks
@@ -77,10 +76,11 @@ class FaultIsolation:
     faults : tuple of IsolatedFault
         The faults that show and change a reference cycle by 0.05 % or more, the clearest first.
     uncertain : array, shape (n,)
-        Error of the forces in a pick-and-place cycle that the values' covariance allows, percent of
-        the forces' standard deviation; NaN where no cycle fits into the machine's workspace.
+        Error of the forces in a pick-and-place cycle, or in another motion of the logs' range where
+        it is larger, that the values' covariance allows, percent of the forces' standard deviation;
+        NaN where no cycle fits into the machine's workspace.
     spoiled : array, shape (n,)
-        Error that all faults together make in the same cycle, percent.
+        Error that all faults together make in the same motions, percent.
     why_not : str
         The reason why no fault was tried; empty where some were.
     hidden : tuple of str
@@ -173,7 +173,8 @@ def isolate_faults(
 
     Each fault adds columns to the regressor (`families_of`). Those whose sizes the data tell from
     zero join the fit one after the other, the clearest first. The errors that they make are
-    computed on a pick-and-place cycle as fast as the logs' motion.
+    computed on a pick-and-place cycle as fast as the logs' motion, and on states of another motion
+    of their range.
 
     Parameters
     ----------
@@ -217,11 +218,16 @@ def _isolated(
 
     observations = observed(parts)
     plain, found = _found_faults(parts, observations, observed, estimate, noise)
-    cycle = ReferenceCycle.within(
-        model.robot, Extent.of([s for part in parts for s in part.states])
-    )
-    motion = cycle and columns.motion(cycle.states, np.full(len(cycle.states), 0.5))
-    uncertain, spoiled, each = _cycle_errors(cycle, motion, estimate, plain, found)
+    states = [s for part in parts for s in part.states]
+    cycle = ReferenceCycle.within(model.robot, Extent.of(states))
+    uncertain, spoiled, each = _cycle_errors(columns, cycle, estimate, plain, found)
+    other = ReferenceCycle.shuffled(model.robot, states)
+    if cycle is not None and len(other.states) > 0:
+        # What a cycle spares another motion of the same range may show.
+        elsewhere = _cycle_errors(columns, other, estimate, plain, found)
+        uncertain, spoiled = (
+            np.fmax(a, b) for a, b in zip((uncertain, spoiled), elsewhere[:2], strict=True)
+        )
     step = 1.0 / max(part.how.rate for part in parts)
     faults = _named_faults(columns, plain, found, each, step)
 
@@ -234,14 +240,18 @@ def _isolated(
     # The scale of all forces, which the residuals cannot show
     factor = factor_of_forces(model, found[-1].fit if found else plain, known)
     gain = None if factor is None else _wrong_gain(factor, tuple(known), faults, len(noise))
+    left_open = hidden_faults(columns, observations, noise, other)
     if gain is not None:
+        if "clock" in left_open:
+            # Weight tells the bodies' mass: a slow clock lets their inertia take from the rotors'.
+            gain = replace(gain, as_well=("clock",))
         faults.insert(0, gain)
         spoiled = np.hypot(spoiled, gain.cycle)
     names = dict.fromkeys(family.name for family in columns.families)
     tried = (*names, *["play"] * looked, *["gain"] * (factor is not None))
     hidden = (
         *["gain"] * (factor is None or not factor.told),
-        *hidden_faults(columns, observations, noise, [s for part in parts for s in part.states]),
+        *left_open,
         *["play"] * (not looked),
     )
     return FaultIsolation(
@@ -277,8 +287,8 @@ def _found_faults(
 
 
 def _cycle_errors(
+    columns: FaultColumns,
     cycle: ReferenceCycle | None,
-    motion: FittedMotion | None,
     estimate: Estimate,
     plain: Estimate,
     found: Sequence[FoundFault],
@@ -287,16 +297,17 @@ def _cycle_errors(
 
     NaN without a cycle.
     """
-    if cycle is None or motion is None:
+    if cycle is None:
         nothing = np.full(len(estimate.noise), np.nan)
         return nothing, nothing, [nothing for _ in found]
+    motion = columns.motion(cycle.states, np.full(len(cycle.states), 0.5))
     matrix = motion.matrix
     p = matrix.shape[-1]
     forces = [matrix @ plain.values]
     for one in found:
         with_fault = matrix @ one.fit.values[:p]
         for family, sizes in (*one.others, (one.family, one.sizes)):
-            if family.of_machine:
+            if family.of_machine and (cycle.in_order or not family.of_path):
                 with_fault = with_fault + family.of_cycle(motion) @ sizes
         forces.append(with_fault)
     each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
