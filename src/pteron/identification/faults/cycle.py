@@ -13,6 +13,7 @@ from pteron.errors import PteronError
 from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion, home
 from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion, pick_and_place
 
@@ -83,7 +84,8 @@ class ReferenceCycle:
     def shuffled(cls, robot: Manipulator, states: list[States]) -> ReferenceCycle:
         """Return states of another motion with the range, speeds and accelerations of a log's.
 
-        Each coordinate is that of another sample, and so is its rate.
+        Each coordinate is that of another sample, and so is its rate. Poses out of the legs' reach
+        are left out.
         """
         rng = np.random.default_rng(0)
         motion = []
@@ -92,7 +94,9 @@ class ReferenceCycle:
             rows = rng.integers(len(log), size=(_SAMPLES, log.shape[1]))
             motion.append(np.take_along_axis(log, rows, axis=0))
         whole = FullMotion.of_platform(robot, *motion)
-        within = np.isfinite(np.hstack(whole)).all(axis=1)
+        # A slider's motion is finite out of the legs' reach too; that of the links is not.
+        within = np.isfinite(unchecked(robot, "regressor", *motion)).all(axis=(1, 2))
+        within &= np.isfinite(np.hstack(whole)).all(axis=1)
         whole = FullMotion(*(np.ascontiguousarray(part[within]) for part in whole))
         rates = np.abs(whole.rates)
         time = np.arange(len(rates), dtype=float)
