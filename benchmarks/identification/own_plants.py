@@ -655,7 +655,7 @@ FAULTS: dict[str, tuple[Callable[[Case], None], str]] = {
     "passive friction": (passive, "[Pp]assive"),
     "load friction": (load_friction, "with the load"),
     "flexible": (flexible, "drives (that )?give|flexib"),
-    "payload": (payload, "payload|changes during"),
+    "payload": (payload, "as a payload"),
     "quantised": (quantised, "quanti|steps"),
 }
 """Each with the words that name its cause."""
