@@ -219,15 +219,8 @@ def _isolated(
     observations = observed(parts)
     plain, found = _found_faults(parts, observations, observed, estimate, noise)
     states = [s for part in parts for s in part.states]
-    cycle = ReferenceCycle.within(model.robot, Extent.of(states))
-    uncertain, spoiled, each = _cycle_errors(columns, cycle, estimate, plain, found)
     other = ReferenceCycle.shuffled(model.robot, states)
-    if cycle is not None and len(other.states) > 0:
-        # What a cycle spares another motion of the same range may show.
-        elsewhere = _cycle_errors(columns, other, estimate, plain, found)
-        uncertain, spoiled = (
-            np.fmax(a, b) for a, b in zip((uncertain, spoiled), elsewhere[:2], strict=True)
-        )
+    uncertain, spoiled, each = _expected_errors(columns, states, other, estimate, plain, found)
     step = 1.0 / max(part.how.rate for part in parts)
     faults = _named_faults(columns, plain, found, each, step)
 
@@ -249,17 +242,16 @@ def _isolated(
         spoiled = np.hypot(spoiled, gain.cycle)
     names = dict.fromkeys(family.name for family in columns.families)
     tried = (*names, *["play"] * looked, *["gain"] * (factor is not None))
-    hidden = (
-        *["gain"] * (factor is None or not factor.told),
-        *left_open,
-        *["play"] * (not looked),
-    )
+    if factor is None or not factor.told:
+        left_open.insert(0, "gain")
+    if not looked:
+        left_open.append("play")
     return FaultIsolation(
         tried,
         tuple(faults),
         uncertain,
         spoiled,
-        hidden=tuple(name for name in hidden if name not in {one.fault for one in faults}),
+        hidden=tuple(name for name in left_open if name not in {one.fault for one in faults}),
         late=any(one.family is DELAY for one in found),
     )
 
@@ -284,6 +276,24 @@ def _found_faults(
         if late is not None:
             found.insert(0, replace(late, fit=fit))
     return plain, found
+
+
+def _expected_errors(
+    columns: FaultColumns,
+    states: list[States],
+    other: ReferenceCycle,
+    estimate: Estimate,
+    plain: Estimate,
+    found: Sequence[FoundFault],
+) -> tuple[Array, Array, list[Array]]:
+    """Return `_cycle_errors` of a cycle; the first two of another motion where these are larger."""
+    cycle = ReferenceCycle.within(columns.model.robot, Extent.of(states))
+    uncertain, spoiled, each = _cycle_errors(columns, cycle, estimate, plain, found)
+    if cycle is not None and len(other.states) > 0:
+        # What a cycle spares another motion of the same range may show.
+        elsewhere = _cycle_errors(columns, other, estimate, plain, found)
+        uncertain, spoiled = np.fmax(uncertain, elsewhere[0]), np.fmax(spoiled, elsewhere[1])
+    return uncertain, spoiled, each
 
 
 def _cycle_errors(
