@@ -8,7 +8,7 @@ One fault is put into a log, or into the machine's file; the log is identified w
 held out, and the model's forces are compared with the plant's on a third motion. Printed are
 grades, the first two causes, that error, and the same after following the advice.
 
-    python benchmarks/identification/own_plants.py [--seeds 1] [PLANT ...]
+    python benchmarks/identification/own_plants.py [--seeds 1] [--first 1] [PLANT ...]
 """
 
 from __future__ import annotations
