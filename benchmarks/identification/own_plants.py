@@ -8,7 +8,7 @@ One fault is put into a log, or into the machine's file; the log is identified w
 held out, and the model's forces are compared with the plant's on a third motion. Printed are
 grades, the first two causes, that error, and the same after following the advice.
 
-    python benchmarks/identification/own_plants.py [--seeds 1] [PLANT ...]
+    python benchmarks/identification/own_plants.py [--seeds 1] [--first 1] [PLANT ...]
 """
 
 from __future__ import annotations
@@ -36,17 +36,41 @@ from pteron.identification import (
 from pteron.kernels import Array
 from pteron.legs import Drive
 
-RATE = 500.0
-_PERIOD = 4.0
 _PERIODS = 2
-NOISE = 0.01
-"""Standard deviation of the forces' noise, over each force's own."""
 _COMPLEX = 1e-30
 _STEP = 1e-3
 
 
 Place = Callable[[Any], tuple[Any, Any, Any]]
 """Returns joints, points and directions of poses, real or complex."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """How a plant moves and is recorded, and how large its faults are.
+
+    Attributes
+    ----------
+    rate : float
+        Samples per second.
+    period : float
+        Of the motions, s.
+    noise : float
+        Standard deviation of the forces' noise, over each force's own.
+    begin : float
+        The log's first time stamp, s.
+    motion : float
+        Size of the motions, over the plant's usual one.
+    fault : float
+        Size of the faults, over their usual one.
+    """
+
+    rate: float = 500.0
+    period: float = 4.0
+    noise: float = 0.01
+    begin: float = 0.0
+    motion: float = 1.0
+    fault: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +95,8 @@ class Plant:
         Friction of the drives.
     encoder : float
         Resolution of the joints' coordinates.
+    conditions : Conditions
+        Of its motions and logs.
     """
 
     name: str
@@ -86,6 +112,7 @@ class Plant:
     encoder: float
     upright: bool = False
     passive: float = 0.0
+    conditions: Conditions = Conditions()
 
 
 @dataclass
@@ -124,23 +151,24 @@ def _seconds(place: Place, x: Array, v: Array, a: Array) -> list[Array]:
     return [rate[0], back[0], back[1], rate[2]]
 
 
-def moved(plant: Plant, seed: int, *, payload: float = 0.0, scale: float = 1.0) -> Moved:
+def moved(plant: Plant, seed: int, *, payload: float = 0.0) -> Moved:
     """Return a motion of the plant: Fourier series in its own coordinates, from a seed."""
     rng = np.random.default_rng(seed)
-    time = np.arange(round(_PERIODS * _PERIOD * RATE)) / RATE
+    period, rate = plant.conditions.period, plant.conditions.rate
+    time = np.arange(round(_PERIODS * period * rate)) / rate
     m = len(plant.home)
     x, v, a = (np.zeros((len(time), m)) for _ in range(3))
     weights = rng.normal(size=(5, 2, m))
-    look = np.linspace(0.0, _PERIOD, 400)
+    look = np.linspace(0.0, period, 400)
     shape = np.zeros((400, m))
     for h, (c, s) in enumerate(weights, start=1):
-        w = 2.0 * np.pi * h / _PERIOD
+        w = 2.0 * np.pi * h / period
         cos, sin = np.cos(w * time)[:, None], np.sin(w * time)[:, None]
         x += (c * cos + s * sin) / h
         v += w * (s * cos - c * sin) / h
         a -= w * w * (c * cos + s * sin) / h
         shape += (c * np.cos(w * look)[:, None] + s * np.sin(w * look)[:, None]) / h
-    size = scale * plant.size / np.abs(shape).max(axis=0)
+    size = plant.conditions.motion * plant.size / np.abs(shape).max(axis=0)
     return forces_along(plant, time, plant.home + size * x, size * v, size * a, payload=payload)
 
 
@@ -203,14 +231,28 @@ def _with_rotors(name: str, rotor: float, ratio: float, **changes: object) -> pt
     return replace(robot, legs=legs, **changes)  # type: ignore[arg-type]
 
 
-def linear_delta() -> Plant:
+def _with_legs(robot: pteron.Manipulator, **changes: object) -> pteron.Manipulator:
+    """Return a machine with changed legs; a callable changes a leg's own value."""
+    legs = tuple(
+        replace(leg, **{k: v(getattr(leg, k)) if callable(v) else v for k, v in changes.items()})
+        for leg in robot.legs
+    )
+    return replace(robot, legs=legs)
+
+
+def linear_delta(*, other: bool = False) -> Plant:
     """Return a linear Delta with vertical guides and belts: carriages above the platform."""
     rotor = 54e-7 / 0.00637**2  # NEMA 17 at a pulley of 40 mm circumference
     robot = _with_rotors("linear-delta", rotor, 1.0 / 0.00637)
+    length, limits = 0.2294, (0.13, 0.48)
+    slider, rod, effector = 0.14, 0.035, 0.28
+    if other:
+        length, limits = 0.32, (0.15, 0.7)
+        slider, rod, effector = 0.1, 0.05, 0.3
+        wider = {"guide_point": lambda p: tuple(1.3 * np.array(p))}
+        robot = _with_legs(robot, **wider, lower_length=length, limits=limits, bar_length=None)
     base = np.array([leg.guide_point for leg in robot.legs])
     arm = np.array([leg.platform_point for leg in robot.legs])
-    length = 0.2294
-    slider, rod, effector = 0.14, 0.035, 0.28
 
     def place(x: Array) -> tuple[Array, Array, Array]:
         c = x[:, None, :] + arm
@@ -226,20 +268,27 @@ def linear_delta() -> Plant:
 
     masses = np.array([*([slider, *_rod_masses(rod)] * 3), effector])
     home, size = np.array([0.0, 0.0, 0.1]), np.array([0.06, 0.06, 0.06])
+    if other:
+        home, size = np.array([0.01, -0.02, 0.2]), np.array([0.08, 0.07, 0.09])
     about = (np.array([0.0, 0.0, -9.81]), rotor, 1.0, 2.0, 2e-6)
     return Plant("linear-delta", robot, home, size, place, masses, *about)
 
 
-def hexapod() -> Plant:
+def hexapod(*, other: bool = False) -> Plant:
     """Return a hexapod with screws: rams of a cylinder and a piston each."""
     lead = 0.02
     ratio = 2.0 * np.pi / lead
     rotor = 6e-4 * ratio**2
     robot = _with_rotors("stewart", rotor, ratio)
+    platform, cylinder, piston = 1100.0, 100.0, 45.0
+    if other:
+        platform, cylinder, piston = 1000.0, 80.0, 60.0
+        narrower = {"guide_point": lambda p: tuple(0.7 * np.array(p))}
+        cones: dict[str, object] = {"base_cone": None, "platform_cone": None}
+        robot = _with_legs(robot, **narrower, **cones, limits=(1.8, 3.6))
     base = np.array([leg.guide_point for leg in robot.legs])
     arm = np.array([leg.platform_point for leg in robot.legs])
     span = 3.153801 * 0.75
-    platform, cylinder, piston = 1100.0, 100.0, 45.0
     plate = np.array([[0.7, 0.0, 0.0], [-0.7, 0.0, 0.0], [0.0, 0.7, 0.0], [0.0, -0.7, 0.0]])
 
     def place(x: Array) -> tuple[Array, Array, Array]:
@@ -272,7 +321,7 @@ def hexapod() -> Plant:
     return Plant("hexapod", robot, home, size, place, masses, *about)
 
 
-def ball_table() -> Plant:
+def ball_table(*, other: bool = False) -> Plant:
     """Return a ball table: three cranks with a link each to a joint under the plate."""
     rotor = 3e-4
     robot = _with_rotors("ball-table", rotor, 10.0)
@@ -280,8 +329,11 @@ def ball_table() -> Plant:
     out = np.stack([np.cos(azimuths), np.sin(azimuths), 0.0 * azimuths], axis=-1)
     across = np.stack([-np.sin(azimuths), np.cos(azimuths), 0.0 * azimuths], axis=-1)
     base, arm, crank, link = 0.06 * out, 0.1 * out, 0.08, 0.11
+    if other:
+        crank, link = 0.09, 0.14
+        robot = _with_legs(robot, upper_length=crank, lower_length=link)
     plate = np.array([[0.1, 0, 0.01], [-0.1, 0, 0.01], [0, 0.1, 0.01], [0, -0.1, 0.01]])
-    mass, of_crank, of_link = 0.32, 0.035, 0.018
+    mass, of_crank, of_link = (0.4, 0.03, 0.025) if other else (0.32, 0.035, 0.018)
     up = np.array([0.0, 0.0, 1.0])
 
     def place(x: Array) -> tuple[Array, Array, Array]:
@@ -324,31 +376,36 @@ def ball_table() -> Plant:
     masses = np.array(
         [*([*_rod_masses(of_crank), *_rod_masses(of_link)] * 3), *([mass / 4.0] * 4), 0.0]
     )
-    home, size = np.array([0.1, 0.0, 0.0]), np.array([0.025, 0.2, 0.2])
+    home, size = np.array([0.12 if other else 0.1, 0.0, 0.0]), np.array([0.025, 0.2, 0.2])
     about = (np.array([0.0, 0.0, -9.81]), rotor, 0.01, 0.005, 2.0 * np.pi / 2**17)
     return Plant("ball-table", robot, home, size, place, masses, *about)
 
 
-def five_bar() -> Plant:
+def five_bar(*, other: bool = False) -> Plant:
     """Return a five-bar that stands upright: gravity is in its plane."""
     rotor = 1e-5
     gravity = (0.0, -9.81, 0.0)
     robot = _with_rotors("five-bar", rotor, 5.0, gravity=gravity)
     base = np.array([[-0.059, 0.0], [0.059, 0.0]])
-    length, bend = 0.09, (1.0, -1.0)
+    upper, lower, bend = 0.09, 0.09, (1.0, -1.0)
     crank, link, pen = 0.07, 0.04, 0.035
+    if other:
+        base, upper, lower = 0.7 * base, 0.1, 0.13
+        crank, link, pen = 0.05, 0.05, 0.025
+        nearer = {"guide_point": lambda p: tuple(0.7 * np.array(p))}
+        robot = _with_legs(robot, **nearer, upper_length=upper, lower_length=lower)
 
     def place(x: Array) -> tuple[Array, Array, Array]:
         points, rods, angles = [], [], []
         for i in range(2):
             rel = x - base[i]
             d = _root((rel**2).sum(axis=-1))
-            share = d / (2.0 * length)
+            share = (d * d + upper**2 - lower**2) / (2.0 * upper * d)
             q = _angle(rel[:, 0], rel[:, 1]) + bend[i] * _arccos(share)
-            elbow = base[i] + length * np.stack([np.cos(q), np.sin(q)], axis=-1)
+            elbow = base[i] + upper * np.stack([np.cos(q), np.sin(q)], axis=-1)
             points += _rod([base[i] + 0 * elbow, elbow])
             points += _rod([elbow, x])
-            rods.append(_seen_from(q, *((x - elbow) / length).T))
+            rods.append(_seen_from(q, *((x - elbow) / lower).T))
             angles.append(q)
         points.append(x)
         flat = np.stack(points, axis=1)
@@ -356,7 +413,7 @@ def five_bar() -> Plant:
         return np.stack(angles, axis=1), level, np.stack(rods, axis=1)
 
     masses = np.array([*([*_rod_masses(crank), *_rod_masses(link)] * 2), pen])
-    home, size = np.array([0.0, 0.125]), np.array([0.03, 0.02])
+    home, size = np.array([0.0, 0.16 if other else 0.125]), np.array([0.03, 0.02])
     about = (np.array(gravity), rotor, 0.004, 0.001, 2.0 * np.pi / 2**17)
     return Plant("five-bar", robot, home, size, place, masses, *about, upright=True)
 
@@ -367,13 +424,14 @@ PLANTS: dict[str, Callable[[], Plant]] = {
     "ball-table": lru_cache(ball_table),
     "five-bar": lru_cache(five_bar),
 }
+"""Each also with other dimensions and masses: `other=True`."""
 
 
 def log_of(plant: Plant, motion: Moved, seed: int, source: str = "log.csv") -> Log:
     """Return the log of a motion without a fault: encoders round, forces have noise."""
     rng = np.random.default_rng((seed, 7))
-    size = motion.forces.std(axis=0)
-    forces = motion.forces + NOISE * size * rng.normal(size=motion.forces.shape)
+    size = plant.conditions.noise * motion.forces.std(axis=0)
+    forces = motion.forces + size * rng.normal(size=motion.forces.shape)
     joints = np.round(motion.joints / plant.encoder) * plant.encoder
     symbols = tuple(leg.joint for leg in plant.drawn.legs)
     return Log(source, motion.time, joints, forces, symbols=symbols)
@@ -397,6 +455,12 @@ class Case:
     time: Array
     joints: Array
     forces: Array
+    seed: int = 0
+
+    @property
+    def size(self) -> float:
+        """The size of its fault, over the usual one."""
+        return self.plant.conditions.fault
 
     @property
     def home(self) -> Array:
@@ -411,37 +475,43 @@ class Case:
 
 def jitter(case: Case) -> None:
     """Sample positions 0.2 ms off their stamps, at random."""
-    case.seen_at(case.time + 2e-4 * case.rng.normal(size=case.time.shape))
+    case.seen_at(case.time + 2e-4 * case.size * case.rng.normal(size=case.time.shape))
 
 
 def lost(case: Case) -> None:
     """Lose 3 % of the samples."""
-    kept = case.rng.random(len(case.time)) >= 0.03
+    kept = case.rng.random(len(case.time)) >= 0.03 * case.size
     case.time, case.joints, case.forces = case.time[kept], case.joints[kept], case.forces[kept]
 
 
 def slow_clock(case: Case) -> None:
     """Let the log's clock run 3 % slow."""
-    case.time = 0.97 * case.time
+    case.time = (1.0 - 0.03 * case.size) * case.time
 
 
 def late(case: Case) -> None:
     """Make forces 4 ms late."""
     spline = make_interp_spline(case.time, case.forces, k=1)
-    case.forces = spline(np.clip(case.time - 4e-3, case.time[0], None))
+    case.forces = spline(np.clip(case.time - 4e-3 * case.size, case.time[0], None))
 
 
 def saturated(case: Case) -> None:
     """Cut the range of forces to 60 %."""
     low, high = case.forces.min(axis=0), case.forces.max(axis=0)
-    case.forces = np.clip(case.forces, 0.8 * low + 0.2 * high, 0.2 * low + 0.8 * high)
+    cut = 0.2 * case.size * (high - low)
+    case.forces = np.clip(case.forces, low + cut, high - cut)
+
+
+def _sized(factor: float, case: Case) -> float:
+    """Return a factor by the size of the case's fault; one of two has no other size."""
+    return factor if factor in (0.5, 2.0) else 1.0 + case.size * (factor - 1.0)
 
 
 def times(factor: float) -> Callable[[Case], None]:
     """Return what multiplies all forces."""
 
     def change(case: Case) -> None:
-        case.forces = factor * case.forces
+        case.forces = _sized(factor, case) * case.forces
 
     return change
 
@@ -450,8 +520,9 @@ def geared(factor: float) -> Callable[[Case], None]:
     """Return what gives the drives another ratio, or lead, than the file has."""
 
     def change(case: Case) -> None:
-        case.joints = case.home + factor * (case.joints - case.home)
-        case.forces = case.forces / factor
+        moved = _sized(factor, case)
+        case.joints = case.home + moved * (case.joints - case.home)
+        case.forces = case.forces / moved
 
     return change
 
@@ -459,7 +530,7 @@ def geared(factor: float) -> Callable[[Case], None]:
 def zero_off(case: Case) -> None:
     """Shift the zero of one joint, by a twentieth of its range or so."""
     case.joints = case.joints.copy()
-    case.joints[:, case.actuator] += 0.06 * np.ptp(case.joints[:, case.actuator])
+    case.joints[:, case.actuator] += 0.06 * case.size * np.ptp(case.joints[:, case.actuator])
 
 
 def flipped(case: Case) -> None:
@@ -502,7 +573,9 @@ def guide_off(case: Case) -> None:
     leg = case.drawn.legs[case.actuator]
     size = {"hexapod": 0.025, "linear-delta": 0.008, "ball-table": 0.006, "five-bar": 0.004}
     way = case.rng.normal(size=3) * (1.0, 1.0, 0.0)
-    point = np.array(leg.guide_point) + size[case.plant.name] * way / np.linalg.norm(way)
+    point = np.array(leg.guide_point) + case.size * size[case.plant.name] * way / np.linalg.norm(
+        way
+    )
     _with_leg(case, guide_point=tuple(point))
 
 
@@ -510,51 +583,54 @@ def length_off(case: Case) -> None:
     """Draw a link 3 % too long; of a ram, its platform point 3 % too far out."""
     leg = case.drawn.legs[case.actuator]
     if hasattr(leg, "lower_length"):
-        _with_leg(case, lower_length=1.03 * leg.lower_length)
+        _with_leg(case, lower_length=(1.0 + 0.03 * case.size) * leg.lower_length)
     else:
-        _with_leg(case, platform_point=tuple(1.03 * np.array(leg.platform_point)))
+        _with_leg(
+            case, platform_point=tuple((1.0 + 0.03 * case.size) * np.array(leg.platform_point))
+        )
 
 
 def passive(case: Case) -> None:
     """Let the joints between crank, rod and platform have viscous friction."""
     bare = forces_like(case)
     with_one = forces_like(case, passive=1.0)
-    share = 0.1 * case.motion.load.std(axis=0).mean() / (with_one - bare).std(axis=0).mean()
+    share = (
+        0.1 * case.size * case.motion.load.std(axis=0).mean() / (with_one - bare).std(axis=0).mean()
+    )
     case.forces = case.forces + share * (with_one - bare)
 
 
 def load_friction(case: Case) -> None:
     """Let friction grow with the load: 8 % of it."""
-    case.forces = case.forces + 0.08 * np.abs(case.motion.load) * np.sign(case.motion.rates)
+    case.forces = case.forces + 0.08 * case.size * np.abs(case.motion.load) * np.sign(
+        case.motion.rates
+    )
 
 
 def flexible(case: Case) -> None:
     """Measure motors ahead of their joints, by a transmission that gives."""
     inertia = case.motion.load.std(axis=0) / case.motion.accelerations.std(axis=0)
-    case.joints = case.joints + case.motion.load / (inertia * (2.0 * np.pi * 15.0) ** 2)
+    case.joints = case.joints + case.size * case.motion.load / (inertia * (2.0 * np.pi * 15.0) ** 2)
 
 
 def payload(case: Case) -> None:
     """Carry a payload that nobody declares in the second half: 30 % of the platform's mass."""
-    mass = 0.3 * case.drawn.platform.inertia.mass
+    mass = 0.3 * case.size * case.drawn.platform.inertia.mass
     carrying = forces_like(case, payload=mass) - forces_like(case)
     case.forces = case.forces + carrying * (case.time > case.time.mean())[:, None]
 
 
 def quantised(case: Case) -> None:
     """Round forces to steps of 5 % of their deviation."""
-    step = 0.05 * case.forces.std(axis=0)
+    step = 0.05 * case.size * case.forces.std(axis=0)
     case.forces = np.round(case.forces / step) * step
 
 
 def forces_like(case: Case, *, passive: float = 0.0, payload: float = 0.0) -> Array:
     """Return the plant's forces along the case's motion, with passive friction or a payload."""
-    seed, scale = _SEEDS[id(case.motion)]
     plant = replace(case.plant, passive=passive)
-    return moved(plant, seed, payload=payload, scale=scale).forces
+    return moved(plant, case.seed, payload=payload).forces
 
-
-_SEEDS: dict[int, tuple[int, float]] = {}
 
 MACHINE = ("passive", "load friction", "flexible")
 """Faults that the machine itself has: the true forces have them too."""
@@ -579,7 +655,7 @@ FAULTS: dict[str, tuple[Callable[[Case], None], str]] = {
     "passive friction": (passive, "[Pp]assive"),
     "load friction": (load_friction, "with the load"),
     "flexible": (flexible, "drives (that )?give|flexib"),
-    "payload": (payload, "payload|changes during"),
+    "payload": (payload, "as a payload"),
     "quantised": (quantised, "quanti|steps"),
 }
 """Each with the words that name its cause."""
@@ -597,12 +673,11 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 def case_of(plant: Plant, fault: str, seed: int) -> Case:
     """Return the case of one motion of a plant, with a fault, or "none"."""
     motion = moved(plant, seed)
-    _SEEDS[id(motion)] = (seed, 1.0)
     rng = np.random.default_rng((seed, list(FAULTS).index(fault) if fault in FAULTS else 99))
     n = motion.joints.shape[1]
     actuator = seed % n
     about = motion.time, motion.joints, motion.forces
-    return Case(plant, plant.drawn, motion, rng, actuator, *about)
+    return Case(plant, plant.drawn, motion, rng, actuator, *about, seed=seed)
 
 
 def recorded(case: Case, fault: str, source: str) -> Log:
@@ -610,12 +685,14 @@ def recorded(case: Case, fault: str, source: str) -> Log:
     if fault in FAULTS:
         FAULTS[fault][0](case)
     size = case.motion.forces.std(axis=0)
-    case.forces = case.forces + NOISE * size * case.rng.normal(size=case.forces.shape)
+    noise = case.plant.conditions.noise * size
+    case.forces = case.forces + noise * case.rng.normal(size=case.forces.shape)
     if fault == "quantised":
         quantised(case)
     joints = np.round(case.joints / case.plant.encoder) * case.plant.encoder
     symbols = tuple(leg.joint for leg in case.drawn.legs)
-    return Log(source, case.time, joints, case.forces, symbols=symbols)
+    time = case.plant.conditions.begin + case.time
+    return Log(source, time, joints, case.forces, symbols=symbols)
 
 
 HIDDEN = "These logs cannot show"
@@ -700,7 +777,7 @@ class Faultless:
     accused: tuple[str, ...]
 
 
-def faultless(plant: Plant, count: int) -> Faultless:
+def faultless(plant: Plant, count: int, first: int = 3000) -> Faultless:
     """Return what `identify` says of so many logs without a fault.
 
     The true values are those of a log without noise, which is exact.
@@ -712,7 +789,7 @@ def faultless(plant: Plant, count: int) -> Faultless:
     ]
     truth = identify(plant.drawn, exact[0], held_out=exact[1]).estimate.values
     within, intervals, accused = 0, 0, []
-    for seed in range(3000, 3000 + count):
+    for seed in range(first, first + count):
         pair = [case_of(plant, "none", seed + k) for k in (0, 1000)]
         for k, case in enumerate(pair):
             case.rng = np.random.default_rng((seed, k, 5))
@@ -812,6 +889,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("plants", nargs="*")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--faults", nargs="*", default=["none", *FAULTS])
     parser.add_argument("--faultless", action="store_true")
     parser.add_argument("--quick", action="store_true")
@@ -824,7 +902,7 @@ def main() -> None:
         rows = []
         for name in names:
             for fault in given.faults:
-                for seed in range(1, given.seeds + 1):
+                for seed in range(given.first, given.first + given.seeds):
                     rows.append(row_of(name, fault, seed))
                     print(rows[-1], flush=True)
         print_summary(rows)

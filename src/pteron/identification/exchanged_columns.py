@@ -218,14 +218,20 @@ def _orders(n: int) -> list[tuple[int, ...]]:
     """Return the orders of n joints that are tried, those of fewest exchanges first.
 
     Of two orders that explain equally well, the simpler one is right. Of many joints not all 719 or
-    more are tried, each with poses of its own, but exchanges of two, shifts and the reverse.
+    more are tried, each with poses of its own, but exchanges of two, of all neighbours in pairs,
+    shifts and the reverse.
     """
     usual = tuple(range(n))
     if n <= _ALL_ORDERS:
         return sorted(permutations(usual), key=_exchanges)[1:]
     shifts = [usual[k:] + usual[:k] for k in range(1, n)]
     pairs = [tuple({i: j, j: i}.get(k, k) for k in usual) for i, j in combinations(usual, 2)]
-    return [*pairs, *shifts, usual[::-1]]
+    couples = [(i, (i + 1) % n) for i in usual[: n - n % 2]]
+    neighbours = [
+        tuple(dict((*some, *((j, i) for i, j in some))).get(k, k) for k in usual)
+        for some in (couples[::2], couples[1::2])
+    ]
+    return [*pairs, *neighbours, *shifts, usual[::-1]]
 
 
 def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[ColumnFault]:

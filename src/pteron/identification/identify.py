@@ -21,7 +21,7 @@ from pteron.identification.estimators import (
     weighted,
 )
 from pteron.identification.faults import delay_of, isolate_faults
-from pteron.identification.faults.assumptions import contradicted, exchangeable_legs
+from pteron.identification.faults.assumptions import contradicted, hidden_orders
 from pteron.identification.faults.fault import is_half, of_held_forces
 from pteron.identification.faults.log_faults import log_faults, lost_share, of_delay
 from pteron.identification.fitting import (
@@ -140,10 +140,15 @@ def identify(
     except (DataError, ModelError) as error:
         # No pose, or values that are no machine's: an assumption of its file may be wrong.
         because = _refusal_cause(robot, logs, processing or Processing(), error)
-        if because:
-            place = f"{error.place}: " if isinstance(error, LogError) else ""
-            error.args = (f"{place}{because} ({str(error).removeprefix(place)})",)
+        _name_cause(error, [because] if because else [])
         raise
+
+
+def _name_cause(error: DataError | ModelError, causes: Sequence[str]) -> None:
+    """Put the first of causes at the beginning of an error's message, if there is one."""
+    for cause in causes[:1]:
+        place = f"{error.place}: " if isinstance(error, LogError) else ""
+        error.args = (f"{place}{cause.rstrip('.')} ({str(error).removeprefix(place)})",)
 
 
 def _determined(
@@ -275,11 +280,20 @@ def _identified(
                 if assumption is not None:
                     raise fit[0].log.fault("contradicted", assumption.message.rstrip("."))
                 check_columns(model, fit[0], preprocessing[0], decisive=distorted)
-            check_motion(model, bare, preprocessing, fit[0])
+            isolate = partial(
+                isolate_faults, model, estimate, fit, preprocessing, reflected_inertia(rotors)
+            )
+            try:
+                check_motion(model, bare, preprocessing, fit[0])
+            except LogError as error:
+                if left_over(bare, preprocessing):
+                    _name_cause(error, isolate(drawn=drawn_values).causes)
+                raise
         report("Looking for faults", 0, 0)
-        faults = isolate_faults(
-            model, estimate, fit, preprocessing, reflected_inertia(rotors), drawn=drawn_values
-        )
+        faults = isolate(drawn=drawn_values)
+        if faults.matters and not distorted:
+            of_log = log_faults(heads, preprocessing, lost, fits=trusted, doubtful=True)
+            distorted = any(one.distorts for one in of_log)
         if late or given is not None or not faults.late:
             break
         # A delay changes values: fit again with it.
@@ -309,7 +323,7 @@ def _identified(
         repeats=not others,
         log=of_log,
         factor=factor,
-        exchangeable=exchangeable_legs(robot, heads[0], preprocessing[0]),
+        hidden_orders=hidden_orders(robot, heads[0], preprocessing[0]),
         followed=_followed(model.terms, estimator),
         left=left_over(estimate, preprocessing),
     )

@@ -164,7 +164,7 @@ def common_factor(
         return 1.0
     factor = float(forces @ as_drawn) / power
     spread = float(np.linalg.norm(forces - factor * as_drawn))
-    if spread > _TOLD * float(np.linalg.norm(forces)):
+    if factor <= 0.0 or spread > _TOLD * float(np.linalg.norm(forces)):
         return 1.0
     return 1.0 if 1.0 / _APART < factor < _APART else factor
 

@@ -44,6 +44,9 @@ _SEEN = 0.5
 """Difference of the nearest real bodies' forces, percent, from which that distance counts: without
 noise the standard deviations are near zero."""
 
+_TAKEN_IN = "where a log cannot show that, other values take in what it does"
+"""The harm of a fault that a log cannot show."""
+
 _HIDDEN: dict[str, tuple[str, str]] = {
     "gain": (
         "These logs cannot show a factor that all forces have in common (gains, rated torque, gear "
@@ -60,6 +63,30 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "These logs cannot show that one force is out of scale by some per cent: its own values "
         "grow with it, and what it shares with other forces is small beside the noise.",
         "Check each drive's gain by itself, or move more coordinates at once, and faster.",
+    ),
+    "ratio": (
+        "These logs cannot show a gear ratio, lead or pulley of the joints that is off by 5 %.",
+        f"Measure how far the joints move for a number of turns or counts: {_TAKEN_IN}.",
+    ),
+    "zero": (
+        "These logs cannot show a joint's zero that is off by 3 degrees, or 2 % of a leg's size.",
+        f"Check the joints' zeros, or record a larger or faster motion: {_TAKEN_IN}.",
+    ),
+    "geometry": (
+        "These logs cannot show lengths or points of the geometry that are off by 1 %.",
+        f"Measure the geometry, or record a larger or faster motion: {_TAKEN_IN}.",
+    ),
+    "elasticity": (
+        "These logs cannot show drives that give (a resonance at 10 Hz).",
+        f"Measure positions behind the drives, or record a faster motion: {_TAKEN_IN}.",
+    ),
+    "load": (
+        "These logs cannot show friction that grows with the load, by 5 % of it.",
+        f"Record a longer motion, or forces with less noise: {_TAKEN_IN}.",
+    ),
+    "passive": (
+        "These logs cannot show friction in the passive joints of 5 % of the load.",
+        f"Record a faster or longer motion, or forces with less noise: {_TAKEN_IN}.",
     ),
     "play": (
         "Play in the drives would not be seen: the load of none changes its direction often "
@@ -94,7 +121,7 @@ def verdict_of(
     repeats: bool,
     log: Sequence[LogFault] = (),
     factor: float = 1.0,
-    exchangeable: Sequence[str] = (),
+    hidden_orders: str = "",
     followed: frozenset[str] = frozenset(),
     left: str = "",
 ) -> Verdict:
@@ -114,8 +141,8 @@ def verdict_of(
     factor : float
         Forces of the bodies over those of the drawing; other than 1 it is "usable with care" at
         best.
-    exchangeable : sequence of str
-        Pairs of legs whose exchange the logs do not show.
+    hidden_orders : str
+        A sentence on orders of the legs that the logs do not show; empty without any.
     followed : frozenset of str
         Options whose advice is followed already, and not given again.
     left : str
@@ -139,11 +166,8 @@ def verdict_of(
         found.steps += one.steps
     if left and found.grade != "trustworthy" and not (faults is not None and faults.causes):
         found.add(f"{left[0].upper()}{left[1:]}.")
-    if exchangeable:
-        found.add(
-            f"These logs cannot show whether legs {', or '.join(exchangeable)}, are exchanged in "
-            "the file: as mirror images of each other they explain the forces as well."
-        )
+    if hidden_orders:
+        found.add(hidden_orders)
     if repeats:
         found.add(
             "What was held out repeats the motion that was fitted: it tells of noise and drift, "
@@ -269,7 +293,7 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
     worst = int(np.argmax(shown.off))
     off = float(shown.off[worst])
     found.add(
-        f"A pick-and-place cycle as fast as this motion is expected to be up to "
+        f"A pick-and-place cycle, or another motion as fast as this one, is expected to be up to "
         f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
         "not.",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, permutations
 from typing import Literal
 
 import numpy as np
@@ -40,8 +40,15 @@ _EXPLAINED = 0.03
 """Share of the forces that may be left for them to count as explained, or three times their noise:
 with all parameters free other machines' logs leave 10 % or more."""
 
+_EXPLAINED_ALONE = 0.06
+"""The same where the joints have no poses as the file has it: few assumptions give them any."""
+
 _AS_GOOD = 1.3
 """Residual, over the least one, up to which the assumption that comes first is taken."""
+
+_AT_NOISE, _AS_GOOD_AT_NOISE = 1.15, 1.05
+"""Least residual, over the forces' noise, that is noise alone, and the residual over it up to which
+another assumption is as good then: of 800 equations with the same noise a wrong one leaves more."""
 
 _FACTORS = (0.5, 2.0)
 """Factors of gear ratios: double and half leads and counts. With smaller ones joints hardly move,
@@ -55,6 +62,15 @@ _MODES = 16
 
 _FEW_LEGS = 4
 """Legs up to which exchanges of two are all that symmetry allows."""
+
+_MOST_LEGS = 7
+"""Legs up to which symmetries are looked for, in 5040 orders."""
+
+_POINTS = ("guide_point", "platform_point")
+"""Points of legs that a symmetry leads to those of other legs."""
+
+_ALIKE = 0.01
+"""Difference of distances of points, over the largest, up to which they count as the same."""
 
 AssumptionName = Literal["ratio", "gravity", "mode"]
 
@@ -107,7 +123,8 @@ def contradicted(
         return None
     before = _left(robot, samples)
     noise = how.force_noise / np.maximum(samples.forces.std(axis=0), 1e-300)
-    explained = max(_EXPLAINED, 3.0 * float(noise.max()))
+    least = _EXPLAINED if np.isfinite(before) else _EXPLAINED_ALONE
+    explained = max(least, 3.0 * float(noise.max()))
     if before < explained:
         return None
     tried: list[Assumption] = []
@@ -118,28 +135,64 @@ def contradicted(
     if not tried:
         return None
     least = min(one.after for one in tried)
-    first = next(one.fault for one in tried if one.after <= _AS_GOOD * least)
+    at_noise = least <= _AT_NOISE * float(noise.max())
+    as_good = (_AS_GOOD_AT_NOISE if at_noise else _AS_GOOD) * least
+    first = next(one.fault for one in tried if one.after <= as_good)
     return min((one for one in tried if one.fault == first), key=lambda one: one.after)
 
 
-def exchangeable_legs(robot: Manipulator, log: Log, how: Preprocessing) -> tuple[str, ...]:
-    """Return pairs of legs, as words, whose exchange in the machine's file a log does not show.
+def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
+    """Return a sentence on other orders of the legs that a log does not show; empty if none.
 
     Mirror images of each other, for instance: another machine, mirrored, explains the forces as
-    well. Machines of more than four legs have more exchanges than are tried.
+    well. Of few legs exchanges of two are tried, of more the orders that symmetry allows.
     """
     count = len(robot.legs)
     samples = _samples(log, how, np.zeros(count))
-    if samples is None or count > _FEW_LEGS:
-        return ()
-    before, pairs = _left(robot, samples), []
-    for i, j in combinations(range(count), 2):
-        order = list(range(count))
-        order[i], order[j] = j, i
-        parts = {k: v[:, order] for k, v in vars(samples).items() if k != "start"}
+    if samples is None:
+        return ""
+    usual = tuple(range(count))
+    if count <= _FEW_LEGS:
+        pairs = combinations(usual, 2)
+        orders = [tuple({i: j, j: i}.get(k, k) for k in usual) for i, j in pairs]
+    else:
+        orders = _symmetries(robot)
+    before = _left(robot, samples) if orders else np.inf
+    hidden = []
+    for order in orders:
+        parts = {k: v[:, list(order)] for k, v in vars(samples).items() if k != "start"}
         if _left(robot, replace(samples, **parts)) <= _AS_GOOD * before:
-            pairs.append(f"{i + 1} and {j + 1}")
-    return tuple(pairs)
+            hidden.append(order)
+    if not hidden:
+        return ""
+    if count <= _FEW_LEGS:
+        pairs_of = (" and ".join(str(k + 1) for k in usual if o[k] != k) for o in hidden)
+        return (
+            f"These logs cannot show whether legs {', or '.join(pairs_of)}, are exchanged in the "
+            "file: as mirror images of each other they explain the forces as well."
+        )
+    names = ", or ".join("-".join(str(k + 1) for k in order) for order in hidden)
+    return (
+        f"These logs cannot show whether the legs are in another order, {names}: mirrored or "
+        "turned the machine explains the forces as well."
+    )
+
+
+def _symmetries(robot: Manipulator) -> list[tuple[int, ...]]:
+    """Return the orders of the legs in which guide and platform points have the same distances."""
+    count = len(robot.legs)
+    if count > _MOST_LEGS:
+        return []
+    points = [np.array([getattr(leg, name, np.nan) for leg in robot.legs]) for name in _POINTS]
+    distances = [np.linalg.norm(p[:, None] - p, axis=-1) for p in points]
+    limits = [_ALIKE * d.max() for d in distances]
+    found = []
+    for order in permutations(range(count)):
+        rows = np.ix_(order, order)
+        pairs = zip(distances, limits, strict=True)
+        if all(np.abs(d[rows] - d).max() <= limit for d, limit in pairs):
+            found.append(order)
+    return found[1:]
 
 
 def _sentence(message: tuple[str, str], before: float, after: float) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +27,39 @@ from pteron.manipulator import Manipulator
 _STRIBECK = (0.05, 0.15, 0.4)
 """Speeds at which friction may fall, over each joint's root mean square: all are tried."""
 
+_EIGHTHS = tuple(f"the {k} eighth" for k in ("1st", "2nd", "3rd", *(f"{n}th" for n in range(4, 9))))
+"""Parts of a log in which the platform may carry another mass."""
+
+_LENGTH = 0.01
+"""Usual error of a length, over the legs' size: a larger one is more likely another fault."""
+
+_ZERO_OF_SLIDE, _ZERO_OF_CRANK = 0.02, 0.05
+"""Usual errors of a zero: a share of the leg's size, and rad (3 degrees, a tooth of a belt's
+pulley)."""
+
+_RATIO = 0.05
+"""Usual error of a ratio, as by a pulley with a tooth more."""
+
+_NEGLIGIBLE = 1e-3
+"""Errors of ratios, of lengths over the legs' size, and of zeros, rad, that every machine has: the
+bias of smoothed positions next to singularities looks like up to 0.7 of them."""
+
+_LIGHT = 0.1
+"""Payload, over the platform's mass, that is none: it varies with time as freely as the bias of
+positions next to singularities, which looks like up to 0.09 of it."""
+
 _DRY = ("coulomb", "stribeck")
 """Kinds of terms that jump where a joint turns round."""
+
+
+class Tolerance(NamedTuple):
+    """The usual size of a fault, 0 where it is not known, and the size up to which it is none."""
+
+    usual: float = 0.0
+    negligible: float = 0.0
+
+
+_UNKNOWN = Tolerance()
 
 
 @dataclass(frozen=True)
@@ -55,6 +87,13 @@ class Family:
         Speed with which friction falls, over the usual one.
     exact : bool
         Whether its columns have sizes as large as they may be, not to first order.
+    tolerance : Tolerance
+        The sizes that such a fault usually has.
+    free : bool
+        Whether its sizes vary with time as they like, so that it must explain all that noise does
+        not: part of other faults' residuals it always explains.
+    of_path : bool
+        Whether its columns are made of derivatives by time, of states one after the other.
     effect : callable, optional
         Returns how the machine's forces change, where that is otherwise than those of the log: by a
         clock that is off all inertia is, and with it the mass that weighs.
@@ -69,6 +108,9 @@ class Family:
     largest: float = np.inf
     speed: float | None = None
     exact: bool = False
+    tolerance: Tolerance = _UNKNOWN
+    free: bool = False
+    of_path: bool = False
     effect: Callable[[FittedMotion], Array] | None = None
 
     def of_cycle(self, motion: FittedMotion) -> Array:
@@ -103,6 +145,16 @@ def _elasticity(m: FittedMotion) -> Array:
 def _drift(m: FittedMotion) -> Array:
     later = m.along[:, None]
     return np.concatenate([diagonal(later * d) for d in (m.direction, m.direction**0)], axis=-1)
+
+
+def _payload(m: FittedMotion) -> Array:
+    """Return the forces (R, n, k) of 1 kg at the platform's point in each eighth of the log."""
+    s, kinds = m.states, m.model.robot.platform.inertia.kinds
+    regressor = unchecked(m.model.robot, "regressor", s.pose, s.velocity, s.acceleration)
+    of_mass = regressor[..., regressor.shape[-1] - len(kinds) + kinds.index("m")]
+    count = len(_EIGHTHS)
+    eighth = np.clip(((m.along + 0.5) * count).astype(int), 0, count - 1)
+    return np.asarray(of_mass[..., None] * np.eye(count)[eighth][:, None, :])
 
 
 def _weight(m: FittedMotion) -> Array:
@@ -143,17 +195,11 @@ _OTHERS = (
         largest=3.0,
         effect=lambda m: _load(m)[..., None],
     ),
-    Family(
-        "geometry",
-        "m",
-        lambda m: [f"leg {leg + 1}" for leg, _ in lengths_of(m.robot)],
-        lambda m: m.by_lengths,
-    ),
     *(
         Family("stribeck", "N", _forces, partial(_stribeck, share), positive=True, speed=share)
         for share in _STRIBECK
     ),
-    Family("elasticity", "m/N", _forces, _elasticity, positive=True),
+    Family("elasticity", "m/N", _forces, _elasticity, positive=True, of_path=True),
     Family("drift", "N", lambda m: [*_forces(m), *_forces(m)], _drift),
     Family("load", "", _forces, lambda m: diagonal(m.direction * np.abs(_load(m))), positive=True),
     Family("passive", "N m s", _passive_legs, _passive, positive=True),
@@ -181,9 +227,13 @@ def families_of(model: Model) -> tuple[Family, ...]:
         own = identification_model(model.robot, with_rotors, base=model.base).kept_terms
         rotors = [_ROTORS] * any(term.kind == "rotor" for term in own)
     drives = (_scale(i) for i in range(count))
-    joints = (one for i in range(count) for one in (_ratio((i,)), _zero(i)))
-    legs = (_leg_geometry(i) for i in range(len(model.robot.legs)))
-    return (DELAY, *drives, _ratio(range(count)), *joints, *legs, *_OTHERS, *rotors)
+    joints = (one for i in range(count) for one in (_ratio((i,)), _zero(model.robot, i)))
+    legs = range(len(model.robot.legs))
+    geometry = (_geometry(model.robot, some) for some in (*((i,) for i in legs), legs))
+    light = Tolerance(negligible=_LIGHT * model.robot.platform.inertia.mass)
+    payload = Family("payload", "kg", lambda m: _EIGHTHS, _payload, tolerance=light, free=True)
+    known = (*drives, _ratio(range(count)), *joints, *geometry)
+    return (DELAY, *known, *_OTHERS, payload, *rotors)
 
 
 def _ratio(joints: Sequence[int]) -> Family:
@@ -198,29 +248,41 @@ def _ratio(joints: Sequence[int]) -> Family:
         names = [model.robot.joint_names[i] for i in some]
         return names if len(names) == 1 else ["all joints"]
 
-    return Family("ratio", "", sizes, columns, of_machine=False, largest=1.0)
+    about = Tolerance(_RATIO, _NEGLIGIBLE)
+    return Family("ratio", "", sizes, columns, of_machine=False, largest=1.0, tolerance=about)
 
 
-def _zero(i: int) -> Family:
-    one = slice(i, i + 1)
+def length_tolerance(robot: Manipulator) -> Tolerance:
+    """Return the usual and the negligible errors of a machine's lengths, m."""
+    size = float(np.mean([leg.size for leg in robot.legs]))
+    return Tolerance(_LENGTH * size, _NEGLIGIBLE * size)
+
+
+def _zero(robot: Manipulator, i: int) -> Family:
+    one, leg = slice(i, i + 1), robot.legs[i]
+    slides = leg.joint.unit == "m"
+    usual = _ZERO_OF_SLIDE * leg.size if slides else _ZERO_OF_CRANK
+    tolerance = Tolerance(usual, _NEGLIGIBLE * (leg.size if slides else 1.0))
     return Family(
         "zero",
         "",
         lambda model: model.robot.joint_names[one],
         lambda m: m.by_zeros[..., one],
         of_machine=False,
+        tolerance=tolerance,
     )
 
 
-def _leg_geometry(i: int) -> Family:
-    def some(robot: Manipulator) -> list[int]:
-        return [k for k, (leg, _) in enumerate(lengths_of(robot)) if leg == i]
-
+def _geometry(robot: Manipulator, legs: Sequence[int]) -> Family:
+    lengths = lengths_of(robot)
+    places = [k for k, (leg, _) in enumerate(lengths) if leg in legs]
+    labels = [f"leg {lengths[k][0] + 1}" for k in places]
     return Family(
         "geometry",
         "m",
-        lambda m: [f"leg {i + 1}" for _ in some(m.robot)],
-        lambda m: m.by_lengths[..., some(m.model.robot)],
+        lambda m: labels,
+        lambda m: m.by_lengths[..., places],
+        tolerance=length_tolerance(robot),
     )
 
 

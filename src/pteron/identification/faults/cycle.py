@@ -13,6 +13,7 @@ from pteron.errors import PteronError
 from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion, home
 from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion, pick_and_place
 
@@ -46,10 +47,14 @@ class Extent(NamedTuple):
 
 @dataclass(frozen=True)
 class ReferenceCycle:
-    """States of a cycle, and where each joint moves (R, n)."""
+    """States of a cycle, and where each joint moves (R, n).
+
+    They may be `in_order`, one after the other, or each by itself.
+    """
 
     states: States
     moves: NDArray[np.bool_]
+    in_order: bool = True
 
     @classmethod
     def within(
@@ -74,6 +79,29 @@ class ReferenceCycle:
             rates = np.abs(gone.rates)
             return cls(States.of(motion.time, gone), rates > _MOVES * rates.max(axis=0))
         return None
+
+    @classmethod
+    def shuffled(cls, robot: Manipulator, states: list[States]) -> ReferenceCycle:
+        """Return states of another motion with the range, speeds and accelerations of a log's.
+
+        Each coordinate is that of another sample, and so is its rate. Poses out of the legs' reach
+        are left out.
+        """
+        rng = np.random.default_rng(0)
+        motion = []
+        for name in ("pose", "velocity", "acceleration"):
+            log = np.concatenate([getattr(s, name) for s in states])
+            rows = rng.integers(len(log), size=(_SAMPLES, log.shape[1]))
+            motion.append(np.take_along_axis(log, rows, axis=0))
+        whole = FullMotion.of_platform(robot, *motion)
+        # A slider's motion is finite out of the legs' reach too; that of the links is not.
+        within = np.isfinite(unchecked(robot, "regressor", *motion)).all(axis=(1, 2))
+        within &= np.isfinite(np.hstack(whole)).all(axis=1)
+        whole = FullMotion(*(np.ascontiguousarray(part[within]) for part in whole))
+        rates = np.abs(whole.rates)
+        time = np.arange(len(rates), dtype=float)
+        moves = rates > _MOVES * rates.max(axis=0, initial=0.0)
+        return cls(States.of(time, whole), moves, in_order=False)
 
     def share(self, error: Array, forces: Array) -> Array:
         """Return the size of an error (R, n), percent of the forces' standard deviation (n,)."""

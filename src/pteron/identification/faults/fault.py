@@ -21,6 +21,7 @@ FaultName = Literal[
     "geometry",
     "stribeck",
     "elasticity",
+    "payload",
     "drift",
     "load",
     "passive",
@@ -29,12 +30,13 @@ FaultName = Literal[
 ]
 """Faults by name: forces that are late, the scale of one force, the gear ratio of one joint or of
 all, the zero of one, the scale of all forces, the direction of gravity, its size or the rate of the
-clock, lengths, friction that falls with speed, elastic drives, drifting friction or offsets,
-friction that grows with load, friction in passive joints, motors' inertia, drives with play."""
+clock, lengths, friction that falls with speed, elastic drives, a payload that is picked up or put
+down, drifting friction or offsets, friction that grows with load, friction in passive joints,
+motors' inertia, drives with play."""
 
 ORDER: tuple[FaultName, ...] = (
     *("delay", "clock", "gain", "scale", "ratio", "zero", "gravity", "geometry"),
-    *("play", "elasticity", "rotors", "drift", "stribeck", "load", "passive"),
+    *("play", "elasticity", "rotors", "payload", "drift", "stribeck", "load", "passive"),
 )
 """The order in which faults are mended, and named: what comes first distorts what comes later."""
 
@@ -72,6 +74,8 @@ _SENTENCES = {
     "{shown_leg}",
     "stribeck": "Friction falls with speed, most clearly at {clearest}",
     "elasticity": "The drives give, most clearly under {clearest}",
+    "payload": "The platform carries about {mass:.2g} kg more in {most} of the log than in "
+    "{least}, as a payload that nobody declared",
     "drift": "Friction or offset changes during the log, most clearly at {clearest}",
     "load": "Friction grows with the load, most clearly at {clearest}",
     "passive": "Passive joints have friction, most clearly in {clearest}",
@@ -92,6 +96,7 @@ _IN_WORDS: dict[FaultName, str] = {
     "geometry": "lengths or points of the geometry",
     "stribeck": "friction that falls with speed",
     "elasticity": "drives that give",
+    "payload": "a payload during a part of the log",
     "drift": "friction that changes during the log",
     "load": "friction that grows with the load",
     "passive": "friction of passive joints",
@@ -112,6 +117,7 @@ _REMEDY: dict[FaultName, str] = {
     "stribeck": "--stribeck auto finds its speeds, and adds it to the model; slow passages, which "
     "pteron excite --stribeck writes, show them best. It hides a delay: take --delay auto with it",
     "elasticity": "measure positions behind the drive, or move more slowly",
+    "payload": "declare it in a payload column (--payload), or record without it",
     "drift": "warm the machine up, or record shorter",
     "load": "no term of the model has it: keep to loads like those of the log",
     "passive": "--joints each adds it to the model",
@@ -240,10 +246,15 @@ class IsolatedFault:
         clock = max(1.0 + first, 1e-300) ** -0.5 - 1.0
         whole = self.labels[0] == "all joints"
         clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
+        # Of the eighths of a log that filters cut off nothing is known.
+        seen = np.flatnonzero(self.deviations) if self.fault == "payload" else np.array([0])
         return _SENTENCES[told].format(
             label=self.labels[0],
             labels=", ".join(self.labels),
             times=float(self.sizes.max()),
+            mass=float(np.ptp(self.sizes[seen])),
+            most=self.labels[int(seen[np.argmax(self.sizes[seen])])],
+            least=self.labels[int(seen[np.argmin(self.sizes[seen])])],
             clearest=self.labels[clearest],
             late=late,
             early=early,

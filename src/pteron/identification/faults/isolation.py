@@ -15,13 +15,14 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
 from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
+from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import Record, knocks
-from pteron.identification.faults.search import FoundFault, cannot_be_told, searched
+from pteron.identification.faults.search import FoundFault, searched
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations, in_motion, observations_of, stacked
-from pteron.identification.plausibility import factor_of_forces, known_values
+from pteron.identification.plausibility import Factor, factor_of_forces, known_values
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import (
     Preprocessing,
@@ -75,16 +76,19 @@ class FaultIsolation:
     faults : tuple of IsolatedFault
         The faults that show and change a reference cycle by 0.05 % or more, the clearest first.
     uncertain : array, shape (n,)
-        Error of the forces in a pick-and-place cycle that the values' covariance allows, percent of
-        the forces' standard deviation; NaN where no cycle fits into the machine's workspace.
+        Error of the forces in a pick-and-place cycle, or in another motion of the logs' range where
+        it is larger, that the values' covariance allows, percent of the forces' standard deviation;
+        NaN where no cycle fits into the machine's workspace.
     spoiled : array, shape (n,)
-        Error that all faults together make in the same cycle, percent.
+        Error that all faults together make in the same motions, percent.
     why_not : str
         The reason why no fault was tried; empty where some were.
-    hidden : tuple of {"gain", "clock", "scale", "play"}
-        Faults that these logs cannot show: by the rank of their equations a common factor of all
-        forces, a clock at another rate, a wrong scale of one force; and play, where no drive's load
-        changes direction often enough.
+    hidden : tuple of str
+        Faults that these logs cannot show: by the rank of their equations "gain", a common factor
+        of all forces, "clock", at another rate, "scale", of one force; "ratio", "zero", "geometry",
+        "elasticity", "load" and "passive", where a usual one changes the forces of another motion
+        by more than is trusted before it is told; and "play", where no drive's load changes
+        direction often enough.
     late : bool
         Whether forces are late for positions, or early; in a log without noise this changes values,
         even if too little to be named.
@@ -169,7 +173,8 @@ def isolate_faults(
 
     Each fault adds columns to the regressor (`families_of`). Those whose sizes the data tell from
     zero join the fit one after the other, the clearest first. The errors that they make are
-    computed on a pick-and-place cycle as fast as the logs' motion.
+    computed on a pick-and-place cycle as fast as the logs' motion, and on states of another motion
+    of their range.
 
     Parameters
     ----------
@@ -204,63 +209,20 @@ def _isolated(
     known: Mapping[str, float],
     drawn: DrawnValues | None,
 ) -> FaultIsolation:
-    nothing = np.full(model.robot.joint_count, np.nan)
     columns = parts[0].model
-    largest = max(float(np.abs(part.log.forces).max()) for part in parts)
+    noise = np.mean([part.how.force_noise for part in parts], axis=0)
 
-    # Which faults the residuals show
     def observed(some: Sequence[_Part]) -> Observations:
         rows = _observed(some)
         return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
 
     observations = observed(parts)
-    noise = np.mean([part.how.force_noise for part in parts], axis=0)
-    left_open = cannot_be_told(columns, observations, noise)
-    exact = np.abs(estimate.residuals).max() < _EXACT * largest
-    plain, found = searched(columns, observations, () if exact else None, noise)
-    if any(one.family is DELAY for one in found):
-        # Columns hold for small delays: other faults are sought after a long one is corrected.
-        late, shifted = _delay(parts, observed)
-        rest = tuple(one for one in columns.families if one is not DELAY)
-        fit, found = _searched_for(rest, shifted, observed)
-        if late is not None:
-            found.insert(0, replace(late, fit=fit))
-
-    # The errors that they make on a cycle
-    p = len(model.names)
-    cycle = ReferenceCycle.within(
-        model.robot, Extent.of([s for part in parts for s in part.states])
-    )
-    uncertain, spoiled, each = nothing, nothing, [nothing for _ in found]
-    if cycle is not None:
-        motion = columns.motion(cycle.states, np.full(len(cycle.states), 0.5))
-        matrix = motion.matrix
-        forces = [matrix @ plain.values]
-        for one in found:
-            with_fault = matrix @ one.fit.values[:p]
-            for family, sizes in (*one.others, (one.family, one.sizes)):
-                if family.of_machine:
-                    with_fault = with_fault + family.of_cycle(motion) @ sizes
-            forces.append(with_fault)
-        each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
-        spoiled = cycle.share(forces[-1] - forces[0], forces[0])
-        # A fault that is not named adds to the residuals, and so to the covariance.
-        covariance = found[-1].fit.covariance[:p, :p] if found else estimate.covariance
-        variance = np.einsum("rnp,pq,rnq->rn", matrix, covariance, matrix, optimize=True)
-        uncertain = cycle.share(np.sqrt(np.maximum(variance, 0.0)), forces[0])
-    fits = [plain, *(one.fit for one in found)]
-    shifts = [
-        float(np.abs((b.values[:p] - a.values[:p]) / b.deviations[:p]).max())
-        for a, b in pairwise(fits)
-    ]
+    plain, found = _found_faults(parts, observations, observed, estimate, noise)
+    states = [s for part in parts for s in part.states]
+    other = ReferenceCycle.shuffled(model.robot, states)
+    uncertain, spoiled, each = _expected_errors(columns, states, other, estimate, plain, found)
     step = 1.0 / max(part.how.rate for part in parts)
-    faults = []
-    for one, shift, spoils in zip(found, shifts, each, strict=True):
-        if not (spoils < _NAMED).all():
-            family, seen = one.family, (one.sizes, one.deviations, one.chance, shift, spoils)
-            speeds = None if family.speed is None else family.speed * columns.usual
-            labels = tuple(family.sizes(model))
-            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, one.as_well))
+    faults = _named_faults(columns, plain, found, each, step)
 
     # Play, which no column has
     play, looked = _play(parts, estimate.values, step)
@@ -268,28 +230,145 @@ def _isolated(
         faults.insert(0, play)
         spoiled = np.hypot(spoiled, play.cycle)
 
-    # The scales of all forces and of time, which the residuals cannot show
-    tried = (*dict.fromkeys(family.name for family in columns.families), *["play"] * looked)
-    if not looked:
-        left_open.append("play")
-    factor = factor_of_forces(model, fits[-1], known)
-    if factor is not None:
-        tried = (*tried, "gain")
-        # A slow clock makes all inertia too small, that of known rotors too.
-        slow = [1.0 + float(one.sizes[0]) for one in faults if one.fault == "clock"]
-        if factor.wrong and all(factor.times(s).wrong for s in slow):
-            off = factor.value - 1.0
-            wrong = np.full(len(nothing), 100.0 * abs(1.0 - 1.0 / factor.value))
-            size, error = np.array([off]), np.array([factor.deviation])
-            told = factor.chance, abs(off) / factor.deviation, wrong
-            faults.insert(0, IsolatedFault("gain", tuple(known), size, error, *told))
-            spoiled = np.hypot(spoiled, wrong)
+    # The scale of all forces, which the residuals cannot show
+    factor = factor_of_forces(model, found[-1].fit if found else plain, known)
+    gain = None if factor is None else _wrong_gain(factor, tuple(known), faults, len(noise))
+    left_open = hidden_faults(columns, observations, noise, other)
+    if gain is not None:
+        if "clock" in left_open:
+            # Weight tells the bodies' mass: a slow clock lets their inertia take from the rotors'.
+            gain = replace(gain, as_well=("clock",))
+        faults.insert(0, gain)
+        spoiled = np.hypot(spoiled, gain.cycle)
+    names = dict.fromkeys(family.name for family in columns.families)
+    tried = (*names, *["play"] * looked, *["gain"] * (factor is not None))
     if factor is None or not factor.told:
         left_open.insert(0, "gain")
-    shown = {one.fault for one in faults}
-    hidden = tuple(fault for fault in left_open if fault not in shown)
-    delayed = any(one.family is DELAY for one in found)
-    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden, late=delayed)
+    if not looked:
+        left_open.append("play")
+    return FaultIsolation(
+        tried,
+        tuple(faults),
+        uncertain,
+        spoiled,
+        hidden=tuple(name for name in left_open if name not in {one.fault for one in faults}),
+        late=any(one.family is DELAY for one in found),
+    )
+
+
+def _found_faults(
+    parts: list[_Part],
+    observations: Observations,
+    observed: Callable[[Sequence[_Part]], Observations],
+    estimate: Estimate,
+    noise: Array,
+) -> tuple[Estimate, list[FoundFault]]:
+    """Return the fit without faults, and the faults that residuals show beside each other."""
+    columns = parts[0].model
+    largest = max(float(np.abs(part.log.forces).max()) for part in parts)
+    exact = np.abs(estimate.residuals).max() < _EXACT * largest
+    plain, found = searched(columns, observations, () if exact else None, noise)
+    if any(one.family is DELAY for one in found):
+        # Columns hold for small delays: other faults are sought after a long one is corrected.
+        late, shifted = _delay(parts, observed)
+        others = tuple(one for one in columns.families if one is not DELAY)
+        fit, found = _searched_for(others, shifted, observed)
+        if late is not None:
+            found.insert(0, replace(late, fit=fit))
+    return plain, found
+
+
+def _expected_errors(
+    columns: FaultColumns,
+    states: list[States],
+    other: ReferenceCycle,
+    estimate: Estimate,
+    plain: Estimate,
+    found: Sequence[FoundFault],
+) -> tuple[Array, Array, list[Array]]:
+    """Return `_cycle_errors` of a cycle; the first two of another motion where these are larger."""
+    cycle = ReferenceCycle.within(columns.model.robot, Extent.of(states))
+    uncertain, spoiled, each = _cycle_errors(columns, cycle, estimate, plain, found)
+    if cycle is not None and len(other.states) > 0:
+        # What a cycle spares another motion of the same range may show.
+        elsewhere = _cycle_errors(columns, other, estimate, plain, found)
+        uncertain, spoiled = np.fmax(uncertain, elsewhere[0]), np.fmax(spoiled, elsewhere[1])
+    return uncertain, spoiled, each
+
+
+def _cycle_errors(
+    columns: FaultColumns,
+    cycle: ReferenceCycle | None,
+    estimate: Estimate,
+    plain: Estimate,
+    found: Sequence[FoundFault],
+) -> tuple[Array, Array, list[Array]]:
+    """Return errors of a cycle's forces, percent: by covariance, by all faults, and by each (n,).
+
+    NaN without a cycle.
+    """
+    if cycle is None:
+        nothing = np.full(len(estimate.noise), np.nan)
+        return nothing, nothing, [nothing for _ in found]
+    motion = columns.motion(cycle.states, np.full(len(cycle.states), 0.5))
+    matrix = motion.matrix
+    p = matrix.shape[-1]
+    forces = [matrix @ plain.values]
+    for one in found:
+        with_fault = matrix @ one.fit.values[:p]
+        for family, sizes in (*one.others, (one.family, one.sizes)):
+            if family.of_machine and (cycle.in_order or not family.of_path):
+                with_fault = with_fault + family.of_cycle(motion) @ sizes
+        forces.append(with_fault)
+    each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
+    spoiled = cycle.share(forces[-1] - forces[0], forces[0])
+    # A fault that is not named adds to the residuals, and so to the covariance.
+    covariance = found[-1].fit.covariance[:p, :p] if found else estimate.covariance
+    variance = np.einsum("rnp,pq,rnq->rn", matrix, covariance, matrix, optimize=True)
+    uncertain = cycle.share(np.sqrt(np.maximum(variance, 0.0)), forces[0])
+    return uncertain, spoiled, each
+
+
+def _named_faults(
+    columns: FaultColumns,
+    plain: Estimate,
+    found: Sequence[FoundFault],
+    each: Sequence[Array],
+    step: float,
+) -> list[IsolatedFault]:
+    """Return the faults that change a cycle's forces by enough to be named."""
+    p = len(columns.model.names)
+    fits = [plain, *(one.fit for one in found)]
+    shifts = [
+        float(np.abs((b.values[:p] - a.values[:p]) / b.deviations[:p]).max())
+        for a, b in pairwise(fits)
+    ]
+    faults = []
+    for one, shift, spoils in zip(found, shifts, each, strict=True):
+        family = one.family
+        negligible = np.abs(one.sizes).max() <= family.tolerance.negligible
+        if not (spoils < _NAMED).all() and not negligible:
+            seen = (one.sizes, one.deviations, one.chance, shift, spoils)
+            speeds = None if family.speed is None else family.speed * columns.usual
+            labels = tuple(family.sizes(columns.model))
+            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, one.as_well))
+    return faults
+
+
+def _wrong_gain(
+    factor: Factor, known: tuple[str, ...], faults: Sequence[IsolatedFault], count: int
+) -> IsolatedFault | None:
+    """Return the fault of a factor of all forces, by known values; None if it is one."""
+    # A slow clock makes all inertia too small, that of known rotors too.
+    slow = [1.0 + float(one.sizes[0]) for one in faults if one.fault == "clock"]
+    if not (factor.wrong and all(factor.times(s).wrong for s in slow)):
+        return None
+    off = factor.value - 1.0
+    wrong = np.full(count, 100.0 * abs(1.0 - 1.0 / factor.value))
+    size, error = np.array([off]), np.array([factor.deviation])
+    return IsolatedFault(
+        "gain", known, size, error, factor.chance, abs(off) / factor.deviation, wrong
+    )
 
 
 def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:

@@ -12,10 +12,9 @@ import scipy  # type: ignore[import-untyped]
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.estimators.estimate import wald
 from pteron.identification.estimators.qr import actuator_factors
-from pteron.identification.faults.columns import Family, FaultColumns
+from pteron.identification.faults.columns import Family, FaultColumns, length_tolerance
 from pteron.identification.faults.fault import ORDER, FaultName
 from pteron.identification.observation import Observations, scaled
-from pteron.identification.plausibility import CLEAR, WANTED
 from pteron.kernels import Array
 
 _CHANCE = 1e-6
@@ -46,23 +45,18 @@ _ENOUGH = 2
 _BESIDE = 0.1
 """Least statistic of a further fault, as a share of the first one's."""
 
-_LENGTH = 0.01
-"""Usual error of a length, over the legs' size: a larger one is more likely another fault."""
-
 _MOSTLY = 0.5
 """Least share of the effect of a fault of lengths that errors of the usual size explain too."""
+
+_MOST_OF = 5.0
+"""Factor by which a fault that varies freely with time must lower residuals that noise is not all
+of: others' residuals it lowers up to twice."""
 
 _TIMES = 3.0
 """Greatest friction that falls with speed, over the remaining dry friction."""
 
 _MOST = 3
 """Greatest number of faults that are found."""
-
-_NOISELESS = 1e-9
-"""Least noise of a force, over that of the noisiest one; a smaller one counts as this."""
-
-_INDEPENDENT = 1e-3
-"""Share of a column, independent of the model's columns, from which both can be told apart."""
 
 
 @dataclass(frozen=True)
@@ -120,30 +114,31 @@ def searched(
     plain = weighted(observations.columns(range(p)), triangles=triangles.columns(range(p)))
     while len(found) < _MOST:
         clear = []
+        before = found[-1].fit.noise if found else plain.noise
+        floor = _VANISHED * before if noise is None else np.maximum(noise, _VANISHED * before)
         for k, family in enumerate(model.families):
             if family not in wanted or family.name in (one.family.name for one in found):
                 continue
             one = _taken_in(model, observations, triangles, found, k)
-            if one is not None and one.chance < _CHANCE and _is_possible(one, model):
+            if one is not None and one.chance < _CHANCE and _is_possible(one, model, before, floor):
                 clear.append(one)
         best = max((one.statistic for one in clear), default=0.0)
         first = first or best
         # Residuals beside a clear fault may come from its shape, which no column has exactly.
         if not best > _BESIDE * first:
             break
-        beside = found[-1].fit if found else plain
-        found.append(_likeliest(clear, beside.noise, observations.used, noise))
+        found.append(_likeliest(clear, before, observations.used, floor))
     return plain, found
 
 
 def _likeliest(
-    faults: Sequence[FoundFault], before: Array, rows: Array, noise: Array | None
+    faults: Sequence[FoundFault], before: Array, rows: Array, floor: Array
 ) -> FoundFault:
     """Return the fault that explains residuals of deviations `before` (n,) of so many rows (n,).
 
-    Where one leaves only the `noise` of forces (n,), likelihood decides: of those that explain as
-    much the one of fewest sizes. Else the fault is large, its columns hold to first order only, and
-    what comes first among those that explain nearly as much is taken.
+    Where one leaves only the noise of forces, `floor` (n,), likelihood decides: of those that
+    explain as much the one of fewest sizes. Else the fault is large, its columns hold to first
+    order only, and what comes first among those that explain nearly as much is taken.
     """
     gains = [
         float(rows @ np.log(np.maximum(before, 1e-300) / np.maximum(one.fit.noise, 1e-300)))
@@ -151,7 +146,6 @@ def _likeliest(
     ]
     most = int(np.argmax(gains))
     clearest = faults[most]
-    floor = _VANISHED * before if noise is None else np.maximum(noise, _VANISHED * before)
     as_well = _AS_WELL * gains[most]
     whole = bool((clearest.fit.noise <= _AT_NOISE * floor).all())
     if whole or clearest.family.exact:
@@ -168,30 +162,6 @@ def _likeliest(
     others = sorted(explaining, key=lambda pair: -pair[1])
     names = dict.fromkeys(one.family.name for one, _ in others)
     return replace(first, as_well=tuple(n for n in names if n != first.family.name)[:_TOLD])
-
-
-def cannot_be_told(
-    model: FaultColumns, observations: Observations, noise: Array
-) -> list[FaultName]:
-    """Return which of the clock and the scale of one force the equations leave open.
-
-    A fault is left open if its column depends on the model's columns, but for a part below the
-    noise (n,) of the forces.
-    """
-    weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
-    flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
-    known = flat[:, : len(model.model.names)]
-    basis = np.linalg.qr(scaled(known)[0])[0]
-    found: dict[FaultName, None] = {}
-    for family, places in zip(model.families, model.places, strict=True):
-        if family.name not in ("clock", "scale"):
-            continue
-        columns = flat[:, places]
-        left = float(np.linalg.norm(columns - basis @ (basis.T @ columns)))
-        independent = left > _INDEPENDENT * float(np.linalg.norm(columns))
-        if not (independent and WANTED * left > CLEAR):
-            found[family.name] = None
-    return list(found)
 
 
 def _taken_in(
@@ -254,7 +224,7 @@ def _taken_in(
 
 def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
     """Return the share of Wald's statistic that errors of lengths of the usual size explain."""
-    spread = _LENGTH * float(np.mean([leg.size for leg in model.model.robot.legs]))
+    spread = length_tolerance(model.model.robot).usual
     back = spread * np.linalg.pinv(mix)
     both = back @ back.T + covariance
     # Of the sizes, C (C0 + C)^-1 remains beside the most likely ones.
@@ -262,9 +232,18 @@ def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> 
     return 1.0 - float(left @ covariance @ left) / wald(size, covariance)
 
 
-def _is_possible(one: FoundFault, model: FaultColumns) -> bool:
-    """Say whether the sizes are possible: friction must brake, errors of lengths be small."""
+def _is_possible(one: FoundFault, model: FaultColumns, before: Array, floor: Array) -> bool:
+    """Say whether the sizes are possible: friction must brake, errors of lengths be small.
+
+    A fault that varies freely with time must leave noise alone, `floor` (n,), or a small part of
+    the residuals `before` (n,).
+    """
     family = one.family
+    if (
+        family.free
+        and not (one.fit.noise <= np.maximum(_AT_NOISE * floor, before / _MOST_OF)).all()
+    ):
+        return False
     largest = family.largest
     if family.speed is not None:
         dry = model.model.per_joint("coulomb", np.abs(model.values))
