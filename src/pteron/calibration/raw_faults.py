@@ -267,7 +267,9 @@ def _trial_poses(guess: Guess, rows: Measurements, *, modes: bool = True) -> Arr
 
     The right readings lead to the measured pose, or near home, by Newton's steps alone.
     """
-    return starting_poses(guess, rows, modes=modes and guess.robot.freedom <= QUICK_MODES)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
+        return starting_poses(guess, rows, modes=modes and guess.robot.freedom <= QUICK_MODES)
 
 
 def row_misfits(guess: Guess, rows: Measurements, blocks: Sequence[Block], poses: Array) -> Array:

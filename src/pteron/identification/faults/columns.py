@@ -150,7 +150,7 @@ def _drift(m: FittedMotion) -> Array:
 def _payload(m: FittedMotion) -> Array:
     """Return the forces (R, n, k) of 1 kg at the platform's point in each eighth of the log."""
     s, kinds = m.states, m.model.robot.platform.inertia.kinds
-    regressor = unchecked(m.model.robot, "regressor", s.pose, s.velocity, s.acceleration)
+    regressor = evaluate_unchecked(m.model.robot, "regressor", s.pose, s.velocity, s.acceleration)
     of_mass = regressor[..., regressor.shape[-1] - len(kinds) + kinds.index("m")]
     count = len(_EIGHTHS)
     eighth = np.clip(((m.along + 0.5) * count).astype(int), 0, count - 1)

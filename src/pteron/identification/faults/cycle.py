@@ -13,7 +13,7 @@ from pteron.errors import PteronError
 from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion, home
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion, pick_and_place
 
@@ -95,7 +95,7 @@ class ReferenceCycle:
             motion.append(np.take_along_axis(log, rows, axis=0))
         whole = FullMotion.of_platform(robot, *motion)
         # A slider's motion is finite out of the legs' reach too; that of the links is not.
-        within = np.isfinite(unchecked(robot, "regressor", *motion)).all(axis=(1, 2))
+        within = np.isfinite(evaluate_unchecked(robot, "regressor", *motion)).all(axis=(1, 2))
         within &= np.isfinite(np.hstack(whole)).all(axis=1)
         whole = FullMotion(*(np.ascontiguousarray(part[within]) for part in whole))
         rates = np.abs(whole.rates)
