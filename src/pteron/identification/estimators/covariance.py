@@ -55,16 +55,16 @@ class Noise:
         """Return the covariance (p, p) of W^T e for rows W (R, n, p) times weights (R, n)."""
         p = matrix.shape[-1]
         factors = np.broadcast_to(weights, matrix.shape[:2])
-        states = [np.zeros((len(one) - 1, p)) for one in self.polynomials]
+        states = [np.zeros((len(polynomial) - 1, p)) for polynomial in self.polynomials]
         total = np.zeros((p, p))
         # What a row's innovation adds depends on the rows after it: from the last to the first.
         for stop in range(len(matrix), 0, -_BLOCK):
             block = slice(max(stop - _BLOCK, 0), stop)
             rows = (matrix[block] * factors[block, :, None])[::-1]
             passed = np.empty(rows.shape)
-            for i, one in enumerate(self.polynomials):
+            for i, polynomial in enumerate(self.polynomials):
                 passed[:, i], states[i] = scipy.signal.lfilter(
-                    [1.0], one, rows[:, i], axis=0, zi=states[i]
+                    [1.0], polynomial, rows[:, i], axis=0, zi=states[i]
                 )
             each = np.einsum("ij,rip->rjp", self.root, passed).reshape(-1, p)
             total += each.T @ each
@@ -77,8 +77,8 @@ class Noise:
 
     def _filtered(self, matrix: Array) -> Array:
         columns = [
-            scipy.signal.lfilter([1.0], one, matrix[:, i], axis=0)
-            for i, one in enumerate(self.polynomials)
+            scipy.signal.lfilter([1.0], polynomial, matrix[:, i], axis=0)
+            for i, polynomial in enumerate(self.polynomials)
         ]
         return np.stack(columns, axis=1)
 
@@ -110,20 +110,20 @@ def noise_of(
         decomposed.
     """
     counts = np.maximum(_lagged(used[..., None].astype(float)), 1.0)
-    found = _lagged(residuals[..., None])
+    autocovariances = _lagged(residuals[..., None])
     rows, n, p = matrix.shape
     if used.sum() >= _FEW * p:
-        return _shared(_autoregression(found / counts, rows), residuals, used)
+        return _shared(_autoregression(autocovariances / counts, rows), residuals, used)
     factors = np.broadcast_to(weights, used.shape)
     weighted = (matrix * factors[..., None]).reshape(-1, p)
     orthonormal = np.linalg.qr(weighted)[0] if whitened is None else weighted @ whitened
     columns = orthonormal.reshape(rows, n, p)  # H = X X^T
-    noise = Noise((np.ones(1),) * n, np.diag(np.sqrt(found[0] / counts[0])))
+    noise = Noise((np.ones(1),) * n, np.diag(np.sqrt(autocovariances[0] / counts[0])))
     for _ in range(_ROUNDS):
         times = noise.times(columns) * used[..., None]
         taken = columns @ np.einsum("rip,riq->pq", columns, times)
         missing = _lagged(columns, times) + _lagged(times, columns) - _lagged(taken, columns)
-        noise = _autoregression((found + missing) / counts, rows)
+        noise = _autoregression((autocovariances + missing) / counts, rows)
     return _shared(noise, residuals, used)
 
 
@@ -149,10 +149,12 @@ def _autoregression(lagged: Array, rows: int) -> Noise:
         # Take out the correlation with the next row ...
         memory = float(np.clip(g[1] / g[0], -most, most))
         g[1] = memory * g[0]
-        before = np.r_[g[1], g[:-2]]
-        rest = (1.0 + memory**2) * g[:-1] - memory * (before + g[1:])
+        previous_lag = np.r_[g[1], g[:-2]]
+        prewhitened = (1.0 + memory**2) * g[:-1] - memory * (previous_lag + g[1:])
         # ... and fit an autoregression to the rest, seen through Parzen's window.
-        polynomial, variance = _levinson(rest * _parzen(np.arange(len(rest)) / len(rest)))
+        polynomial, variance = _levinson(
+            prewhitened * _parzen(np.arange(len(prewhitened)) / len(prewhitened))
+        )
         polynomials.append(np.convolve([1.0, -memory], polynomial))
         sizes.append(np.sqrt(variance))
     return Noise(tuple(polynomials), np.diag(sizes))
@@ -179,7 +181,8 @@ def _parzen(share: Array) -> Array:
 def _shared(noise: Noise, residuals: Array, used: NDArray[np.bool_]) -> Noise:
     """Return the noise with the correlation between actuators of the residuals' innovations."""
     parts = [
-        scipy.signal.lfilter(one, [1.0], residuals[:, i]) for i, one in enumerate(noise.polynomials)
+        scipy.signal.lfilter(polynomial, [1.0], residuals[:, i])
+        for i, polynomial in enumerate(noise.polynomials)
     ]
     innovations = np.stack(parts, axis=1) * used
     together = used.T.astype(float) @ used

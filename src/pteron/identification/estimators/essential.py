@@ -73,18 +73,18 @@ def essential_parameters(
     values = estimate.values
     gone: list[int] = []
     p_value = 1.0
-    left = list(range(len(values)))
-    while len(left) > 1:
+    remaining = list(range(len(values)))
+    while len(remaining) > 1:
         # Cost of dropping each of those left, beside those already gone.
-        statistics = [estimate.wald(values[[*gone, k]], [*gone, k]) for k in left]
+        statistics = [estimate.wald(values[[*gone, k]], [*gone, k]) for k in remaining]
         least = int(np.argmin(statistics))
         count = len(gone) + 1
         chance = float(scipy.stats.f.sf(statistics[least] / count, count, estimate.degrees))
         if chance < level:
             break
         p_value = chance
-        gone.append(left.pop(least))
+        gone.append(remaining.pop(least))
     if not gone:
         return Essential(estimate.names, (), estimate, 1.0, level)
-    refit = estimator(observations.columns(left))
+    refit = estimator(observations.columns(remaining))
     return Essential(refit.names, tuple(estimate.names[k] for k in gone), refit, p_value, level)

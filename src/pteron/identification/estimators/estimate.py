@@ -206,20 +206,23 @@ def estimate_of(
     (W^T V W)^-1, another one is `inverse`, and Z is W, another one is `instruments` (R, n, p).
     `pull` (R, n) stands for the weighted residuals where these count in another way.
     """
-    rest = residuals_of(observations, values)
+    residuals = residuals_of(observations, values)
     share = factor.degrees / factor.rows
-    noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(observations.used, 1) / share)
+    noise = np.sqrt((residuals**2).sum(axis=0) / np.maximum(observations.used, 1) / share)
     bread = factor.inverse() if inverse is None else inverse
     rows = observations.matrix if instruments is None else instruments
-    pulled = weights * rest if pull is None else pull
+    pulled = weights * residuals if pull is None else pull
     whitened = factor.whitening() if instruments is None else None
-    found = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
-    middle = found.sum_covariance(rows, weights)
+    noise_model = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
+    middle = noise_model.sum_covariance(rows, weights)
     covariance = bread @ (middle + beside) @ bread.T
-    symmetric, white = 0.5 * (covariance + covariance.T), whiteness(rest, observations.gain > 0.0)
-    told = factor.condition, factor.rows, search.iterations, search.converged, rest
+    symmetric, white = (
+        0.5 * (covariance + covariance.T),
+        whiteness(residuals, observations.gain > 0.0),
+    )
+    figures = factor.condition, factor.rows, search.iterations, search.converged, residuals
     names, units = observations.names, observations.units
-    return Estimate(search.method, names, units, values, symmetric, noise, white, *told)
+    return Estimate(search.method, names, units, values, symmetric, noise, white, *figures)
 
 
 def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiteness:
@@ -228,13 +231,13 @@ def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiten
     Those that are not `used` (R, n) take no part: a lag has the pairs of which both are used.
     """
     taken = np.ones(residuals.shape, dtype=bool) if used is None else used
-    found, pairs = autocorrelations(residuals, taken, _LAGS)
-    if not len(found):
+    correlations, pairs = autocorrelations(residuals, taken, _LAGS)
+    if not len(correlations):
         return Whiteness(np.zeros(residuals.shape[1]), np.ones(residuals.shape[1]))
     count = taken.sum(axis=0)
-    statistic = count * (count + 2.0) * (found**2 / np.maximum(pairs, 1)).sum(axis=0)
+    statistic = count * (count + 2.0) * (correlations**2 / np.maximum(pairs, 1)).sum(axis=0)
     degrees = np.maximum((pairs > 0).sum(axis=0), 1)
-    return Whiteness(found[0], np.asarray(scipy.stats.chi2.sf(statistic, degrees)))
+    return Whiteness(correlations[0], np.asarray(scipy.stats.chi2.sf(statistic, degrees)))
 
 
 def autocorrelations(
@@ -248,7 +251,7 @@ def autocorrelations(
     centred = np.where(used, residuals - mean, 0.0)
     power = np.maximum((centred**2).sum(axis=0), np.finfo(float).tiny)
     lags = range(1, min(most, len(residuals) // 5) + 1)
-    found = [(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags]
+    correlations = [(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags]
     pairs = [(used[k:] & used[:-k]).sum(axis=0) for k in lags]
     shape = len(lags), residuals.shape[1]
-    return np.reshape(found, shape), np.reshape(np.array(pairs, dtype=np.int64), shape)
+    return np.reshape(correlations, shape), np.reshape(np.array(pairs, dtype=np.int64), shape)

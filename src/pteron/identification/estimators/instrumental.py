@@ -75,18 +75,18 @@ def instrumental(
     search = Search("instrumental")
     for _ in search.steps(iterations):
         if callable(instruments) or search.iterations == 1:
-            found = instruments(values) if callable(instruments) else instruments
-            both, z, apart = _together(observations, found, mutual=mutual)
+            instrument_rows = instruments(values) if callable(instruments) else instruments
+            both, z, differences = _together(observations, instrument_rows, mutual=mutual)
             qr_factor(replace(both, matrix=z)).check_seen()
-        inverse, moment = _normal_equations(both, z, apart, noise)
+        inverse, moment = _normal_equations(both, z, differences, noise)
         earlier, values = values, inverse @ moment
         factor = qr_factor(both, 1.0 / noise)
-        before, noise = noise, actuator_noise(both, values)
+        last_noise, noise = noise, actuator_noise(both, values)
         size = np.sqrt(np.maximum(np.diag(factor.inverse()), np.finfo(float).tiny))
-        settled = np.abs(noise / before - 1.0).max() < _SETTLED
-        still = (np.abs(values - earlier) <= _SETTLED * size).all()
-        search.converged = bool(settled and still)
-    solved, weights = (search, both, factor, values), 1.0 / before
+        settled = np.abs(noise / last_noise - 1.0).max() < _SETTLED
+        values_settled = (np.abs(values - earlier) <= _SETTLED * size).all()
+        search.converged = bool(settled and values_settled)
+    solved, weights = (search, both, factor, values), 1.0 / last_noise
     return estimate_of(*solved, weights=weights, inverse=inverse, instruments=z)
 
 
@@ -120,9 +120,9 @@ def _together(
         )
     used = (observations.gain > 0.0) & (instruments.gain > 0.0)
     matrix, forces = observations.matrix, observations.forces
-    z, apart = instruments.matrix * used[..., None], None
+    z, differences = instruments.matrix * used[..., None], None
     if mutual:
-        apart = 0.5 * (matrix * used[..., None] - z)
+        differences = 0.5 * (matrix * used[..., None] - z)
         matrix, forces = 0.5 * (matrix + z), 0.5 * (forces + instruments.forces)
     both = replace(
         observations,
@@ -130,19 +130,19 @@ def _together(
         forces=used * forces,
         gain=used * observations.gain,
     )
-    return both, both.matrix if mutual else z, apart
+    return both, both.matrix if mutual else z, differences
 
 
 def _normal_equations(
-    observations: Observations, instruments: Array, apart: Array | None, noise: Array
+    observations: Observations, instruments: Array, differences: Array | None, noise: Array
 ) -> tuple[Array, Array]:
     """Return (Z^T V W)^-1, or (M^T V M - D^T V D)^-1, (p, p), and Z^T V F (p,)."""
     p = instruments.shape[-1]
     z, w = ((a / noise[:, None]).reshape(-1, p) for a in (instruments, observations.matrix))
     size = np.linalg.norm(w, axis=0)
     normal = (z / size).T @ (w / size)
-    if apart is not None:
-        d = (apart / noise[:, None]).reshape(-1, p) / size
+    if differences is not None:
+        d = (differences / noise[:, None]).reshape(-1, p) / size
         normal -= d.T @ d
     inverse = np.linalg.inv(normal) / np.outer(size, size)
     return inverse, z.T @ (observations.forces / noise).ravel()
@@ -152,9 +152,11 @@ def _every_other(log: Log, start: int) -> Log:
     """Return a log with the positions that every other sample from `start` on has."""
     joints = log.joints.copy()
     for rows in log.segments:
-        time, kept = log.time[rows], slice(start, None, 2)
+        time, every_other = log.time[rows], slice(start, None, 2)
         if len(time) // 2 <= _DEGREE:
             continue  # too short for the filters, too
-        spline = scipy.interpolate.make_interp_spline(time[kept], log.joints[rows][kept], k=_DEGREE)
+        spline = scipy.interpolate.make_interp_spline(
+            time[every_other], log.joints[rows][every_other], k=_DEGREE
+        )
         joints[rows] = spline(time)
     return replace(log, joints=joints)

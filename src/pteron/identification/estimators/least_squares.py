@@ -68,9 +68,9 @@ def weighted(
     for _ in search.steps(iterations):
         factor = qr_factor(triangles, 1.0 / noise)
         values = factor.values()
-        before, noise = noise, actuator_noise(observations, values)
-        search.converged = bool(np.abs(noise / before - 1.0).max() < _SETTLED_NOISE)
-    return estimate_of(search, observations, factor, values, weights=1.0 / before)
+        last_noise, noise = noise, actuator_noise(observations, values)
+        search.converged = bool(np.abs(noise / last_noise - 1.0).max() < _SETTLED_NOISE)
+    return estimate_of(search, observations, factor, values, weights=1.0 / last_noise)
 
 
 def huber(
@@ -101,14 +101,14 @@ def huber(
     values = factor.values()
     search = Search("huber")
     for _ in search.steps(iterations):
-        rest = residuals_of(observations, values)
-        scale = median_noise(observations, rest)
+        residuals = residuals_of(observations, values)
+        scale = median_noise(observations, residuals)
         # An actuator without equations needs a scale too: any positive one.
         scale = np.where(scale > 0.0, scale, actuator_noise(observations, values))
-        reduction = np.minimum(1.0, threshold / np.maximum(np.abs(rest) / scale, 1e-300))
+        reduction = np.minimum(1.0, threshold / np.maximum(np.abs(residuals) / scale, 1e-300))
         factor = qr_factor(observations, np.sqrt(reduction) / scale)
-        before, values = values, factor.values()
-        change = factor.scale * np.abs(values - before)
+        last_values, values = values, factor.values()
+        change = factor.scale * np.abs(values - last_values)
         search.converged = bool(change.max() <= _SETTLED_VALUES * np.sqrt(observations.rows))
     plain = qr_factor(observations, 1.0 / scale)
     standard = residuals_of(observations, values) / scale
@@ -124,18 +124,18 @@ def huber(
 
 def actuator_noise(observations: Observations, values: Array) -> Array:
     """Return the standard deviation (n,) of the residuals of fitted values, N or N m."""
-    rest = residuals_of(observations, values)
+    residuals = residuals_of(observations, values)
     spent = len(values) / observations.rows
     used = np.maximum(observations.used, 1)
-    noise = np.sqrt((rest**2).sum(axis=0) / used / (1.0 - spent))
+    noise = np.sqrt((residuals**2).sum(axis=0) / used / (1.0 - spent))
     size = np.sqrt((observations.forces**2).sum(axis=0) / used)
     if (noise <= _NOISELESS * size).all():
         return np.ones_like(noise)
     return np.asarray(np.maximum(noise, 1e-6 * noise.max()))
 
 
-def median_noise(observations: Observations, rest: Array) -> Array:
+def median_noise(observations: Observations, residuals: Array) -> Array:
     """Return the robust standard deviation (n,) of residuals; 0 for an actuator without any."""
     used = observations.gain > 0.0
-    sizes = np.where(used | ~used.any(axis=0), np.abs(rest), np.nan)
+    sizes = np.where(used | ~used.any(axis=0), np.abs(residuals), np.nan)
     return np.asarray(np.nanmedian(sizes, axis=0) / MEDIAN_SIZE)

@@ -97,33 +97,35 @@ def maximum_likelihood(
         weights = np.tile(1.0 / noise, (len(observations.time), 1))
         w = (weights[..., None] * observations.matrix).reshape(-1, len(values))
         s = scipy.sparse.diags(weights.ravel()) @ slopes
-        rest = (weights * (observations.forces - observations.matrix @ values)).ravel()
+        residuals = (weights * (observations.forces - observations.matrix @ values)).ravel()
         # Normal equations; the motion is eliminated, its measurement being its prior.
         normal = scipy.sparse.linalg.splu((information + s.T @ s).tocsc())
-        pull = information @ (measured - curve.coefficients).ravel() + s.T @ rest
+        pull = information @ (measured - curve.coefficients).ravel() + s.T @ residuals
         coupling = s.T @ w
         solved = normal.solve(np.column_stack([coupling, pull]))
         schur = w.T @ w - coupling.T @ solved[:, :-1]
         size = np.sqrt(np.diag(schur))
         inverse = np.linalg.inv(schur / np.outer(size, size)) / np.outer(size, size)
-        step = inverse @ (w.T @ rest - coupling.T @ solved[:, -1])
+        step = inverse @ (w.T @ residuals - coupling.T @ solved[:, -1])
         motion_step = solved[:, -1] - solved[:, :-1] @ step
         values = values + step
         shifted = curve.coefficients + motion_step.reshape(measured.shape)
         curve = replace(curve, coefficients=shifted)
         # What is left of the forces, less what the values and the motion took.
-        left = (rest - w @ step - s @ motion_step).reshape(weights.shape) * noise
+        remainder = (residuals - w @ step - s @ motion_step).reshape(weights.shape) * noise
         spent = 1.0 - len(values) / observations.rows
-        noise = np.sqrt((left**2).sum(axis=0) / np.maximum(observations.used, 1) / spent)
+        noise = np.sqrt((remainder**2).sum(axis=0) / np.maximum(observations.used, 1) / spent)
         noise = np.maximum(noise, least)
         search.converged = bool((np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all())
     # The values' own part of the forces: what the motion could do as well is taken out of it.
     moved = solved[:, :-1]
-    own = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
+    own_rows = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
     observations = _sampled(model, log, curve, preprocessing)
     beside, factor = moved.T @ (information @ moved), qr_factor(observations, 1.0 / noise)
-    found, weights = (search, observations, factor, values), 1.0 / noise
-    return estimate_of(*found, weights=weights, inverse=inverse, instruments=own, beside=beside)
+    solution, weights = (search, observations, factor, values), 1.0 / noise
+    return estimate_of(
+        *solution, weights=weights, inverse=inverse, instruments=own_rows, beside=beside
+    )
 
 
 def _check(log: Log) -> None:
@@ -141,8 +143,8 @@ def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing)
     used = in_motion(states.joint_rates, preprocessing.slow, preprocessing.settling)
     used[: curve.ends] = used[len(used) - curve.ends :] = 0.0
     rows = used[..., None] * model.matrix(states), used * log.forces
-    found = assembled(model, *rows, used, log.time, states.payload, 1.0)
-    return replace(found, source=log.source)
+    observations = assembled(model, *rows, used, log.time, states.payload, 1.0)
+    return replace(observations, source=log.source)
 
 
 def _slopes(

@@ -99,9 +99,9 @@ def actuator_factors(observations: Observations) -> Observations:
     p = len(observations.names)
     triangles = np.empty((p + 1, observations.actuators, p + 1))
     for i in range(observations.actuators):
-        own = observations.matrix[:, i], observations.forces[:, i]
-        starts = range(0, len(own[1]), BLOCK)
-        pieces = (np.column_stack([part[k : k + BLOCK] for part in own]) for k in starts)
+        rows = observations.matrix[:, i], observations.forces[:, i]
+        starts = range(0, len(rows[1]), BLOCK)
+        pieces = (np.column_stack([part[k : k + BLOCK] for part in rows]) for k in starts)
         triangles[:, i] = triangle(pieces, p + 1)
     return replace(observations, matrix=triangles[..., :p], forces=triangles[..., p])
 

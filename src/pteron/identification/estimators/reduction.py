@@ -47,20 +47,20 @@ class Reduced:
     @property
     def expressions(self) -> tuple[str, ...]:
         """Expression of each value, such as "I1 + 0.25 m2"."""
-        found = []
+        texts = []
         for name, row in zip(self.names, self.shares, strict=True):
             text = name
             for other, share in zip(self.dependent_names, row.tolist(), strict=True):
                 if share:
                     size = "" if abs(abs(share) - 1.0) < TOLERANCE else f"{abs(share):.6g} "
                     text += f" {'-' if share < 0.0 else '+'} {size}{other}"
-            found.append(text)
-        return tuple(found)
+            texts.append(text)
+        return tuple(texts)
 
     def values(self, parameters: Array) -> Array:
         """Return the values (kept,) that parameters of all columns have."""
-        own, joined = parameters[list(self.kept)], parameters[list(self.dependent)]
-        return np.asarray(own + self.shares @ joined)
+        independent, joined = parameters[list(self.kept)], parameters[list(self.dependent)]
+        return np.asarray(independent + self.shares @ joined)
 
 
 def reduced(observations: Observations, *, tolerance: float = TOLERANCE) -> Reduced:
@@ -81,27 +81,29 @@ def reduced(observations: Observations, *, tolerance: float = TOLERANCE) -> Redu
     M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of
     Robotic Systems 8(4), 1991.
     """
-    found = qr_factor(observations)
+    triangle_factor = qr_factor(observations)
     # Columns that vanish but for rounding would be independent once they are scaled.
-    acts = found.scale > _ROUNDING * found.scale.max()
-    _, factor, order = scipy.linalg.qr(found.factor * acts, mode="economic", pivoting=True)
+    acts = triangle_factor.scale > _ROUNDING * triangle_factor.scale.max()
+    _, factor, order = scipy.linalg.qr(
+        triangle_factor.factor * acts, mode="economic", pivoting=True
+    )
     sizes = np.abs(np.diag(factor))
     rank = int((sizes > tolerance * sizes[0]).sum())
     if not rank:
         raise DataError(f"{observations.source}: every column of the regressor is zero")
     shares = scipy.linalg.solve_triangular(factor[:rank, :rank], factor[:rank, rank:])
     shares = np.where(np.abs(shares) > 1e2 * tolerance, shares, 0.0)
-    scale = np.where(acts, found.scale, 0.0)
+    scale = np.where(acts, triangle_factor.scale, 0.0)
     shares = shares * scale[order[rank:]] / scale[order[:rank], None]
     # In the order in which they were given
-    first, rest = np.argsort(order[:rank]), np.argsort(order[rank:])
-    kept, dependent = order[:rank][first].tolist(), order[rank:][rest].tolist()
+    first, dependent_order = np.argsort(order[:rank]), np.argsort(order[rank:])
+    independent, dependent = order[:rank][first].tolist(), order[rank:][dependent_order].tolist()
     below = sizes[rank] if rank < len(sizes) else 0.0
     return Reduced(
-        tuple(kept),
+        tuple(independent),
         tuple(dependent),
-        tuple(observations.names[k] for k in kept),
+        tuple(observations.names[k] for k in independent),
         tuple(observations.names[k] for k in dependent),
-        shares[np.ix_(first, rest)],
+        shares[np.ix_(first, dependent_order)],
         float(sizes[rank - 1] / below) if below else float("inf"),
     )

@@ -49,8 +49,8 @@ def smallest_corrections(upper: Array, exact: int, noise: Array) -> SmallestCorr
     last = directions[-1]
     with np.errstate(all="ignore"):
         noisy = -last[:-1] / last[-1] * noise[-1] / noise[:-1]
-        rest = upper[:exact, -1] - upper[:exact, exact:-1] @ noisy
-        first = np.linalg.solve(upper[:exact, :exact], rest)
+        remainder = upper[:exact, -1] - upper[:exact, exact:-1] @ noisy
+        first = np.linalg.solve(upper[:exact, :exact], remainder)
     return SmallestCorrections(np.r_[first, noisy], sizes, float(abs(last[-1])))
 
 
@@ -81,8 +81,8 @@ def total(
     plain = qr_factor(observations).check_seen()
     noise = actuator_noise(observations, plain.values())
     factor = qr_factor(observations, 1.0 / noise)
-    given = errors
-    if given is None:
+    given_errors = errors
+    if given_errors is None:
         relative = np.sqrt(factor.rest / (factor.rest + factor.image @ factor.image))
         errors = relative * factor.scale / np.sqrt(factor.rows)
         if observations.kinds:
@@ -90,7 +90,7 @@ def total(
     else:
         # On average over the equations that there are: an actuator without any has no noise.
         weight = (observations.used / noise**2).sum() / observations.rows
-        errors = np.asarray(given, dtype=float) * np.sqrt(weight)
+        errors = np.asarray(given_errors, dtype=float) * np.sqrt(weight)
     order = np.argsort(errors > 0.0, kind="stable")
     exact = int((errors == 0.0).sum())
     p = len(order)
@@ -100,22 +100,24 @@ def total(
     forces, search = 1.0, Search("total")
     values = np.empty(p)
     for _ in search.steps(iterations):
-        found = smallest_corrections(upper, exact, np.r_[errors[order[exact:]], forces])
-        sizes = found.sizes
-        if found.share < 1e-12 or (len(sizes) > 1 and sizes[-1] >= sizes[-2]):
+        corrections = smallest_corrections(upper, exact, np.r_[errors[order[exact:]], forces])
+        sizes = corrections.sizes
+        if corrections.share < 1e-12 or (len(sizes) > 1 and sizes[-1] >= sizes[-2]):
             raise observations.fault(
                 "too little motion",
                 "total least squares: noise explains all there is; record a livelier motion",
             )
-        values[order] = found.values
+        values[order] = corrections.values
         through = ((values * errors) ** 2).sum()
         # The residuals hold the noise of the columns as well as that of the forces.
-        left = factor.rest + ((factor.image - factor.factor @ (factor.scale * values)) ** 2).sum()
-        variance = left / factor.degrees
-        search.converged = given is None or variance == 0.0
+        squares_left = (
+            factor.rest + ((factor.image - factor.factor @ (factor.scale * values)) ** 2).sum()
+        )
+        variance = squares_left / factor.degrees
+        search.converged = given_errors is None or variance == 0.0
         if not search.converged:
-            before, forces = forces, np.sqrt(max(variance - through, _LEAST_SHARE * variance))
-            search.converged = bool(abs(forces / before - 1.0) < _SETTLED)
+            last_forces, forces = forces, np.sqrt(max(variance - through, _LEAST_SHARE * variance))
+            search.converged = bool(abs(forces / last_forces - 1.0) < _SETTLED)
     # The normal equations without the bias of the columns' noise, least^2 times its variance.
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)
     normal = normal - float(sizes[-1] ** 2) * np.diag(errors**2)
@@ -155,8 +157,8 @@ def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed:
     same = (shaken.gain == plain.gain) & (plain.gain > 0.0)
     if not same.any():
         same = (shaken.gain > 0.0) & (plain.gain > 0.0)
-    before, after = plain.matrix[same], shaken.matrix[same]
-    change = np.sqrt(((after - before) ** 2).mean(axis=0))
-    size = np.sqrt((before**2).mean(axis=0))
+    plain_rows, shaken_rows = plain.matrix[same], shaken.matrix[same]
+    change = np.sqrt(((shaken_rows - plain_rows) ** 2).mean(axis=0))
+    size = np.sqrt((plain_rows**2).mean(axis=0))
     # What rounding alone moves counts as exact.
     return np.asarray(np.where(change > 1e-12 * size, change, 0.0))

@@ -143,8 +143,8 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
     """Return the base regressors at times (T,) below one another, (T n, rank)."""
     state = motion.states(times)
     path = state.pose, state.velocity, state.acceleration
-    found: Array = evaluate_unchecked(motion.robot, "base_regressor", *path, base=base)
-    return found.reshape(-1, base.rank)
+    regressors: Array = evaluate_unchecked(motion.robot, "base_regressor", *path, base=base)
+    return regressors.reshape(-1, base.rank)
 
 
 def _condition(matrix: Array) -> float:

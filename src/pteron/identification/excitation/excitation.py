@@ -109,7 +109,7 @@ class Excitation:
     @property
     def progress_text(self) -> str:
         """How far the search came, and whether its motion identifies the machine, in sentences."""
-        finished = sum(one.finished for one in self.starts)
+        finished = sum(start.finished for start in self.starts)
         how = f"{self.draws} random motions drawn, {finished} of {len(self.starts)} improved to the"
         reached = self.conditioning.scaled
         text = f"Search: {how} end, {self.seconds:.0f} s; condition number {reached:.3g}."

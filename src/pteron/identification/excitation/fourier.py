@@ -121,23 +121,23 @@ class FourierMotion:
             If no pose has the joint coordinates of a motion of the joints.
         """
         times = _times(time)
-        found = self.states(times)
-        lost = ~np.isfinite(found.pose).all(axis=-1)
+        states = self.states(times)
+        lost = ~np.isfinite(states.pose).all(axis=-1)
         if lost.any():
             k = int(np.argmax(lost))
             raise UnreachablePose(
                 f"time {times[k]:g} s: no pose has the joint coordinates "
-                f"{found.joints[k].tolist()} (m, rad at a crank); make the motion smaller",
+                f"{states.joints[k].tolist()} (m, rad at a crank); make the motion smaller",
                 leg=0,
                 shortfall=float("nan"),
                 index=(k,),
             )
-        return Motion(times, found.pose, found.velocity, found.acceleration)
+        return Motion(times, states.pose, states.velocity, states.acceleration)
 
     def joints(self, time: ArrayLike) -> tuple[Array, Array, Array]:
         """Return the joints' coordinates, rates and accelerations, (T, n) each, at times (T,)."""
-        found = self.states(_times(time))
-        return found.joints, found.rates, found.accelerations
+        states = self.states(_times(time))
+        return states.joints, states.rates, states.accelerations
 
     @property
     def duration(self) -> float:
@@ -160,8 +160,8 @@ class FourierMotion:
         poses: Array = evaluate_unchecked(robot, "closure_poses", np.vstack([self.center, q]))
         center, pose = poses[0, self.mode], poses[1:, self.mode]
         # Within a mode angles stay on one side of the singular orientations, half a turn at most.
-        apart = (pose - center + np.pi) % (2.0 * np.pi) - np.pi
-        pose = np.where(robot.wraps, center + apart, pose)
+        turned = (pose - center + np.pi) % (2.0 * np.pi) - np.pi
+        pose = np.where(robot.wraps, center + turned, pose)
         velocity, acceleration = evaluate_unchecked(robot, "platform_motion", pose, dq, ddq)
         return FullMotion(pose, velocity, acceleration, q, dq, ddq)
 

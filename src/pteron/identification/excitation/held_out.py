@@ -87,8 +87,8 @@ class RepeatedCycle:
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the machine as plain data."""
         cycle = self.cycle
-        more = picked(cycle, "scale around across up") | {"turn": cycle.scale * cycle.turn}
-        return picked(self, "count length") | more
+        cycle_data = picked(cycle, "scale around across up") | {"turn": cycle.scale * cycle.turn}
+        return picked(self, "count length") | cycle_data
 
 
 def held_out_cycle(
@@ -124,9 +124,9 @@ def held_out_cycle(
     (True, True)
     """
     limits = limits or Limits.of(robot)
-    found = _standard(robot, min(limits.type_i, limits.type_ii))
-    cycle = found.cycle
-    while not is_clear(replace(found, length=_AT_REST), limits, _SAMPLES, _CLEAR):
+    repeated = _standard(robot, min(limits.type_i, limits.type_ii))
+    cycle = repeated.cycle
+    while not is_clear(replace(repeated, length=_AT_REST), limits, _SAMPLES, _CLEAR):
         cycle = replace(cycle, scale=_SMALLER * cycle.scale)
         if cycle.scale < _SMALLEST:
             raise ModelError(
@@ -134,12 +134,12 @@ def held_out_cycle(
                 "loosen those that it barely keeps at rest",
                 subject=robot.name,
             )
-        found = replace(found, cycle=cycle)
-    while not is_clear(found, limits, _SAMPLES, _CLEAR):
-        found = replace(found, length=_SLOWER * found.length)
-    length = math.ceil(rate * found.length) / rate
+        repeated = replace(repeated, cycle=cycle)
+    while not is_clear(repeated, limits, _SAMPLES, _CLEAR):
+        repeated = replace(repeated, length=_SLOWER * repeated.length)
+    length = math.ceil(rate * repeated.length) / rate
     count = max(_LEAST_CYCLES, math.ceil(_LEAST_DURATION / length))
-    return replace(found, length=length, count=count)
+    return replace(repeated, length=length, count=count)
 
 
 def _standard(robot: Manipulator, least: float) -> RepeatedCycle:
@@ -148,19 +148,19 @@ def _standard(robot: Manipulator, least: float) -> RepeatedCycle:
     A joint that rests says nothing of its forces.
     """
     middle = np.array(home(robot))
-    found: list[tuple[float, RepeatedCycle]] = []
+    cycles: list[tuple[float, RepeatedCycle]] = []
     if robot.platform.tilts:
-        across, up = moves(robot, None, 1)[0]
-        return RepeatedCycle(robot, Cycle(robot.platform, middle, across, up, _TILT, 1.0), 1.0)
-    for across, up in moves(robot, None, _DIRECTIONS):
+        direction, up = moves(robot, None, 1)[0]
+        return RepeatedCycle(robot, Cycle(robot.platform, middle, direction, up, _TILT, 1.0), 1.0)
+    for direction, up in moves(robot, None, _DIRECTIONS):
         try:
-            fits = pick_and_place(robot, middle, direction=across, least=least)
+            fits = pick_and_place(robot, middle, direction=direction, least=least)
         except ModelError:
             continue
-        cycle = Cycle(robot.platform, middle, across, up, fits.turn / fits.scale, fits.scale)
+        cycle = Cycle(robot.platform, middle, direction, up, fits.turn / fits.scale, fits.scale)
         once = RepeatedCycle(robot, cycle, fits.duration)
         joints = once.states(np.linspace(0.0, once.length, _SAMPLES)).joints
-        found.append((float((np.ptp(joints, axis=0) / sizes(robot, "joints")).min()), once))
-    if not found:
+        cycles.append((float((np.ptp(joints, axis=0) / sizes(robot, "joints")).min()), once))
+    if not cycles:
         pick_and_place(robot, middle, least=least)  # says why there is none
-    return max(found, key=lambda one: one[0])[1]
+    return max(cycles, key=lambda pair: pair[0])[1]

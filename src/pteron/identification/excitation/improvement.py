@@ -81,34 +81,34 @@ class Improvement:
 
     def stages(self) -> Iterator[Stage]:
         """Yield the result of each stage; the last one has ended."""
-        plan, setting, left = self.plan, self.setting, self.seconds
+        plan, setting, remaining = self.plan, self.setting, self.seconds
         safe = current = self.start
         # The limits that the program keeps, by name, and instants (E,) beside its own samples, s
         watched, instants = _near(current, setting), np.empty(0)
         for stage in range(plan.stages):
-            if left <= 0.0:
+            if remaining <= 0.0:
                 yield Stage(self.number, stage, None, ended=True, finished=False)
                 return
             begin, sharp = time.monotonic(), len(plan.doublings) - 1
             doublings = plan.doublings[min(stage, sharp)]
             coefficients = minimised(
-                setting, current.coefficients, doublings, watched, instants, left
+                setting, current.coefficients, doublings, watched, instants, remaining
             )
-            kept, good = None, False
+            feasible, good = None, False
             current = safe
             if coefficients is not None:
                 # A motion that does not keep the limits yet is still a place to go on from.
                 motion = self.start.with_coefficients(coefficients)
-                kept = within_limits(motion, setting.limits)
-                violated, more = _violations(motion, setting)
-                good = not violated or (kept is not None and not plan.thorough)
-                safe, current = kept or safe, kept or motion
+                feasible = within_limits(motion, setting.limits)
+                violated, further_instants = _violations(motion, setting)
+                good = not violated or (feasible is not None and not plan.thorough)
+                safe, current = feasible or safe, feasible or motion
                 watched = tuple(dict.fromkeys([*watched, *violated]))
-                instants = np.unique(np.concatenate([instants, more]))
-            left -= time.monotonic() - begin
+                instants = np.unique(np.concatenate([instants, further_instants]))
+            remaining -= time.monotonic() - begin
             last = stage == plan.stages - 1
-            finished = (last and left > 0.0) or (stage >= sharp and good)
-            yield Stage(self.number, stage + 1, kept, last or finished, finished)
+            finished = (last and remaining > 0.0) or (stage >= sharp and good)
+            yield Stage(self.number, stage + 1, feasible, last or finished, finished)
             if finished:
                 return
 
@@ -120,8 +120,8 @@ def improved(starts: Sequence[Improvement], workers: int) -> Generator[Stage, No
     """
     if workers > 1:
         starts = yield from _in_processes(starts, workers)
-    for one in starts:
-        yield from one.stages()
+    for start in starts:
+        yield from start.stages()
 
 
 def serve() -> None:
@@ -140,25 +140,25 @@ def _in_processes(
     starts: Sequence[Improvement], workers: int
 ) -> Generator[Stage, None, list[Improvement]]:
     """Yield every stage of all starts, and return those starts whose processes fail."""
-    left, failed = list(reversed(starts)), []
-    told: SimpleQueue[Stage | None] = SimpleQueue()
+    waiting, failed = list(reversed(starts)), []
+    messages: SimpleQueue[Stage | None] = SimpleQueue()
 
     def work(process: subprocess.Popen[bytes]) -> None:
         assert process.stdin is not None
         assert process.stdout is not None
         try:
-            while left:
-                failed.append(one := left.pop())
-                pickle.dump(one, process.stdin)
+            while waiting:
+                failed.append(start := waiting.pop())
+                pickle.dump(start, process.stdin)
                 process.stdin.flush()
                 while not (stage := pickle.load(process.stdout)).ended:
-                    told.put(stage)
-                told.put(stage)
-                failed.remove(one)
+                    messages.put(stage)
+                messages.put(stage)
+                failed.remove(start)
         except (OSError, EOFError, IndexError, pickle.UnpicklingError):
             pass  # what it was to do has failed, or nothing is left
         finally:
-            told.put(None)
+            messages.put(None)
 
     with ExitStack() as ends:
         # Last in, first out: no processes, then no threads that wait for them.
@@ -169,10 +169,10 @@ def _in_processes(
             ends.callback(_end, process)
             works.append(pool.submit(work, process))
         for _ in works:
-            yield from iter(told.get, None)
+            yield from iter(messages.get, None)
         for each in works:
             each.result()
-    return failed + left
+    return failed + waiting
 
 
 def _started() -> subprocess.Popen[bytes]:
@@ -198,19 +198,19 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _near(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:
     """Return the limits that the motion is near to; the platform's place is always watched."""
-    found, always = _margins(motion, setting)[0], ("type_i", "type_ii")
-    return tuple(name for name, values in found.items() if name in always or values.min() < _NEAR)
+    margins, always = _margins(motion, setting)[0], ("type_i", "type_ii")
+    return tuple(name for name, values in margins.items() if name in always or values.min() < _NEAR)
 
 
 def _violations(motion: FourierMotion, setting: Setting) -> tuple[tuple[str, ...], Array]:
     """Return the limits that are violated, and the instants (E,) of the least margins."""
-    found, times = _margins(motion, setting)
+    margins, times = _margins(motion, setting)
     instants = [np.empty(0)]
-    for margin in np.hstack(list(found.values())).T:
+    for margin in np.hstack(list(margins.values())).T:
         # Of a stretch out of reach, all -inf, the first instant counts.
         dip = (margin < 0.0) & (margin <= np.roll(margin, -1)) & (margin < np.roll(margin, 1))
         instants.append(times[dip])
-    names = tuple(name for name, values in found.items() if (values < 0.0).any())
+    names = tuple(name for name, values in margins.items() if (values < 0.0).any())
     return names, np.concatenate(instants)
 
 

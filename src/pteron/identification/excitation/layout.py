@@ -97,7 +97,7 @@ class Layout:
         """
         joints = {leg.joint.unit: self._unit(leg.joint.unit) for leg in robot.legs}
         turns, poses = bool(robot.platform.angles), self.contents != "joints"
-        found = Description(
+        description = Description(
             csv=self.dialect,
             time_unit=self.time_unit,
             joint_columns=cast(Any, self.joint_columns),
@@ -106,14 +106,14 @@ class Layout:
             length_unit=self.length_unit if poses else None,
             angle_unit=self.angle_unit if poses and turns else None,
         )
-        found.check(robot)
+        description.check(robot)
         names = ["t", *(name for name, _ in self._columns(robot))]
         twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
         if twice is not None:
             raise DataError(
                 f"columns: {shown(twice)} would be the name of two columns; choose another"
             )
-        return found
+        return description
 
     def frame(self, movement: Movement, rate: float) -> pl.DataFrame:
         """Return a movement from beginning to end as a data frame, `rate` samples a second.
@@ -146,10 +146,10 @@ class Layout:
         pose: list[tuple[str, str]] = list(zip(robot.coordinates, robot.units, strict=True))
         if self.contents != "all":
             return joints if self.contents == "joints" else pose
-        found = joints + pose
+        columns = joints + pose
         for part in (joints, pose):
-            found += [(f"{order}{name}", unit) for order in ("d", "dd") for name, unit in part]
-        return found + [(name, "") for name in robot.force_names]
+            columns += [(f"{order}{name}", unit) for order in ("d", "dd") for name, unit in part]
+        return columns + [(name, "") for name in robot.force_names]
 
     def _unit(self, si: str) -> str:
         units = {"m": self.length_unit, "rad": self.angle_unit, "s": self.time_unit}

@@ -121,14 +121,14 @@ class LedMotion:
     def at(self, time: ArrayLike) -> Motion:
         """Return the platform's motion at times (T,), s; it rests before and after."""
         times = as_array(time, "time", ())
-        found = self.states(times)
-        return Motion(times, found.pose, found.velocity, found.acceleration)
+        states = self.states(times)
+        return Motion(times, states.pose, states.velocity, states.acceleration)
 
     def states(self, times: Array) -> FullMotion:
         """Return the motion of platform and joints at times (T,), s; it rests before and after."""
         span = self.lead.duration
         (far_in, rate_in, gain_in), (far_out, rate_out, gain_out) = (
-            _set_off(one, span) for one in (times, self.duration - times)
+            _set_off(moments, span) for moments in (times, self.duration - times)
         )
         steady = np.clip(times, self.start, self.end) - self.start
         phase = self.lead.phase + far_in + steady - far_out
@@ -171,8 +171,8 @@ def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
 
 def _room(led: LedMotion, limits: Limits, samples: int) -> float:
     """Return the least relative margin to limits of speed, acceleration and force."""
-    found = relative_margins(led, limits, np.linspace(0.0, led.duration, samples))
-    return min(float(found[name].min()) for name in PER_JOINT if name in found)
+    margins = relative_margins(led, limits, np.linspace(0.0, led.duration, samples))
+    return min(float(margins[name].min()) for name in PER_JOINT if name in margins)
 
 
 def _set_off(times: Array, span: float) -> tuple[Array, Array, Array]:

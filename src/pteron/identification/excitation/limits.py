@@ -109,19 +109,19 @@ class Limits:
         """
         drives = [leg.drive or Drive() for leg in robot.legs]
         for name, fallback in (("speed", _SPEED), ("force", math.inf)):
-            own = [getattr(drive, f"max_{name}") for drive in drives]
-            if given.get(name) is None and any(value is not None for value in own):
-                given[name] = tuple(fallback if value is None else value for value in own)
+            drive_limits = [getattr(drive, f"max_{name}") for drive in drives]
+            if given.get(name) is None and any(value is not None for value in drive_limits):
+                given[name] = tuple(fallback if value is None else value for value in drive_limits)
         return cls(**{name: value for name, value in given.items() if value is not None})
 
     def __post_init__(self) -> None:
         for name in PER_JOINT:
-            given = getattr(self, name)
-            if given is None and name == "force":
+            setting = getattr(self, name)
+            if setting is None and name == "force":
                 continue
-            several = isinstance(given, list | tuple | np.ndarray)
-            values = tuple(_number(name, value) for value in (given if several else (given,)))
-            expect(min(values, default=0.0) > 0.0, "limits", f"{name} {given}", "numbers above 0")
+            several = isinstance(setting, list | tuple | np.ndarray)
+            values = tuple(_number(name, value) for value in (setting if several else (setting,)))
+            expect(min(values, default=0.0) > 0.0, "limits", f"{name} {setting}", "numbers above 0")
             object.__setattr__(self, name, values if several else values[0])
         for name, (fits, expected) in _SHARES.items():
             value = _number(name, getattr(self, name))
@@ -130,8 +130,8 @@ class Limits:
 
 def per_joint(limits: Limits, name: str, robot: Manipulator) -> Array:
     """Return a limit of each joint (n,), infinite where there is none."""
-    given = getattr(limits, name)
-    values = np.atleast_1d(np.array(np.inf if given is None else given, dtype=float))
+    setting = getattr(limits, name)
+    values = np.atleast_1d(np.array(np.inf if setting is None else setting, dtype=float))
     if values.size not in (1, robot.joint_count):
         raise DataError(
             f"limits: {values.size} numbers for {name}, one expected or {robot.joint_count}, one "

@@ -105,7 +105,7 @@ def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
     True
     """
     times, step = np.linspace(0.0, motion.duration, samples, retstep=True)
-    found, robot = [], motion.robot
+    least_margins, robot = [], motion.robot
     coarse = _margins_of(robot, limits, motion.states(times))
     for name, values in coarse.items():
         tightest = times[int(values.min(axis=-1).argmin())]
@@ -114,8 +114,8 @@ def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
         k, leg = np.unravel_index(int(values.argmin()), values.shape)
         owner, unit = None if name == "type_ii" else int(leg) + 1, unit_of(robot, name, int(leg))
         when = float(near[k] % motion.duration)
-        found.append(Margin(name, float(values[k, leg]), owner, when, unit))
-    return Margins(tuple(found), samples)
+        least_margins.append(Margin(name, float(values[k, leg]), owner, when, unit))
+    return Margins(tuple(least_margins), samples)
 
 
 def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str, Array]:
@@ -124,9 +124,9 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
     # Half its range for a joint, 1 for the two measures, else the limit itself.
     sizes = {name: per_joint(limits, name, robot) for name in PER_JOINT}
     sizes["joint_clearance"] = joint_sizes(robot)
-    found = _margins_of(robot, limits, motion.states(times))
+    absolute = _margins_of(robot, limits, motion.states(times))
     relative = {}
-    for name, values in found.items():
+    for name, values in absolute.items():
         size = np.broadcast_to(sizes.get(name, 1.0), values.shape[1:])
         # A limit that is infinite has its whole margin.
         relative[name] = np.divide(
@@ -138,20 +138,20 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
     """Refuse limits that the machine violates at rest in its home pose; the message names one."""
     zero = np.zeros((1, len(home)))
-    rest = FullMotion.of_platform(robot, home[None], zero, zero)
-    for name, values in _margins_of(robot, limits, rest).items():
+    at_rest = FullMotion.of_platform(robot, home[None], zero, zero)
+    for name, values in _margins_of(robot, limits, at_rest).items():
         leg = int(values[0].argmin())
-        left = values[0, leg]
-        if left > 0.0:
+        margin = values[0, leg]
+        if margin > 0.0:
             continue
         whose = "the platform" if name == "type_ii" else f"leg {leg + 1}"
-        given = getattr(limits, name)
+        setting = getattr(limits, name)
         if name == "force":
-            wanted, has = f"at most {given}", per_joint(limits, name, robot)[leg] - left
+            limit_text, has = f"at most {setting}", per_joint(limits, name, robot)[leg] - margin
         else:
-            wanted, has = f"at least {given:g}", given + left
+            limit_text, has = f"at least {setting:g}", setting + margin
         raise ModelError(
-            f"limits: {name} of {wanted} {unit_of(robot, name, leg)}".rstrip()
+            f"limits: {name} of {limit_text} {unit_of(robot, name, leg)}".rstrip()
             + f" is impossible: {whose} of {robot.name} has {has:.4g} at rest in the home pose, "
             "the best one; loosen it"
         )
@@ -166,25 +166,25 @@ def _limits_passive(robot: Manipulator) -> bool:
 
 def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[str, Array]:
     """Return every limit's margins (T, n) or (T, 1), -inf at poses out of reach."""
-    found = {"type_i": evaluate_unchecked(robot, "reach", state.pose)[1] - limits.type_i}
+    margins = {"type_i": evaluate_unchecked(robot, "reach", state.pose)[1] - limits.type_i}
     if closure_of(robot).vanishes() is None or robot.platform.angles:
         type_ii = np.abs(evaluate_unchecked(robot, "type_ii", state.pose))[:, None]
-        found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
+        margins["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
     if any(leg.limits for leg in robot.legs):
         clearances = joint_clearances(limits, robot)
-        found["joint_clearance"] = joint_distances(robot, state.joints) - clearances
+        margins["joint_clearance"] = joint_distances(robot, state.joints) - clearances
     if _limits_passive(robot):
         passive = evaluate_unchecked(robot, "passive_room", state.pose)[0]
-        found["passive_clearance"] = passive - limits.passive_clearance
-    found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
-    found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
+        margins["passive_clearance"] = passive - limits.passive_clearance
+    margins["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
+    margins["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
     if limits.force is not None:
-        drives, still = drives_of(robot), np.zeros_like(state.pose)
+        drives, zeros = drives_of(robot), np.zeros_like(state.pose)
         moving = evaluate_unchecked(robot, "inverse_dynamics", *state[:3])
         moving = moving + drives.inertia * state.accelerations + drives.viscous * state.rates
-        held = evaluate_unchecked(robot, "inverse_dynamics", state.pose, still, still)
-        needed = np.maximum(np.abs(moving + drives.offset), np.abs(held + drives.offset))
+        static = evaluate_unchecked(robot, "inverse_dynamics", state.pose, zeros, zeros)
+        needed = np.maximum(np.abs(moving + drives.offset), np.abs(static + drives.offset))
         # Dry friction counts in full, whichever way a joint moves.
         dry = drives.coulomb + drives.stribeck
-        found["force"] = per_joint(limits, "force", robot) - dry - needed
-    return {name: np.where(np.isnan(values), -np.inf, values) for name, values in found.items()}
+        margins["force"] = per_joint(limits, "force", robot) - dry - needed
+    return {name: np.where(np.isnan(values), -np.inf, values) for name, values in margins.items()}

@@ -31,11 +31,11 @@ def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, 
     held_out, slow = (
         check_output(first.with_stem(first.stem + ending), dialect) for ending in _BESIDE
     )
-    for one in (first, held_out, slow):
-        beside = one.with_suffix(".toml")
+    for table in (first, held_out, slow):
+        beside = table.with_suffix(".toml")
         if beside.is_dir():
             raise OutputError(f"{beside}: is a folder; name another file")
-        if beside.is_file() and find_description(one) != beside:
+        if beside.is_file() and find_description(table) != beside:
             raise OutputError(f"{beside}: describes a machine, and is kept; name another file")
     return first, held_out, slow
 

@@ -118,17 +118,19 @@ def random_excitation(
         return FourierMotion(robot, space, period, center, *np.zeros((2, harmonics, n)))
 
     for _ in range(_HALVINGS):
-        rest = still(middle + offset)
-        if is_clear(rest, limits, 2, _COARSE_CLEAR) and (found := _largest(rest, shape, limits)):
-            return found
+        resting = still(middle + offset)
+        if is_clear(resting, limits, 2, _COARSE_CLEAR) and (
+            motion := _largest(resting, shape, limits)
+        ):
+            return motion
         offset = 0.5 * offset
-    found = _largest(still(middle), shape, limits)
-    if found is None:
+    motion = _largest(still(middle), shape, limits)
+    if motion is None:
         raise ModelError(
             f"limits: no motion of {robot.name} about its home pose keeps them all; loosen those "
             "that it barely keeps at rest"
         )
-    return found
+    return motion
 
 
 def sizes(robot: Manipulator, space: Space) -> Array:
@@ -141,8 +143,8 @@ def sizes(robot: Manipulator, space: Space) -> Array:
 
 def is_clear(motion: Movement, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:
     """Return whether all limits are kept at so many samples, by a share of their sizes."""
-    found = relative_margins(motion, limits, np.linspace(0.0, motion.duration, samples))
-    return all(float(values.min()) >= clear for values in found.values())
+    margins = relative_margins(motion, limits, np.linspace(0.0, motion.duration, samples))
+    return all(float(values.min()) >= clear for values in margins.values())
 
 
 def within_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None:
@@ -166,14 +168,14 @@ def within_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None
     return _scaled(motion, low)
 
 
-def _largest(still: FourierMotion, shape: Array, limits: Limits) -> FourierMotion | None:
+def _largest(center_motion: FourierMotion, shape: Array, limits: Limits) -> FourierMotion | None:
     """Return the motion of that shape about a center, as large as it can be; None without room."""
 
     def sized(scale: float) -> FourierMotion:
-        return still.with_coefficients(np.vstack([still.center, scale * shape]))
+        return center_motion.with_coefficients(np.vstack([center_motion.center, scale * shape]))
 
     def kept(scale: float) -> bool:
-        return is_clear(sized(scale), limits, _COARSE * still.harmonics, _COARSE_CLEAR)
+        return is_clear(sized(scale), limits, _COARSE * center_motion.harmonics, _COARSE_CLEAR)
 
     low, high = 0.0, 1.0
     for _ in range(_DOUBLINGS):

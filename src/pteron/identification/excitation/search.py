@@ -184,12 +184,12 @@ def optimal_excitation(
             # At least half the time is for improvements, however long the drawing took.
             until = max(begin + (attempt + 1) * seconds, time.monotonic() + 0.5 * seconds)
             first, second = ROUNDS[criterion]
-            left = until - time.monotonic()
-            search.improve(search.starts, first, _FIRST * left, processes)
-            best = sorted(search.starts, key=lambda one: search.cost(one.best))
-            left = until - time.monotonic()
-            search.improve(best[: math.ceil(starts / _ONE_OF)], second, left, processes)
-            if search.identifies or all(one.finished for one in search.starts):
+            remaining = until - time.monotonic()
+            search.improve(search.starts, first, _FIRST * remaining, processes)
+            best = sorted(search.starts, key=lambda start: search.cost(start.best))
+            remaining = until - time.monotonic()
+            search.improve(best[: math.ceil(starts / _ONE_OF)], second, remaining, processes)
+            if search.identifies or all(start.finished for start in search.starts):
                 break
     except KeyboardInterrupt:
         if not search.drawn:
@@ -235,19 +235,19 @@ class _Search:
 
     def lengths(self) -> Array:
         """Return the columns' lengths (p,) in the random motions, as root mean squares."""
-        found = np.array([np.linalg.norm(one.root, axis=0) for one in self.drawn])
-        reached = found[np.isfinite(found).all(axis=1)]
+        norms = np.array([np.linalg.norm(candidate.root, axis=0) for candidate in self.drawn])
+        reached = norms[np.isfinite(norms).all(axis=1)]
         return np.sqrt((reached**2).mean(axis=0)) if len(reached) else np.zeros(self.base.rank)
 
-    def cost(self, one: _Candidate) -> float:
+    def cost(self, candidate: _Candidate) -> float:
         if self.criterion == "logdet":
-            return -one.conditioning.logdet
-        return condition_of_long(one.root, self.short)
+            return -candidate.conditioning.logdet
+        return condition_of_long(candidate.root, self.short)
 
     @property
     def identifies(self) -> bool:
         """Whether the best motion shows all base parameters."""
-        best = min(self.starts, key=lambda one: self.cost(one.best)).best
+        best = min(self.starts, key=lambda start: self.cost(start.best)).best
         return best.conditioning.scaled <= IDENTIFIES
 
     def choose(self, starts: int) -> None:
@@ -268,17 +268,17 @@ class _Search:
         each = seconds / math.ceil(len(starts) / workers)
         if each <= 0.0:
             return
-        motions = enumerate(one.best.motion for one in starts)
+        motions = enumerate(stage.best.motion for stage in starts)
         tasks = [Improvement(k, self.setting, plan, motion, each) for k, motion in motions]
         seen, share = self.seen, [0.0] * len(starts)
         weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
         with closing(improved(tasks, workers)) as stages:
-            for one in stages:
-                share[one.number] = 1.0 if one.ended else one.done / (plan.stages + 1)
-                start = starts[one.number]
-                start.finished = start.finished or (one.finished and plan.thorough)
-                if one.found is not None:
-                    start.best = min(start.best, self.judged(one.found), key=self.cost)
+            for stage in stages:
+                share[stage.number] = 1.0 if stage.ended else stage.done / (plan.stages + 1)
+                start = starts[stage.number]
+                start.finished = start.finished or (stage.finished and plan.thorough)
+                if stage.found is not None:
+                    start.best = min(start.best, self.judged(stage.found), key=self.cost)
                 self.report(seen + weight * sum(share) / len(share))
 
     def report(self, share: float) -> None:
@@ -287,12 +287,12 @@ class _Search:
 
     def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:
         random = min(self.drawn, key=self.cost)
-        best = min([*(one.best for one in self.starts), random], key=self.cost)
+        best = min([*(start.best for start in self.starts), random], key=self.cost)
         starts = tuple(
-            Start(one.draw, one.first.conditioning, one.best.conditioning, one.finished)
-            for one in self.starts
+            Start(start.draw, start.first.conditioning, start.best.conditioning, start.finished)
+            for start in self.starts
         )
-        left, lead = margins(best.motion, limits), found_lead(best.motion, limits)
-        how = self.criterion, best.conditioning, random.conditioning, left, lead, starts
+        best_margins, lead = margins(best.motion, limits), found_lead(best.motion, limits)
+        how = self.criterion, best.conditioning, random.conditioning, best_margins, lead, starts
         ended = len(self.drawn), seed, seconds, interrupted
         return Excitation(best.motion, limits, *how, *ended)

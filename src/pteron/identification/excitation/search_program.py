@@ -83,33 +83,33 @@ def minimised(
     """
     size = sizes(setting.robot, setting.space)
     cost = _cost(setting, doublings)
-    kept = _Kept(setting, watched, np.concatenate([_instants(setting), extra]))
+    constraints = _Kept(setting, watched, np.concatenate([_instants(setting), extra]))
     deadline = time.monotonic() + seconds
 
     def measured(z: Array) -> tuple[float, Array]:
         value, gradient = cost(z.reshape(start.shape))
         return float(_numbers(value).item()), _numbers(gradient).ravel()
 
-    found = sequential_minimum(
-        NonlinearProgram(measured, kept.values, kept.slopes),
+    minimum = sequential_minimum(
+        NonlinearProgram(measured, constraints.values, constraints.slopes),
         (start / size).ravel(),
         radius=_RADIUS,
         settled=_SETTLED,
         iterations=_ITERATIONS,
         stop=lambda: time.monotonic() > deadline,
     )
-    return None if found is None else found.reshape(start.shape) * size
+    return None if minimum is None else minimum.reshape(start.shape) * size
 
 
 def _numbers(matrix: ca.DM) -> Array:
     """Return the entries of a matrix; in the middle of an interrupt CasADi gives none, or fails."""
     try:
-        found: Array | None = matrix.full()
-        if found is None:
+        array: Array | None = matrix.full()
+        if array is None:
             raise KeyboardInterrupt  # a SystemError where an exception is pending
     except SystemError:
         raise KeyboardInterrupt from None
-    return found
+    return array
 
 
 class _Kept:
@@ -125,16 +125,16 @@ class _Kept:
 
     def values(self, z: Array) -> Array:
         """Return the margins (R,)."""
-        found = _numbers(self._path(*self._along(z))).T
-        return self._sides(found - self._low, self._high - found)
+        path_values = _numbers(self._path(*self._along(z))).T
+        return self._sides(path_values - self._low, self._high - path_values)
 
     def slopes(self, z: Array) -> Array:
         """Return their derivatives by the variables (R, v)."""
         count, limits, n = self._rows.shape[1], len(self._low), len(self._size)
         blocks = _numbers(self._slopes(*self._along(z))).T.reshape(count, 3, n, limits)
-        found = np.einsum("tdig,dtk->tgki", blocks * self._size[:, None], self._rows)
-        found = found.reshape(count, limits, -1)
-        return self._sides(found, -found)
+        derivatives = np.einsum("tdig,dtk->tgki", blocks * self._size[:, None], self._rows)
+        derivatives = derivatives.reshape(count, limits, -1)
+        return self._sides(derivatives, -derivatives)
 
     def _along(self, z: Array) -> list[Array]:
         coefficients = z.reshape(-1, len(self._size)) * self._size
@@ -163,8 +163,8 @@ def _cost(setting: Setting, doublings: int) -> ca.Function:
     n = setting.robot.freedom
     z = ca.MX.sym("z", 2 * setting.harmonics + 1, n)
     coefficients = ca.mtimes(z, ca.diag(ca.DM(sizes(setting.robot, setting.space))))
-    along = [ca.mtimes(ca.DM(row), coefficients).T for row in _bases(setting, times)]
-    blocks = _regressor(setting).map(len(times))(*along)
+    curve = [ca.mtimes(ca.DM(row), coefficients).T for row in _bases(setting, times)]
+    blocks = _regressor(setting).map(len(times))(*curve)
     information = ca.mtimes(blocks, blocks.T) / len(times)
     value = measure(information, setting.criterion, doublings, setting.short)
     return ca.Function("cost", [z], [value, ca.gradient(value, z)])
@@ -190,13 +190,13 @@ def _path(
     robot, limits = setting.robot, setting.limits
     q, state = _state(setting)
     pose, velocity, _ = state
-    found: dict[str, tuple[Expression, float | Array, float | Array]] = {}
+    limit_terms: dict[str, tuple[Expression, float | Array, float | Array]] = {}
     squares = program(robot, "squared_type_i").function(pose).T
-    found["type_i"] = squares, (limits.type_i + _BACK_OFF) ** 2, np.inf
+    limit_terms["type_i"] = squares, (limits.type_i + _BACK_OFF) ** 2, np.inf
     # An assembly mode keeps the sign that the measure has in the home pose.
     sign = float(np.sign(evaluate_unchecked(robot, "type_ii", np.array(home(robot)))))
     type_ii = sign * program(robot, "type_ii").function(pose)
-    found["type_ii"] = type_ii / best_type_ii(robot), limits.type_ii + _BACK_OFF, np.inf
+    limit_terms["type_ii"] = type_ii / best_type_ii(robot), limits.type_ii + _BACK_OFF, np.inf
     if setting.space == "joints":
         joints, rates, seconds = q
     else:
@@ -205,19 +205,19 @@ def _path(
         seconds = program(robot, "joint_accelerations").function(*state)[0].T
     ranges = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs])
     clearance = joint_clearances(limits, robot) + _BACK_OFF * joint_sizes(robot)
-    found["joint_clearance"] = joints, ranges[:, 0] + clearance, ranges[:, 1] - clearance
+    limit_terms["joint_clearance"] = joints, ranges[:, 0] + clearance, ranges[:, 1] - clearance
     passive = program(robot, "passive_room").function(pose)[0].T
-    found["passive_clearance"] = passive, limits.passive_clearance + _BACK_OFF, np.inf
+    limit_terms["passive_clearance"] = passive, limits.passive_clearance + _BACK_OFF, np.inf
     for name, value in (("speed", rates), ("acceleration", seconds)):
-        found[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
-    dynamics, still = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)
+        limit_terms[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
+    dynamics, zeros = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)
     drives, values = Drives(*map(ca.DM, drives_of(robot))), ca.DM(parameters(robot))
     moving = dynamics(*state, values).T + drives.inertia * seconds + drives.viscous * rates
-    held = dynamics(pose, still, still, values).T
+    static = dynamics(pose, zeros, zeros, values).T
     most = ca.DM(per_joint(limits, "force", robot)) - (drives.coulomb + drives.stribeck)
-    needed = ca.vertcat(*((forces + drives.offset) / most for forces in (moving, held)))
-    found["force"] = needed, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
-    values, *sides = zip(*(found[name] for name in watched), strict=True)
+    needed = ca.vertcat(*((forces + drives.offset) / most for forces in (moving, static)))
+    limit_terms["force"] = needed, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
+    values, *sides = zip(*(limit_terms[name] for name in watched), strict=True)
     low, high = (
         np.concatenate([np.broadcast_to(b, v.shape[0]) for v, b in zip(values, side, strict=True)])
         for side in sides

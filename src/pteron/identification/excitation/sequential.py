@@ -116,18 +116,18 @@ def sequential_minimum(
     for _ in range(iterations):
         if stop() or radius < _SMALLEST:
             break
-        step, multipliers, left = _step(here, slopes, hessian, radius, weight)
+        step, multipliers, remaining_violation = _step(here, slopes, hessian, radius, weight)
         while _PENALTY * multipliers.sum() > weight and weight < _DEAREST:
             dearer = _step(here, slopes, hessian, radius, 2.0 * weight)
-            if left > 0.0 and not dearer[2] < _MENDED * left:
+            if remaining_violation > 0.0 and not dearer[2] < _MENDED * remaining_violation:
                 break  # no step within the region does better
-            step, multipliers, left = dearer
+            step, multipliers, remaining_violation = dearer
             weight *= 2.0
         if not np.isfinite(step).all():
             radius *= _SHRINK
             continue
         model = here.gradient @ step + 0.5 * step @ hessian @ step
-        promised = weight * (here.violation - left) - model
+        promised = weight * (here.violation - remaining_violation) - model
         if promised < settled:
             break
         there = _iterate(program, x + step)

@@ -80,14 +80,14 @@ def by_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
         return log
     drives = [leg.drive or Drive() for leg in robot.legs]
     gains = tuple(drive.gear * (drive.rated_torque or 0.0) / 100.0 for drive in drives)
-    whole = ", ".join(
+    full_scale = ", ".join(
         f"{100.0 * gain:.4g} {leg.joint.force_unit}"
         for gain, leg in zip(gains, robot.legs, strict=True)
     )
     finding = Finding(
         "read",
         f"{log.source}: forces in per cent of the motors' rated torque: by ratio and rated_torque "
-        f"of the robot's drives 100 % are {whole}",
+        f"of the robot's drives 100 % are {full_scale}",
     )
     return log.with_gains(replace(about, gains=gains), finding)
 
@@ -103,7 +103,7 @@ def per_cent_advice(robot: Manipulator) -> str:
 
 def _lacking(robot: Manipulator, names: tuple[str, ...]) -> str:
     """Return which of a drive's values some leg has not, with the legs; empty if none."""
-    given = [[getattr(leg.drive, name, None) is not None for name in names] for leg in robot.legs]
-    legs = [str(i) for i, one in enumerate(given, start=1) if not all(one)]
-    absent = [name for k, name in enumerate(names) if not all(one[k] for one in given)]
+    known = [[getattr(leg.drive, name, None) is not None for name in names] for leg in robot.legs]
+    legs = [str(i) for i, flags in enumerate(known, start=1) if not all(flags)]
+    absent = [name for k, name in enumerate(names) if not all(flags[k] for flags in known)]
     return f"{' and '.join(absent)} (legs {', '.join(legs)})" if absent else ""

@@ -39,15 +39,15 @@ def bridged(log: Log) -> Log:
     if log.rows < 2:
         return log
     step = 1.0 / log.rate
-    apart = gaps(log.time, step)
-    missing = np.where(apart, np.rint(np.diff(log.time) / step).astype(int) - 1, 0)
+    is_gap = gaps(log.time, step)
+    missing = np.where(is_gap, np.rint(np.diff(log.time) / step).astype(int) - 1, 0)
     short = (missing >= 1) & (missing <= _LONGEST)
     if log.payload is not None:
         short &= np.diff(log.payload) == 0
     if short.sum() <= _OFTEN * log.rows:
         return log
     parts = []
-    for start, stop in stretches(apart & ~short):
+    for start, stop in stretches(is_gap & ~short):
         part = log.part(start, stop)
         lost = (missing * short)[start : stop - 1]
         parts.append(part if part.rows < _AROUND else _filled(part, lost))
@@ -103,13 +103,13 @@ def _fitted(
     """
     step = float(np.median(np.diff(time)))
     side = _side(time / step, values, degree)
-    found = np.empty((len(places), values.shape[1]))
+    predictions = np.empty((len(places), values.shape[1]))
     for k, (row, at) in enumerate(zip(places.tolist(), instants.tolist(), strict=True)):
         start = min(max(row + 1 - side, 0), max(len(time) - 2 * side, 0))
         rows = slice(start, start + 2 * side)
         powers = np.vander((time[rows] - at) / step, degree + 1, increasing=True)
-        found[k] = np.linalg.lstsq(powers, values[rows], rcond=None)[0][0]
-    return found
+        predictions[k] = np.linalg.lstsq(powers, values[rows], rcond=None)[0][0]
+    return predictions
 
 
 def _side(ticks: Array, values: Array, degree: int) -> int:
@@ -123,9 +123,9 @@ def _side(ticks: Array, values: Array, degree: int) -> int:
         weights = np.linalg.pinv(np.vander(offsets, degree + 1, increasing=True))[0]
         kernel = np.insert(weights, side, 0.0)
         predicted = scipy.ndimage.correlate1d(values, kernel, axis=0)[side:-side]
-        whole = ticks[2 * side :] - ticks[: -2 * side] < 2 * side + 0.5
-        if whole.any():
-            errors[side] = np.median(np.abs(predicted - values[side:-side])[whole], axis=0)
+        is_even = ticks[2 * side :] - ticks[: -2 * side] < 2 * side + 0.5
+        if is_even.any():
+            errors[side] = np.median(np.abs(predicted - values[side:-side])[is_even], axis=0)
     if not errors:
         return _SIDES[-1]
     least = np.min([*errors.values()], axis=0)

@@ -85,15 +85,15 @@ class Channel:
             self._beyond += int(beyond.sum())
         starts = np.flatnonzero(np.diff(values, prepend=np.nan))
         lengths = np.diff(starts, append=len(values))
-        held = values[starts]
-        extreme = np.isin(held, [self._least, self._greatest])
+        levels = values[starts]
+        extreme = np.isin(levels, [self._least, self._greatest])
         telling = (lengths > _FROZEN_ROWS) | extreme & (lengths >= _CLIPPED_ROWS)
         # The first may go on with the run of the piece before, and the last in the next one.
         telling[[0, -1]] = True
         for i in np.flatnonzero(telling):
             start, stop = int(starts[i]), int(starts[i] + lengths[i])
             least, greatest = joints[start:stop].min(axis=0), joints[start:stop].max(axis=0)
-            run = _Run(float(held[i]), self._rows + start, self._rows + stop, least, greatest)
+            run = _Run(float(levels[i]), self._rows + start, self._rows + stop, least, greatest)
             last = self._runs[-1] if self._runs else run
             if i == 0 and last is not run and last.value == run.value:
                 last.stop = run.stop
@@ -111,7 +111,7 @@ class Channel:
         DataError
             If the channel held one value throughout.
         """
-        runs, column, found = self._runs, f"column {self._column}", []
+        runs, column, findings = self._runs, f"column {self._column}", []
         if runs and runs[0].rows == self._rows:
             raise DataError(
                 f"{self._source}: {column} holds {runs[0].value:g} in all {self._rows} rows: dead "
@@ -119,29 +119,29 @@ class Channel:
             )
         frozen = [run for run in runs if run.rows > _FROZEN_ROWS and self._is_frozen(run)]
         if frozen:
-            first, more = frozen[0], f" ({len(frozen)} such stretches in all)"
+            first, count_text = frozen[0], f" ({len(frozen)} such stretches in all)"
             message = (
                 f"{column} holds {first.value:g} in rows {first.start + 1} to {first.stop} while "
-                f"other joints move: frozen channel{more * (len(frozen) > 1)}"
+                f"other joints move: frozen channel{count_text * (len(frozen) > 1)}"
             )
-            found.append(self._finding("frozen", message, first.start, len(frozen)))
+            findings.append(self._finding("frozen", message, first.start, len(frozen)))
         if self._limits is not None and self._beyond:
             low, high = self._limits
             message = (
                 f"{column} is at or beyond its limits {low:g} and {high:g} in "
                 f"{self._beyond} rows, first in row {self._first_beyond + 1}: clipped"
             )
-            found.append(self._finding("clipped", message, self._first_beyond, self._beyond))
+            findings.append(self._finding("clipped", message, self._first_beyond, self._beyond))
         for word, value in (("greatest", self._greatest), ("least", self._least)):
-            held = [run for run in runs if run.value == value and run.rows >= _CLIPPED_ROWS]
-            if self._limits is None and self._is_force and len(held) >= _CLIPPED_RUNS:
-                rows, start = sum(run.rows for run in held), held[0].start
+            extreme_runs = [run for run in runs if run.value == value and run.rows >= _CLIPPED_ROWS]
+            if self._limits is None and self._is_force and len(extreme_runs) >= _CLIPPED_RUNS:
+                rows, start = sum(run.rows for run in extreme_runs), extreme_runs[0].start
                 message = (
-                    f"{column} holds its {word} value {value:g} in {len(held)} stretches, "
+                    f"{column} holds its {word} value {value:g} in {len(extreme_runs)} stretches, "
                     f"{rows} rows in all, first from row {start + 1}: clipped"
                 )
-                found.append(self._finding("clipped", message, start, rows))
-        return tuple(found)
+                findings.append(self._finding("clipped", message, start, rows))
+        return tuple(findings)
 
     def _is_frozen(self, run: _Run) -> bool:
         at_the_end = run.start == 0 or run.stop == self._rows

@@ -98,9 +98,9 @@ class Clock:
             If a cell holds no time; the message names the row.
         """
         if len(self.columns) == 2:
-            whole, rest = (self._whole(table, name) for name in self.columns)
-            if whole is not None and rest is not None:
-                return self._since(whole * _NANO + rest, _NANO)
+            seconds_part, nanoseconds_part = (self._whole(table, name) for name in self.columns)
+            if seconds_part is not None and nanoseconds_part is not None:
+                return self._since(seconds_part * _NANO + nanoseconds_part, _NANO)
             numbers = table.numbers(self.columns)
             return np.asarray(numbers[:, 0] + numbers[:, 1] / _NANO)
         name = self.columns[0]
@@ -135,16 +135,16 @@ class Clock:
         if stamps.has_nulls():
             row = int(np.argmax(stamps.is_null().to_numpy()))
             cell = str(table.frame[name][row] or "").strip()
-            given = f"{shown(cell)} given" if cell else "the cell is empty"
+            cell_text = f"{shown(cell)} given" if cell else "the cell is empty"
             raise DataError(
-                f"{table.place(row)}, column {shown(name, bare=True)}: {given}, a time like "
+                f"{table.place(row)}, column {shown(name, bare=True)}: {cell_text}, a time like "
                 f"{self.format} expected; correct the cell"
             )
         counts = stamps.to_numpy().astype(np.int64)
         if self.format == "hh:mm:ss" and len(counts):
             # A step back of half a day is a midnight; a smaller one is a fault, reported later.
-            before = self._last if self._origin is not None else int(counts[0])
-            passed = np.diff(counts, prepend=before) < -_DAY * _NANO // 2
+            last_count = self._last if self._origin is not None else int(counts[0])
+            passed = np.diff(counts, prepend=last_count) < -_DAY * _NANO // 2
             days = self._days + np.cumsum(passed)
             self._last, self._days = int(counts[-1]), int(days[-1])
             counts = counts + days * (_DAY * _NANO)

@@ -50,26 +50,26 @@ class ColumnNames:
         """
         example = self._example(kind)
         needed = listed(self.needed)
-        others = next((one for one in families if numbers[0] in one), None)
+        others = next((family for family in families if numbers[0] in family), None)
         if others is None:
             return DataError(
                 f"{self.source}: no columns for the {kind.noun} (found: {listed(self.names)}; "
                 f"needed: {needed}); {self.hint}, or declare the file's own names in a TOML file "
                 f"beside it{example}"
             )
-        given = [others[i] for i in sorted(others)]
+        present = [others[i] for i in sorted(others)]
         word = others[numbers[0]].removesuffix(str(numbers[0]))
         absent = [f"{word}{i}" for i in numbers if i not in others]
         fault = f"without {listed(absent)}, or " if absent else ""
         return DataError(
-            f"{self.source}: the columns {listed(given)} are for {len(given)} {kind.noun}, but the "
-            f"machine has {self.legs} legs (needed: {needed}); {fault}perhaps it is the log of "
+            f"{self.source}: the columns {listed(present)} are for {len(present)} {kind.noun}, but "
+            f"the machine has {self.legs} legs (needed: {needed}); {fault}perhaps it is the log of "
             f"another machine; else declare the columns in a TOML file beside it{example}"
         )
 
     def ambiguous(self, kind: Wanted, choices: Sequence[Sequence[str]]) -> DataError:
         """Return the error for columns that are as good as others; the first are shown declared."""
-        names = [one[0] for one in choices] if len(choices) > 1 else choices[0]
+        names = [columns[0] for columns in choices] if len(choices) > 1 else choices[0]
         single = kind.table in ("time", "payload")
         entry = {"column": choices[0][0]} if single else {"columns": list(choices[0])}
         if kind.table == "pose" or (not single and len(choices[0]) != self.legs):
@@ -88,7 +88,7 @@ class ColumnNames:
             name
             for name in self.names
             if name not in self.taken and name.isprintable() and len(name) < _LONGEST
-            if (one := called(name)) is None or not any(means(one.word, s) for s in others)
+            if (parts := called(name)) is None or not any(means(parts.word, s) for s in others)
         ]
         if kind.table == "time":
             return ", such as" + declaration("time", column=free[0]) if free else ""

@@ -56,18 +56,18 @@ def find_columns(
     """
     d, joints = description, joint_symbols(robot)
     needed = [d.time_column or "t"]
-    needed += d.joint_columns or [f"{one.coordinate}{i}" for i, one in enumerate(joints, 1)]
-    needed += d.force_columns or [f"{one.force}{i}" for i, one in enumerate(joints, 1)]
+    needed += d.joint_columns or [f"{joint.coordinate}{i}" for i, joint in enumerate(joints, 1)]
+    needed += d.force_columns or [f"{joint.force}{i}" for i, joint in enumerate(joints, 1)]
     search = ColumnSearch(tuple(names), units, len(joints), needed, source, hint)
     travels = [
-        Wanted("joints", one.coordinate, f"{one.noun}s", one.unit, unit)
-        for one, unit in zip(joints, d.joint_units(robot), strict=True)
+        Wanted("joints", joint.coordinate, f"{joint.noun}s", joint.unit, unit)
+        for joint, unit in zip(joints, d.joint_units(robot), strict=True)
     ]
     raw = d.column_force_unit
-    units_of_forces = [one.force_unit if raw in ("N", "N m") else raw for one in joints]
+    units_of_forces = [joint.force_unit if raw in ("N", "N m") else raw for joint in joints]
     actuators = [
-        Wanted("forces", one.force, f"{one.force}s", one.force_unit, unit)
-        for one, unit in zip(joints, units_of_forces, strict=True)
+        Wanted("forces", joint.force, f"{joint.force}s", joint.force_unit, unit)
+        for joint, unit in zip(joints, units_of_forces, strict=True)
     ]
     numbers = range(1, len(joints) + 1)
     time = search.time(Wanted("time", "t", "time", "s", d.time_unit), d.time_column)
@@ -115,14 +115,14 @@ def repeated_times(repeated: Mapping[str, str], columns: Columns, source: str) -
 def check_times(table: Table, first: str, others: Sequence[str]) -> None:
     """Raise a `DataError` where a channel was sampled at another time than the first."""
     for name in others:
-        apart = (table.frame[name] != table.frame[first]).fill_null(value=True)
-        if apart.any():
-            row = int(np.argmax(apart.to_numpy()))
-            one, other = (shown(str(table.frame[key][row])) for key in (first, name))
+        differs = (table.frame[name] != table.frame[first]).fill_null(value=True)
+        if differs.any():
+            row = int(np.argmax(differs.to_numpy()))
+            first_time, other_time = (shown(str(table.frame[key][row])) for key in (first, name))
             raise DataError(
                 f"{table.place(row)}: its channels were not sampled at one time: {first} is "
-                f"{one}, {name} is {other}; record all channels with one sample time, or "
-                "export them with one time column"
+                f"{first_time}, {name} is {other_time}; record all channels with one sample time, "
+                "or export them with one time column"
             )
 
 

@@ -72,10 +72,12 @@ def _rising(pair: tuple[float, float]) -> tuple[float, float]:
     return pair
 
 
-def _pairs(given: Any) -> Any:
+def _pairs(limits: Any) -> Any:
     """Return one pair, which holds for all joints, as a list of pairs."""
-    flat = isinstance(given, list | tuple) and len(given) == 2
-    return [given] if flat and not any(isinstance(one, list | tuple) for one in given) else given
+    flat = isinstance(limits, list | tuple) and len(limits) == 2
+    return (
+        [limits] if flat and not any(isinstance(part, list | tuple) for part in limits) else limits
+    )
 
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
@@ -93,12 +95,12 @@ _CONFIG = ConfigDict(extra="forbid", validate_by_name=True, validate_by_alias=Tr
 def _raises_data_errors(cls: _Class) -> _Class:
     """Make a pydantic dataclass refuse its arguments with a `DataError`."""
     checked: Callable[..., None] = cls.__init__  # type: ignore[misc]
-    names = [one.name for one in fields(cls)]
+    names = [field.name for field in fields(cls)]
 
     @wraps(checked)
-    def __init__(self: Any, *args: Any, **given: Any) -> None:  # noqa: N807
+    def __init__(self: Any, *args: Any, **named: Any) -> None:  # noqa: N807
         try:
-            checked(self, **dict(zip(names, args, strict=False)), **given)
+            checked(self, **dict(zip(names, args, strict=False)), **named)
         except ValidationError as error:
             raise DataError(told(fault_lines(error, cls)), subject=cls.__name__) from None
 
@@ -255,16 +257,16 @@ class Description:
 
     @field_validator("payload", mode="before")
     @classmethod
-    def _whole_payload(cls, given: Any) -> Any:
-        if not isinstance(given, dict) or "mass" not in given:
-            return given
-        center, moment = "center_of_mass" in given, "first_moment" in given
-        if (center or moment) and "inertia" not in given:
+    def _whole_payload(cls, payload: Any) -> Any:
+        if not isinstance(payload, dict) or "mass" not in payload:
+            return payload
+        center, moment = "center_of_mass" in payload, "first_moment" in payload
+        if (center or moment) and "inertia" not in payload:
             raise ValueError("inertia is missing; give it about P, in kg m^2")
-        if "inertia" in given and center == moment:
+        if "inertia" in payload and center == moment:
             which = "both center_of_mass and" if center else "neither center_of_mass nor"
             raise ValueError(f"{which} first_moment given; give one of the two")
-        return given
+        return payload
 
     @model_validator(mode="after")
     def _agrees(self) -> Description:
@@ -321,7 +323,11 @@ class Description:
             )
         joints = joint_symbols(robot)
         for key, unit, known in (
-            ("joints.unit", self.joint_unit, [one for j in joints for one in _units_of(j)]),
+            (
+                "joints.unit",
+                self.joint_unit,
+                [joint_unit for j in joints for joint_unit in _units_of(j)],
+            ),
             ("forces.unit", self.column_force_unit, [*_OF_DRIVES, *(j.force_unit for j in joints)]),
         ):
             if unit is not None and unit not in known:

@@ -38,8 +38,10 @@ def find_description(log_path: str | Path) -> Path | None:
 
     A manipulator's file is no description of a log, whatever it is called.
     """
-    own = Path(log_path).with_suffix(".toml")
-    return next((path for path in (own, own.with_name(OF_FOLDER)) if _describes_log(path)), None)
+    beside = Path(log_path).with_suffix(".toml")
+    return next(
+        (path for path in (beside, beside.with_name(OF_FOLDER)) if _describes_log(path)), None
+    )
 
 
 def _describes_log(path: Path) -> bool:
@@ -167,13 +169,13 @@ def _tables(lines: str) -> dict[str, Any]:
 
 def _with(about: Description, added: dict[str, Any]) -> Description:
     """Return a description with more tables, as its file has them."""
-    whole = _plain(about)
+    tables = _plain(about)
     for table, entries in added.items():
         if table == "csv":
-            whole["csv"] = whole.get("csv", {}) | entries
+            tables["csv"] = tables.get("csv", {}) | entries
         else:
-            whole |= {f"{table}.{key}": value for key, value in entries.items()}
-    return validated(Description, whole, "", DataError)
+            tables |= {f"{table}.{key}": value for key, value in entries.items()}
+    return validated(Description, tables, "", DataError)
 
 
 def _plain(about: Description) -> dict[str, Any]:

@@ -159,23 +159,23 @@ class Log(OfLog):
     def _rows_of_numbers(self, name: str, values: Any) -> Any:
         """Return an array of the log as numbers, a row for each time."""
         axes = 2 if name in ("joints", "forces", "pose") else 1
-        whole = name in ("payload", "rows_in_file")
-        found = values if whole else as_array(values, f"{self.source}: {name}", ())
-        found = np.asarray(found)
-        rows = len(found) if name == "time" else len(self.time)
-        if found.ndim != axes or len(found) != rows:
+        integral = name in ("payload", "rows_in_file")
+        array = values if integral else as_array(values, f"{self.source}: {name}", ())
+        array = np.asarray(array)
+        rows = len(array) if name == "time" else len(self.time)
+        if array.ndim != axes or len(array) != rows:
             expected = ("T" if name == "time" else str(rows)) + (", n" if axes == 2 else ",")
             raise DataError(
-                f"{self.source}: {name} of shape {found.shape} given, ({expected}) expected"
+                f"{self.source}: {name} of shape {array.shape} given, ({expected}) expected"
             )
         # Forces that are none are told where they count, and poses may be missing.
-        if name not in ("pose", "forces") and not np.isfinite(found).all():
-            row = int(np.flatnonzero(~np.isfinite(found.reshape(rows, -1)).all(axis=1))[0])
+        if name not in ("pose", "forces") and not np.isfinite(array).all():
+            row = int(np.flatnonzero(~np.isfinite(array.reshape(rows, -1)).all(axis=1))[0])
             raise DataError(
                 f"{self.place(row)}, {name}: a finite number expected; leave the row out, a gap in "
                 "time is understood"
             )
-        return found
+        return array
 
     def __len__(self) -> int:
         return len(self.time)
@@ -214,12 +214,12 @@ class Log(OfLog):
     @property
     def joint_names(self) -> tuple[str, ...]:
         """The columns of joint coordinates: rho1 ..., theta1 ... at cranks."""
-        return tuple(f"{one.coordinate}{j}" for j, one in enumerate(self._symbols, start=1))
+        return tuple(f"{symbol.coordinate}{j}" for j, symbol in enumerate(self._symbols, start=1))
 
     @property
     def force_names(self) -> tuple[str, ...]:
         """The columns of actuator forces: force1 ..., torque1 ... at cranks."""
-        return tuple(f"{one.force}{j}" for j, one in enumerate(self._symbols, start=1))
+        return tuple(f"{symbol.force}{j}" for j, symbol in enumerate(self._symbols, start=1))
 
     @property
     def _symbols(self) -> tuple[ActuatedJoint, ...]:
@@ -244,17 +244,17 @@ class Log(OfLog):
     def with_gains(self, description: Description, finding: Finding) -> Log:
         """Return the log with the gains of a description, which a finding tells."""
         forces = self.forces * np.array(description.gains)
-        found = (*self.findings, finding)
-        return replace(self, forces=forces, description=description, findings=found)
+        findings = (*self.findings, finding)
+        return replace(self, forces=forces, description=description, findings=findings)
 
     def without(self, rows: NDArray[np.bool_]) -> Log:
         """Return the samples without some, (T,): where they were is a gap."""
         return replace(self, rows_in_file=rows_of(self))._taken(np.flatnonzero(~rows))
 
     def _taken(self, rows: slice | NDArray[np.int64]) -> Log:
-        held = {name: getattr(self, name) for name in _ARRAYS}
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
         changed: dict[str, Any] = {
-            name: values[rows] for name, values in held.items() if values is not None
+            name: values[rows] for name, values in arrays.items() if values is not None
         }
         return replace(self, **changed)
 
@@ -301,13 +301,13 @@ def gaps(time: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
     >>> gaps(even + [0, 0, 0, -0.3, 0.3, 0, 0, 0], 1.0).any()
     np.False_
     """
-    found = np.diff(time) > _WIDE * step
+    is_gap = np.diff(time) > _WIDE * step
     late = time / step - np.arange(len(time))
-    for i in np.flatnonzero(found & (np.diff(time) <= _SURELY * step)):
-        before = float(np.median(late[max(i + 1 - _AROUND, 0) : i + 1]))
-        after = float(np.median(late[i + 1 : i + 1 + _AROUND]))
-        found[i] = after - before > _LATER
-    return found
+    for i in np.flatnonzero(is_gap & (np.diff(time) <= _SURELY * step)):
+        lateness_before = float(np.median(late[max(i + 1 - _AROUND, 0) : i + 1]))
+        lateness_after = float(np.median(late[i + 1 : i + 1 + _AROUND]))
+        is_gap[i] = lateness_after - lateness_before > _LATER
+    return is_gap
 
 
 def are_apart(before: NDArray[np.float64], after: NDArray[np.float64], step: float) -> bool:
@@ -351,20 +351,20 @@ class TimeStamps:
                 "or declare the unit of time"
             )
         first = not len(self._before)
-        before = time[:1] if first else self._before
-        steps = np.diff(time, prepend=before[-1:])
+        earlier_times = time[:1] if first else self._before
+        steps = np.diff(time, prepend=earlier_times[-1:])
         if first:
             steps[:1] = self._step
         if (steps <= 0.0).any():
             i = int(np.argmax(steps <= 0.0))
-            earlier = float(time[i - 1] if i else before[-1])
+            earlier = float(time[i - 1] if i else earlier_times[-1])
             what = "is repeated" if time[i] == earlier else "runs backward"
             raise DataError(
                 f"{self._source}: row {self._rows + i + 1}, column {self._column}: time {what} "
                 f"({time[i]:.12g} s behind {earlier:.12g} s); put the rows in order, each with its "
                 "own time"
             )
-        missing = gaps(np.concatenate([before, time]), self._step)[len(before) - 1 :]
+        missing = gaps(np.concatenate([earlier_times, time]), self._step)[len(earlier_times) - 1 :]
         self._gaps += [
             (self._rows + int(i), float(time[i] - steps[i]), float(steps[i]))
             for i in np.flatnonzero(missing)
@@ -374,22 +374,22 @@ class TimeStamps:
         worst = int(np.argmax(deviations))
         if deviations[worst] > self._worst[0]:
             self._worst = (float(deviations[worst]), self._rows + worst)
-        self._before = np.concatenate([before, time])[-_CONTEXT:]
+        self._before = np.concatenate([earlier_times, time])[-_CONTEXT:]
         self._rows += len(time)
 
     def findings(self) -> tuple[Finding, ...]:
         """Return the findings of the pieces taken so far."""
-        found = []
+        findings = []
         if self._gaps:
             row, start, step = self._gaps[0]
-            lost = np.maximum(np.rint([one[2] / self._step for one in self._gaps]) - 1.0, 1.0)
+            lost = np.maximum(np.rint([gap[2] / self._step for gap in self._gaps]) - 1.0, 1.0)
             count = len(lost)
             message = (
                 f"{self._source}: {count} gap{'s' * (count > 1)}, {lost.sum():.0f} samples missing "
                 f"in all; the first is before row {row + 1}, behind t = {start:.9g} s: "
                 f"{lost[0]:.0f} missing (a step of {step:.6g} s where {self._step:.6g} s is usual)"
             )
-            found.append(Finding("gap", message, row + 1, self._column, count))
+            findings.append(Finding("gap", message, row + 1, self._column, count))
         if self._uneven:
             worst, row = self._worst
             message = (
@@ -397,5 +397,5 @@ class TimeStamps:
                 f"{self._step:.6g} s by over {_JITTER:.0%}; the worst, at row {row + 1}, by "
                 f"{worst / self._step:.1%} ({worst:.3g} s)"
             )
-            found.append(Finding("jitter", message, row + 1, self._column, self._uneven))
-        return tuple(found)
+            findings.append(Finding("jitter", message, row + 1, self._column, self._uneven))
+        return tuple(findings)

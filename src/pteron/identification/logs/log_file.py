@@ -135,32 +135,32 @@ class LogFile(OfLog):
         rows = self.rows_in_piece if rows is None else rows
         if rows < 1:
             raise DataError(f"rows: {rows} given; a piece has at least 1 row")
-        held: Log | None = None
+        buffer: Log | None = None
         for piece in self._without_spikes(progress):
-            held = piece if held is None else joined([held, piece])
-            while held.rows >= rows:
-                yield held.part(0, rows)
-                held = held.part(rows, held.rows)
-        if held is not None and held.rows:
-            yield held
+            buffer = piece if buffer is None else joined([buffer, piece])
+            while buffer.rows >= rows:
+                yield buffer.part(0, rows)
+                buffer = buffer.part(rows, buffer.rows)
+        if buffer is not None and buffer.rows:
+            yield buffer
 
     def _without_spikes(self, progress: Callable[[int], None] | None) -> Iterator[Log]:
         """Yield pieces without spikes; whether a row is one, its neighbours' piece may tell."""
         c = self._columns
         spikes = Spikes((*c.joints.shown, *c.forces.shown), self.source)
-        before: Log | None = None
+        previous: Log | None = None
         for piece, following in pairwise(chain(self._checked(), [None])):
             assert piece is not None
-            around = [before, piece, following and following.part(0, MARGIN)]
+            around = [previous, piece, following and following.part(0, MARGIN)]
             parts = [part for part in around if part is not None]
             joints, forces = (
                 np.concatenate([getattr(part, name) for part in parts])
                 for name in ("joints", "forces")
             )
-            start = before.rows if before is not None else 0
+            start = previous.rows if previous is not None else 0
             inner = slice(start, start + piece.rows)
             out = spikes.find(joints, forces, inner, piece.first_row)
-            before = piece.part(max(piece.rows - MARGIN, 0), piece.rows)
+            previous = piece.part(max(piece.rows - MARGIN, 0), piece.rows)
             if progress is not None:
                 progress(piece.rows)
             yield piece.without(out) if out.any() else piece
@@ -183,12 +183,12 @@ class LogFile(OfLog):
             high = np.maximum(high, piece.joints.max(axis=0))
             first += piece.rows
             yield piece
-        found = [finding for channel in channels for finding in channel.finish()]
+        findings = [finding for channel in channels for finding in channel.finish()]
         declared = any(unit is not None for unit in self.description.joint_units(self._robot))
-        found += standstill(
+        findings += standstill(
             high - low, self._robot, self._columns.joints, self.source, declared=declared
         )
-        self.findings = (*self._read, *stamps.findings(), *found)
+        self.findings = (*self._read, *stamps.findings(), *findings)
 
     def read(self, progress: Callable[[int], None] | None = None) -> Log:
         """Return the whole log, with all findings."""
@@ -196,20 +196,20 @@ class LogFile(OfLog):
 
     def _values(self, rows: int) -> Iterator[Values]:
         """Yield the file's numbers in arrays of so many rows: the time in s, then `_names`."""
-        held: list[Values] = []
+        blocks: list[Values] = []
         count = 0
         clock = self._clock.fresh()
         for table in self._file.tables((*clock.columns, *self._names, *self._again)):
             check_times(table, self._columns.time.names[0], self._again)
-            held.append(np.column_stack([clock.seconds(table), table.numbers(self._names)]))
+            blocks.append(np.column_stack([clock.seconds(table), table.numbers(self._names)]))
             count += len(table)
             while count >= rows:
-                whole = held[0] if len(held) == 1 else np.concatenate(held)
-                yield whole[:rows]
-                held = [whole[rows:]]
+                rows_ready = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+                yield rows_ready[:rows]
+                blocks = [rows_ready[rows:]]
                 count -= rows
         if count:
-            yield np.concatenate(held)
+            yield np.concatenate(blocks)
 
     def _piece(self, values: Values, first: int) -> Log:
         c, source = self._columns, self.source
@@ -267,10 +267,10 @@ class LogFile(OfLog):
         c, about = self._columns, self.description
         column, names = c.time.shown[0], c.time.names
         table = next(self._file.tables((*names, *self._names)), None)
-        given = 0 if table is None else len(table)
-        if table is None or given < _FEWEST:
+        count = 0 if table is None else len(table)
+        if table is None or count < _FEWEST:
             raise DataError(
-                f"{self.source}: {given} rows given, at least {_FEWEST} expected: a motion of that "
+                f"{self.source}: {count} rows given, at least {_FEWEST} expected: a motion of that "
                 "length says nothing; record a longer one"
             )
         table = replace(table, frame=table.frame.head(_AHEAD))
@@ -308,8 +308,10 @@ def open_log(
     Parameters and errors are those of `read_log`.
     """
     robot = as_manipulator(robot)
-    given = (find_description(path) or Description()) if description is None else description
-    origin, about = (path, given) if isinstance(given, Description) else (given, None)
+    described_by = (find_description(path) or Description()) if description is None else description
+    origin, about = (
+        (path, described_by) if isinstance(described_by, Description) else (described_by, None)
+    )
     about = about or read_description(origin)
     try:
         about.check(robot)

@@ -131,16 +131,18 @@ def stamp_columns(names: tuple[str, ...]) -> list[tuple[str, ...]]:
     >>> stamp_columns(("Time", "header.stamp.secs", "header.stamp.nsecs", "position_0"))
     [('header.stamp.secs', 'header.stamp.nsecs')]
     """
-    found: list[tuple[str, ...]] = []
+    stamps: list[tuple[str, ...]] = []
     for name in names:
         match = _STAMP.fullmatch(name)
         if match is None:
             continue
         part = match["part"] or ""
         if not part:
-            found.append((name,))
+            stamps.append((name,))
         elif part[1:] in ("sec", "secs"):
             stem = name.removesuffix(part[1:])
-            rest = next((stem + p for p in ("nsecs", "nsec", "nanosec") if stem + p in names), None)
-            found += [(name, rest)] if rest else []
-    return found
+            nanoseconds = next(
+                (stem + p for p in ("nsecs", "nsec", "nanosec") if stem + p in names), None
+            )
+            stamps += [(name, nanoseconds)] if nanoseconds else []
+    return stamps

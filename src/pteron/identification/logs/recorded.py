@@ -55,16 +55,16 @@ def check_forces(
 
 def check_recorded(log: Log) -> None:
     """Refuse forces that never change, and joints whose encoder wraps; all of them at once."""
-    still = [
+    constant = [
         f"{name} is {force[0]:g} throughout"
         for name, force in zip(log.force_names, log.forces.T, strict=True)
         if len(force) > 1 and np.ptp(force) <= _TIES * np.abs(force).max(initial=0.0)
     ]
-    if still:
+    if constant:
         raise log.fault(
             "constant",
-            f"{'; '.join(still)}: no force of a drive that moves a machine; look at the channel, "
-            "and record it again, or correct which columns are read",
+            f"{'; '.join(constant)}: no force of a drive that moves a machine; look at the "
+            "channel, and record it again, or correct which columns are read",
         )
     wraps = []
     for i, (name, joint) in enumerate(zip(log.joint_names, log.joints.T, strict=True)):
@@ -85,7 +85,7 @@ def check_recorded(log: Log) -> None:
 
 def at_limits(log: Log) -> tuple[str, ...]:
     """Return a sentence for each force that stays at its largest or least value while it moves."""
-    found = []
+    sentences = []
     speeds = np.abs(np.diff(log.joints, axis=0, append=log.joints[-1:]))
     for name, force, speed in zip(log.force_names, log.forces.T, speeds.T, strict=True):
         moving = force[speed > _MOVES * speed.max(initial=0.0)]
@@ -98,13 +98,13 @@ def at_limits(log: Log) -> tuple[str, ...]:
             if top < _LEAST * len(moving) or not below.size or top < _LEVEL * below[-1]:
                 continue
             value = values[-1] if word == "largest" else -values[-1]
-            found.append(
+            sentences.append(
                 f"{name} stays at its {word} value, {value:.4g}, in {100.0 * top / len(moving):.2g}"
                 f" % of the samples of {log.source}: the drive or what measures it is at its limit "
                 "(saturation), and forces there need not be those that act; move more slowly, or "
                 "leave such stretches out."
             )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def _jump(log: Log, joint: NDArray[np.float64], turns: bool) -> list[tuple[float, int]]:

@@ -60,13 +60,13 @@ class ColumnSearch(ColumnNames):
         elif len(stamps) == 1:
             columns = stamps[0]
         elif stamps:
-            raise self.ambiguous(kind, [one[:1] for one in stamps])
+            raise self.ambiguous(kind, [stamp[:1] for stamp in stamps])
         else:
             columns = tuple(self.family(kind, [0])[0])
         guessed = declared is None and columns != ("t",)
-        found = self._in_units([kind] * len(columns), columns, guessed=guessed)
+        group = self._in_units([kind] * len(columns), columns, guessed=guessed)
         # What a name says of the time's unit is told, declared or not.
-        return found._replace(told=found.told or self.unit_of(columns[0], kind) is not None)
+        return group._replace(told=group.told or self.unit_of(columns[0], kind) is not None)
 
     def group(
         self,
@@ -78,13 +78,15 @@ class ColumnSearch(ColumnNames):
         if declared is not None:
             columns = self.declared(wanted[0].table, declared)
             return self._in_units(wanted, columns, guessed=False)
-        found, guessed = dict[int, str](), False
+        names_by_number, guessed = dict[int, str](), False
         for kind in dict.fromkeys(wanted):
-            own = [i for i, one in zip(numbers, wanted, strict=True) if one == kind]
-            names, by_name = self.family(kind, own)
-            found |= zip(own, names, strict=True)
+            numbers_of_kind = [
+                i for i, member in zip(numbers, wanted, strict=True) if member == kind
+            ]
+            names, by_name = self.family(kind, numbers_of_kind)
+            names_by_number |= zip(numbers_of_kind, names, strict=True)
             guessed = guessed or by_name
-        columns = [found[i] for i in numbers]
+        columns = [names_by_number[i] for i in numbers]
         # Names that are documented say their units as documented.
         return self._in_units(wanted, columns, guessed=guessed)._replace(told=guessed)
 
@@ -92,16 +94,16 @@ class ColumnSearch(ColumnNames):
         self, wanted: Sequence[Wanted], columns: Sequence[str], *, guessed: bool
     ) -> Group:
         """Return columns of what is wanted with their units; lengths have one, and angles."""
-        units, said, told = dict[str, str](), True, guessed
-        for kind in {one.unit: one for one in wanted}.values():
+        units, said, is_stated = dict[str, str](), True, guessed
+        for kind in {member.unit: member for member in wanted}.values():
             alike = zip(columns, wanted, strict=True)
-            named = self.common_unit([c for c, one in alike if one.unit == kind.unit], kind)
+            named = self.common_unit([c for c, member in alike if member.unit == kind.unit], kind)
             units[kind.unit] = self.unit(kind, named)
             said = said and (kind.declared or named) is not None
-            told = told or (named is not None and not kind.declared)
+            is_stated = is_stated or (named is not None and not kind.declared)
         self.taken.update(columns)
-        each = tuple(units[one.unit] for one in wanted)
-        return Group(tuple(columns), each, said, told, guessed)
+        each = tuple(units[member.unit] for member in wanted)
+        return Group(tuple(columns), each, said, is_stated, guessed)
 
     def matches(self, kind: Wanted) -> Iterator[tuple[str, Called]]:
         """Yield the columns that are called by a word for it, in a unit of it if in any."""
@@ -123,8 +125,8 @@ class ColumnSearch(ColumnNames):
         if numbers[0] > 0:
             # Programs count from 0 as well.
             families = {
-                key: {i + 1: name for i, name in one.items()} if 0 in one else one
-                for key, one in families.items()
+                key: {i + 1: name for i, name in members.items()} if 0 in members else members
+                for key, members in families.items()
             }
         exact = kind.stem + "#" * (numbers[0] > 0)
         if exact not in families and kind.table == "forces":
@@ -132,24 +134,30 @@ class ColumnSearch(ColumnNames):
         if exact in families:
             families = {exact: families[exact]}
         known = set(range(self.legs + 1))
-        complete = [key for key, one in families.items() if set(numbers) <= one.keys() <= known]
+        complete = [
+            key for key, members in families.items() if set(numbers) <= members.keys() <= known
+        ]
         if not complete:
             raise self.incomplete(kind, numbers, list(families.values()))
         if len(complete) > 1:
-            several = [[one[i] for i in sorted(one)] for one in map(families.get, complete) if one]
+            several = [
+                [members[i] for i in sorted(members)]
+                for members in map(families.get, complete)
+                if members
+            ]
             raise self.ambiguous(kind, several)
         columns = [families[complete[0]][number] for number in numbers]
         return columns, complete[0] != exact
 
     def pose(self, wanted: Sequence[Wanted], declared: Sequence[str] | None) -> Group:
         """Return the columns of a measured pose, none where it is not whole."""
-        stems = [one.stem for one in wanted]
+        stems = [member.stem for member in wanted]
         if declared is not None:
             columns = self.declared("pose", declared)
         elif set(stems) <= set(self.names):
             columns = stems
         else:
-            columns = [name for one in wanted for name in self.lone(one)]
+            columns = [name for member in wanted for name in self.lone(member)]
         if len(columns) < len(wanted):
             if columns:
                 message = (
@@ -164,20 +172,20 @@ class ColumnSearch(ColumnNames):
 
     def lone(self, kind: Wanted) -> list[str]:
         """Return the column without a number that may be meant, if any."""
-        found = [name for name, parts in self.matches(kind) if parts.number is None]
-        if len(found) > 1:
-            raise self.ambiguous(kind, [[name] for name in found])
-        return found
+        candidates = [name for name, parts in self.matches(kind) if parts.number is None]
+        if len(candidates) > 1:
+            raise self.ambiguous(kind, [[name] for name in candidates])
+        return candidates
 
     def payload(self, declared: str | None) -> Group:
         """Return the column that says when a payload is carried, if any."""
-        found = [name for name in self.names if name.lower() == "payload"]
+        candidates = [name for name in self.names if name.lower() == "payload"]
         if declared is not None:
-            found = self.declared("payload", [declared])
-        if len(found) > 1:
+            candidates = self.declared("payload", [declared])
+        if len(candidates) > 1:
             kind = Wanted("payload", "payload", "payload", "", None)
-            raise self.ambiguous(kind, [[name] for name in found])
-        return Group(tuple(found), ("",) * len(found))
+            raise self.ambiguous(kind, [[name] for name in candidates])
+        return Group(tuple(candidates), ("",) * len(candidates))
 
     def unit_of(self, name: str, kind: Wanted) -> str | None:
         """Return the unit that a line of units says, or else the column's name; None for none.

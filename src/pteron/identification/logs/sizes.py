@@ -155,11 +155,11 @@ def joint_spans(robot: Manipulator) -> NDArray[np.float64]:
 def _size_of(robot: Manipulator) -> float:
     """Return the extent of a machine, m: between its guide points, along a leg and its platform."""
     points = np.array([leg.guide_point for leg in robot.legs])
-    apart = np.linalg.norm(points[:, None] - points, axis=-1).max()
+    width = np.linalg.norm(points[:, None] - points, axis=-1).max()
     offsets = [[leg.platform_point, leg.fixed_offset] for leg in robot.legs]
     lengths = np.linalg.norm(offsets, axis=-1).sum(axis=-1)
     reach = max(leg.size + length for leg, length in zip(robot.legs, lengths, strict=True))
-    return float(apart + reach)
+    return float(width + reach)
 
 
 def _travel_of(leg: LegKind, robot: Manipulator) -> float | None:
@@ -175,7 +175,7 @@ def _farthest(limits: tuple[float, float] | None) -> float:
     return 0.0 if limits is None else max(abs(limit) for limit in limits)
 
 
-def _declare(held: str, key: str, unit: str) -> str:
+def _declare(contents: str, key: str, unit: str) -> str:
     table, _, entry = key.partition("] ")
     said = declaration(table.removeprefix("["), **{entry: unit})
-    return f"if the file holds {held}, say so in a TOML file beside it:{said}"
+    return f"if the file holds {contents}, say so in a TOML file beside it:{said}"

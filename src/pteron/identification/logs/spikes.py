@@ -67,9 +67,9 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     Forces may jump where an acceleration does, as in an emergency stop, and where friction turns
     with the joint itself: the motion (T, n) says so, in which `own` is the joint of this force.
     """
-    found = _groups(values, _SHARE_OF_FORCE, 0.0)
-    if not found.any():
-        return found
+    is_spike = _groups(values, _SHARE_OF_FORCE, 0.0)
+    if not is_spike.any():
+        return is_spike
     speed = np.abs(np.gradient(joints[:, own]))
     turns = speed < _REVERSING * np.percentile(speed, 95.0)
     low, high = np.percentile(values, _SPAN)
@@ -77,12 +77,12 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     usual = (values > low - far) & (values < high + far)
     turns = scipy.ndimage.maximum_filter1d(turns.astype(np.int8), 5) > 0
     motion = _JointMotion(joints)
-    for start, stop in runs(found):
+    for start, stop in runs(is_spike):
         group = slice(start, stop)
         turned = turns[group].any() and usual[group].all()
         if turned or motion.is_pushed(start, stop):
-            found[group] = False
-    return found
+            is_spike[group] = False
+    return is_spike
 
 
 class _JointMotion:
@@ -110,9 +110,9 @@ class _JointMotion:
             return True
         # Noise of the positions may hide that, but not that all joints rest.
         last = len(self._joints) - 1
-        before = self._travel_between(max(start - 1 - LONGEST, 0), max(start - 1, 0))
-        after = self._travel_between(min(stop, last), min(stop + LONGEST, last))
-        return min(before, after) < _RESTS < _MOVES < max(before, after)
+        travel_before = self._travel_between(max(start - 1 - LONGEST, 0), max(start - 1, 0))
+        travel_after = self._travel_between(min(stop, last), min(stop + LONGEST, last))
+        return min(travel_before, travel_after) < _RESTS < _MOVES < max(travel_before, travel_after)
 
     def _travel_between(self, start: int, stop: int) -> float:
         return float((np.abs(self._joints[stop] - self._joints[start]) / self._travel).max())
@@ -126,9 +126,9 @@ def _pushes(steps: Values, length: int) -> Values:
 
 def _groups(values: Values, share: float, least: Values | float) -> Mask:
     """Return the samples between a jump and the jump back; none of so few that none is usual."""
-    found = np.zeros(len(values), dtype=bool)
+    is_spike = np.zeros(len(values), dtype=bool)
     if len(values) < 2 * _WINDOW:
-        return found
+        return is_spike
     steps = np.diff(values)
     jumps = steps - scipy.ndimage.median_filter(steps, _WINDOW, mode="nearest")
     usual = _USUAL * float(np.percentile(np.abs(jumps), 95.0))
@@ -150,10 +150,10 @@ def _groups(values: Values, share: float, least: Values | float) -> Mask:
             if k >= i and abs(away) <= _BACK * farthest:
                 edges = min(abs(jumps[first]), abs(jumps[last]))
                 if edges >= _SUDDEN * farthest:
-                    found[first + 1 : last + 1] = True
+                    is_spike[first + 1 : last + 1] = True
                     i = k + 1
                 break
-    return found
+    return is_spike
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
@@ -181,11 +181,11 @@ class Spikes:
         for j, (name, channel) in enumerate(
             zip(self._columns, np.hstack([joints, forces]).T, strict=True)
         ):
-            whole = joint_spikes(channel) if j < n else force_spikes(channel, joints, j - n)
-            out |= whole[inner]
+            is_spike = joint_spikes(channel) if j < n else force_spikes(channel, joints, j - n)
+            out |= is_spike[inner]
             self._found[name] += [
                 (first_row + a, first_row + b, float(channel[inner][a]))
-                for a, b in runs(whole[inner])
+                for a, b in runs(is_spike[inner])
             ]
         if out.mean() > _MOST:
             self._too_many = True
@@ -194,7 +194,7 @@ class Spikes:
 
     def findings(self) -> tuple[Finding, ...]:
         """Return a finding for each channel with spikes, and whether they are left out."""
-        found = []
+        findings = []
         fate = "left out like a gap, not repaired"
         if self._too_many:
             fate = f"left in, for over {_MOST:.0%} of the rows are spikes; record it again"
@@ -203,13 +203,13 @@ class Spikes:
             if not count:
                 continue
             named = [f"{a + 1} to {b}" if b - a > 1 else f"{b}" for a, b, _ in groups[:_TOLD]]
-            more = ", ..." if len(groups) > _TOLD else ""
+            ellipsis = ", ..." if len(groups) > _TOLD else ""
             plural = "s" * (count > 1)
             what = "spikes" if plural else "a spike"
             message = (
-                f"{self._source}: row{plural} {', '.join(named)}{more}, column {name}: {what} of "
-                f"{count} sample{plural} that jump away and back (the first is "
+                f"{self._source}: row{plural} {', '.join(named)}{ellipsis}, column {name}: {what} "
+                f"of {count} sample{plural} that jump away and back (the first is "
                 f"{groups[0][2]:g}); {fate}"
             )
-            found.append(Finding("spike", message, groups[0][0] + 1, name, count))
-        return tuple(found)
+            findings.append(Finding("spike", message, groups[0][0] + 1, name, count))
+        return tuple(findings)

@@ -27,9 +27,9 @@ def write_log(log: Log, path: str | Path) -> Path:
         If the file cannot be written; one that was there is left as it was.
     """
     unit = log.description.force_unit
-    counted = [one or Reading() for one in log.readings or [None] * len(log.joint_names)]
-    scales = np.array([one.scale for one in counted])
-    joints = (log.joints - [one.zero for one in counted]) / scales
+    counted = [reading or Reading() for reading in log.readings or [None] * len(log.joint_names)]
+    scales = np.array([reading.scale for reading in counted])
+    joints = (log.joints - [reading.zero for reading in counted]) / scales
     columns = {"t": log.time} | dict(zip(log.joint_names, joints.T, strict=True))
     for j, name in enumerate(log.force_names):
         stem = f"current{j + 1}" if unit == "A" else name

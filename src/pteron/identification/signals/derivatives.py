@@ -174,8 +174,8 @@ class FourierFit:
 
     def series(self, log: Log) -> FittedSeries:
         """Return the series of the log's positions, as the forces are late for them."""
-        found = fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
-        return found.later(self.delay)
+        series = fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
+        return series.later(self.delay)
 
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the log at its own times."""
@@ -275,10 +275,12 @@ def _without_jumps(time: Array, joints: Array) -> NDArray[np.bool_]:
     _, second = central_differences(spline(even), rate)
     rounding = _ROUNDING * np.abs(joints).max() * rate**2
     least = _AGREES * np.abs(second).max(axis=0) + rounding
-    apart = (np.abs(spline(even[LOST:-LOST], 2) - second) > least).any(axis=1)
+    differs = (np.abs(spline(even[LOST:-LOST], 2) - second) > least).any(axis=1)
     # They err in different ways next to a jump, as at the ends of a rest. Jumps are few: where most
     # samples are apart it is for another reason, such as the rounding of the stamps.
-    if apart.mean() > _FEW:
+    if differs.mean() > _FEW:
         return np.ones(len(time), dtype=bool)
-    apart = scipy.ndimage.maximum_filter1d(np.pad(apart, LOST).astype(int), 2 * _SMEARED + 1) > 0
-    return np.asarray(~apart)
+    differs = (
+        scipy.ndimage.maximum_filter1d(np.pad(differs, LOST).astype(int), 2 * _SMEARED + 1) > 0
+    )
+    return np.asarray(~differs)

@@ -191,9 +191,9 @@ def _least_risk(relative: Array, gains: Array, weights: Array) -> int:
     """
     # What a filter takes of the motion and leaves of the noise, but for a constant: the power times
     # `slopes`, and what is `given`.
-    slopes, given = weights * (gains**2 - 2.0 * gains), weights * 2.0 * gains
+    slopes, noise_terms = weights * (gains**2 - 2.0 * gains), weights * 2.0 * gains
     total, count = relative.sum(axis=1), relative.shape[1]
-    risks = total @ slopes + count * given.sum(axis=0)
+    risks = total @ slopes + count * noise_terms.sum(axis=0)
     best = int(np.argmin(risks))
     # Chance may make a higher one the best: the lowest that is as good within a standard error.
     # Noise makes a power 1 + s vary by 1 + 2 s, s being the motion's.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
@@ -67,15 +68,15 @@ class Projection:
             right += self.basis(rows).T @ signal(rows)
         return np.asarray(scipy.linalg.cho_solve(self._normal, right))
 
-    def noise(self, used: Array, kept: Array) -> Array:
+    def noise(self, used: Array, times: Array) -> Array:
         """Return the standard deviation (K, n) of the series at the times `kept` (K,).
 
         The samples have white noise of unit variance where `used` (T, n) is 1, none where it is 0.
         """
         at = scipy.linalg.cho_solve(
-            self._normal, fourier_basis(kept, self.harmonics, self.period).T
+            self._normal, fourier_basis(times, self.harmonics, self.period).T
         )
-        variance = np.zeros((len(kept), used.shape[1]))
+        variance = np.zeros((len(times), used.shape[1]))
         for rows in row_blocks(len(self.time)):
             variance += ((self.basis(rows) @ at) ** 2).T @ used[rows]
         return np.asarray(np.sqrt(variance))
@@ -118,29 +119,34 @@ def fitted_series(
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     limit = most_harmonics(time, period)
-    asked = _MOST if highest is None else round(highest * period)
-    most = min(asked, limit)
-    if most < 1 or (highest is not None and most < min(asked, int(_SHARE * rate * period))):
+    wanted_harmonics = _MOST if highest is None else round(highest * period)
+    most = min(wanted_harmonics, limit)
+    if most < 1 or (
+        highest is not None and most < min(wanted_harmonics, int(_SHARE * rate * period))
+    ):
         raise DataError(
             f"period: the samples leave {_largest_hole(time, period):g} s out of the period of "
             f"{period:g} s, too much for its harmonics; record whole periods without a gap, or "
             'choose derivatives "central"'
         )
-    found, squares = _fitted(time, signal, period, most)
-    noise = np.sqrt(squares / max(len(time) - len(found), 1))
+    coefficients, squares = _fitted(time, signal, period, most)
+    noise = np.sqrt(squares / max(len(time) - len(coefficients), 1))
     noise = np.maximum(noise, _ROUNDING * np.abs(signal).max(axis=0))
     if highest is None:
-        amplitudes = np.hypot(found[1 : most + 1], found[most + 1 :])
+        amplitudes = np.hypot(coefficients[1 : most + 1], coefficients[most + 1 :])
         # One period counts: the rounding of an encoder repeats in every period.
         samples = min(rate * period, len(time))
         shown = amplitudes > _SIGNIFICANT * noise * np.sqrt(2.0 / samples)
         last = int(np.flatnonzero(shown.any(axis=1)).max(initial=0)) + 1
-        found = np.vstack([found[: last + 1], found[most + 1 : most + 1 + last]])
+        coefficients = np.vstack(
+            [coefficients[: last + 1], coefficients[most + 1 : most + 1 + last]]
+        )
         if last < most:
             # Uneven samples mix harmonics a little: those that are kept are fitted again, alone.
-            found, _ = _fitted(time, signal, period, last)
-    last = len(found) // 2
-    return FittedSeries(found[0], found[1 : last + 1], found[last + 1 :], period, noise)  # type: ignore[arg-type]
+            coefficients, _ = _fitted(time, signal, period, last)
+    last = len(coefficients) // 2
+    parts: Any = coefficients[0], coefficients[1 : last + 1], coefficients[last + 1 :]
+    return FittedSeries(*parts, period, noise)
 
 
 def most_harmonics(time: Array, period: float) -> int:
@@ -167,8 +173,8 @@ def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[
         return np.asarray(signal[rows] - projection.basis(rows) @ first)
 
     # A step of iterative refinement removes the rounding of the first solution.
-    found = first + projection.coefficients(rest, size)
+    coefficients = first + projection.coefficients(rest, size)
     squares = np.zeros(size)
     for rows in row_blocks(len(time)):
-        squares += ((signal[rows] - projection.basis(rows) @ found) ** 2).sum(axis=0)
-    return found, squares
+        squares += ((signal[rows] - projection.basis(rows) @ coefficients) ** 2).sum(axis=0)
+    return coefficients, squares

@@ -226,29 +226,29 @@ def preprocessing_of(
         If a frequency is beyond what the sampling allows, or there is less than one period.
     """
     robot = as_manipulator(robot)
-    wanted = processing or Processing()
+    settings = processing or Processing()
     # Noise and cut-offs concern samples as they came: uneven steps are noise to them.
     head = _longest_part(log)
     time, values = uniform(head.time, np.hstack([head.joints, head.forces]))
     rate = (len(time) - 1) / float(time[-1] - time[0])
     joints, forces = np.hsplit(values, 2)
-    _check_frequencies(wanted, rate)
+    _check_frequencies(settings, rate)
     noise = white_noise(forces)
     # A median, which single wild forces do not change.
     size = np.median(np.abs(forces - np.median(forces, axis=0)), axis=0)
     relative = float((noise / np.maximum(size, np.finfo(float).tiny)).min())
-    cutoff = wanted.cutoff or cutoff_of(
+    cutoff = settings.cutoff or cutoff_of(
         joints, rate, harmless=_HARMLESS * relative, tolerable=_TOLERABLE * relative
     )
 
     # How positions are differentiated
-    period = wanted.period or log.description.period
-    derivatives = wanted.derivatives or ("spline" if cutoff is None else "central")
+    period = settings.period or log.description.period
+    derivatives = settings.derivatives or ("spline" if cutoff is None else "central")
     small = (rows or log.rows) <= _LARGEST_PERIODIC
     series = None
-    if wanted.derivatives == "periodic" or (wanted.derivatives is None and period and small):
+    if settings.derivatives == "periodic" or (settings.derivatives is None and period and small):
         series = _checked_series(log, period)
-        if wanted.derivatives is None and not _is_series(series, joints):
+        if settings.derivatives is None and not _is_series(series, joints):
             series = None
     if series is not None:
         derivatives, cutoff = "periodic", series.harmonics / series.period
@@ -263,8 +263,8 @@ def preprocessing_of(
         frequencies = order / series.period
         power = (order**2)[:, None] * (np.square(series.cosines) + np.square(series.sines))
     edge = float(frequencies[min(bins_below(power, _POWER), len(frequencies) - 1)])
-    band = wanted.band or min(_PRODUCTS * edge, rate / 2.0)
-    if wanted.band is None and cutoff is not None and series is None:
+    band = settings.band or min(_PRODUCTS * edge, rate / 2.0)
+    if settings.band is None and cutoff is not None and series is None:
         band = min(band, cutoff)
     usual = np.sqrt((rates**2).mean(axis=0))
     return Preprocessing(
@@ -276,10 +276,10 @@ def preprocessing_of(
         period=period,
         joint_noise=position_noise(joints),
         force_noise=noise,
-        slow=wanted.slow * usual,
+        slow=settings.slow * usual,
         usual=usual,
         stroke=_stroke(rates, rate),
-        delay=0.0 if wanted.delay in (None, "auto") else float(wanted.delay),
+        delay=0.0 if settings.delay in (None, "auto") else float(settings.delay),
     )
 
 
@@ -322,9 +322,9 @@ def _is_series(series: FittedSeries, joints: Array) -> bool:
     return bool((series.noise <= np.maximum(_NOISE_ALONE * position_noise(joints), least)).all())
 
 
-def _check_frequencies(wanted: Processing, rate: float) -> None:
+def _check_frequencies(settings: Processing, rate: float) -> None:
     for name in ("cutoff", "band"):
-        value = getattr(wanted, name)
+        value = getattr(settings, name)
         if value is not None and value >= rate / 2.0:
             raise DataError(
                 f"{name}: {value:g} Hz given; the log has {rate:g} samples a second, so that it "

@@ -76,13 +76,13 @@ def samples(
         parts = blocks(parts, edge + margin, step * ceil(block / step), preprocessing.rate)
     part, pose = None, preprocessing.start
     for part in parts:
-        found = differentiator.differentiated(part, edge)
-        inner = replace(part.part(edge, part.rows - edge), time=found.time)
-        states = States.of_log(robot, inner, found.motion, pose)
+        derived = differentiator.differentiated(part, edge)
+        inner = replace(part.part(edge, part.rows - edge), time=derived.time)
+        states = States.of_log(robot, inner, derived.motion, pose)
         # The next block overlaps this one by its margins.
         pose = tuple(states.pose[-1 - 2 * margin].tolist())
         fresh = slice(margin, len(states) - margin)
-        yield SampleBlock(states, found.forces, fresh, part.source, found.smooth)
+        yield SampleBlock(states, derived.forces, fresh, part.source, derived.smooth)
     if part is None:
         raise LogError(
             "too short",
@@ -99,23 +99,23 @@ def blocks(pieces: Iterable[Log], margin: int, size: int, rate: float) -> Iterat
     its first and last `margin` rows: a filter's edges are dropped, never bridged. Shorter stretches
     yield nothing. `pieces` are the log's parts in order, `rate` is in samples per second.
     """
-    held: Log | None = None
+    buffer: Log | None = None
     for piece in pieces:
         for stretch in _stretches(piece, rate):
-            if held is not None and _continues(held, stretch, rate):
-                held = joined([held, stretch])
+            if buffer is not None and _continues(buffer, stretch, rate):
+                buffer = joined([buffer, stretch])
             else:
-                yield from _rest(held, margin)
-                held = stretch
-            while held.rows >= size + 2 * margin:
-                yield held.part(0, size + 2 * margin)
-                held = held.part(size, held.rows)
-    yield from _rest(held, margin)
+                yield from _rest(buffer, margin)
+                buffer = stretch
+            while buffer.rows >= size + 2 * margin:
+                yield buffer.part(0, size + 2 * margin)
+                buffer = buffer.part(size, buffer.rows)
+    yield from _rest(buffer, margin)
 
 
-def _rest(held: Log | None, margin: int) -> Iterator[Log]:
-    if held is not None and held.rows > 2 * margin:
-        yield held
+def _rest(buffer: Log | None, margin: int) -> Iterator[Log]:
+    if buffer is not None and buffer.rows > 2 * margin:
+        yield buffer
 
 
 def _stretches(piece: Log, rate: float) -> Iterator[Log]:
@@ -128,8 +128,8 @@ def _stretches(piece: Log, rate: float) -> Iterator[Log]:
         yield piece.part(start, stop)
 
 
-def _continues(held: Log, following: Log, rate: float) -> bool:
-    same = held.payload is None or (
-        following.payload is not None and held.payload[-1] == following.payload[0]
+def _continues(buffer: Log, following: Log, rate: float) -> bool:
+    same = buffer.payload is None or (
+        following.payload is not None and buffer.payload[-1] == following.payload[0]
     )
-    return same and not are_apart(held.time, following.time, 1.0 / rate)
+    return same and not are_apart(buffer.time, following.time, 1.0 / rate)

@@ -180,9 +180,9 @@ def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
             )
     shown = poses[~np.isnan(poses[:, column]).any(axis=-1), column]
     if not len(shown):
-        given = "its measured pose" if declared is None else f"assembly_mode = {declared}"
+        mode = "its measured pose" if declared is None else f"assembly_mode = {declared}"
         raise DataError(
-            f"{log.source}: {given} is no pose that its joints have; pteron direct lists those of "
+            f"{log.source}: {mode} is no pose that its joints have; pteron direct lists those of "
             "the first sample"
         )
     return tuple(shown[0].tolist())
@@ -220,8 +220,8 @@ def _no_pose(
     rows = [row] if followed else lost  # of what comes after the first nothing is known
     others = ~np.isnan(direct_kinematics(robot, joints[rows])).any(axis=(0, -1))
     count = len(joints[rows])
-    more = f", nor those of {count - 1} more rows" if count > 1 else ""
-    what = f"no pose of {robot.name} has the joints ({values}){more}"
+    count_text = f", nor those of {count - 1} more rows" if count > 1 else ""
+    what = f"no pose of {robot.name} has the joints ({values}){count_text}"
     hint = "perhaps it is the log of another machine, or its joints have other zeros"
     if others.any() and followed:
         what = f"{robot.name} does not come to the joints ({values}) in its assembly mode"
