@@ -145,8 +145,9 @@ def fitted_series(
             # Uneven samples mix harmonics a little: those that are kept are fitted again, alone.
             coefficients, _ = _fitted(time, signal, period, last)
     last = len(coefficients) // 2
-    parts: Any = coefficients[0], coefficients[1 : last + 1], coefficients[last + 1 :]
-    return FittedSeries(*parts, period, noise)
+    cosines: Any = coefficients[1 : last + 1]
+    sines: Any = coefficients[last + 1 :]
+    return FittedSeries(coefficients[0], cosines, sines, period, noise)
 
 
 def most_harmonics(time: Array, period: float) -> int:
