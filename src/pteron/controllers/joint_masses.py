@@ -61,12 +61,12 @@ def _joint_masses(robot: Manipulator) -> Array:
     poses = light_poses(robot)
     rows = jacobian(robot, poses)
     rotors = np.diag([(leg.drive or Drive()).inertia for leg in robot.legs])
-    across = np.swapaxes(rows, -1, -2)
-    masses = mass_matrix(robot, poses) + across @ rotors @ rows
-    mobility = np.einsum("kij,kji->ki", rows, np.linalg.solve(masses, across))
-    found: Array = np.quantile(1.0 / mobility, _SHARE, axis=0)
-    found.setflags(write=False)
-    return found
+    columns = np.swapaxes(rows, -1, -2)
+    masses = mass_matrix(robot, poses) + columns @ rotors @ rows
+    mobility = np.einsum("kij,kji->ki", rows, np.linalg.solve(masses, columns))
+    quantile: Array = np.quantile(1.0 / mobility, _SHARE, axis=0)
+    quantile.setflags(write=False)
+    return quantile
 
 
 def light_poses(robot: Manipulator) -> Array:

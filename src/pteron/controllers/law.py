@@ -65,8 +65,8 @@ class Law:
         """
         robot = self.model
         place, rate = (
-            as_array(value, name, (robot.freedom,), columns=robot.column_names[name])
-            for name, value in (("pose", pose), ("velocity", velocity))
+            as_array(coordinates, name, (robot.freedom,), columns=robot.column_names[name])
+            for name, coordinates in (("pose", pose), ("velocity", velocity))
         )
         place = np.broadcast_arrays(place, rate)[0]
         zeros = [
@@ -104,11 +104,13 @@ class Law:
             wanted pose, where that is singular, or Newton's method finds no pose for the joints.
         memory : array, shape (..., K)
         """
-        wanted = pose, velocity, acceleration
-        forces, kept, status = self._kernel(*wanted, joints, joint_rates, memory, self.gains)
+        reference = pose, velocity, acceleration
+        forces, next_memory, status = self._kernel(
+            *reference, joints, joint_rates, memory, self.gains
+        )
         if not status.all():
             forces[status == 0.0] = np.nan
-        return forces, kept
+        return forces, next_memory
 
     @cached_property
     def program(self) -> Program:
@@ -119,8 +121,8 @@ class Law:
     @property
     def numbers(self) -> dict[str, Array]:
         """The gains and the model's numbers, as `pteron.kernels.loops.Loop.run` takes them."""
-        found = machine_numbers(self.model, self.program, "law")
-        return found | {"law_gains": self.gains.reshape(1, 1, -1)}
+        model_numbers = machine_numbers(self.model, self.program, "law")
+        return model_numbers | {"law_gains": self.gains.reshape(1, 1, -1)}
 
     @cached_property
     def _kernel(self) -> TieredKernel:
@@ -160,18 +162,18 @@ class Law:
         estimates: tuple[str, ...] = () if self.base is None else self.base.names
         if self.what == "adaptive_drives":
             estimates += drive_names(self.model)[: len(ADAPTED) * self.model.joint_count]
-        found: list[str] = []
+        names: list[str] = []
         for name, per in GAINS[self.what].items():
             if per == "joint":
-                found += [f"{name}_{i}" for i in joints]
+                names += [f"{name}_{i}" for i in joints]
             elif per == "parameter":
-                found += [f"{name}: {one}" for one in estimates]
+                names += [f"{name}: {estimate}" for estimate in estimates]
             elif per == "pair":
                 count = range(1, len(estimates) + 1)
-                found += [f"{name}: {one}, {k}" for k in count for one in estimates]
+                names += [f"{name}: {estimate}, {k}" for k in count for estimate in estimates]
             else:
-                found.append(name)
-        return tuple(found)
+                names.append(name)
+        return tuple(names)
 
     def _sizes(self, layout: Layout) -> dict[str, int]:
         freedom = self.model.freedom

@@ -49,7 +49,7 @@ def optimise_function(function: ca.Function) -> ca.Function:
     >>> from pteron.kernels import count_operations
     >>> a, b, x, y = (ca.SX.sym(name) for name in "abxy")
     >>> plain = ca.Function("plain", [a, b, x, y], [0.04 * a * x - 0.04 * b * y])
-    >>> count_operations(plain), count_operations(optimised(plain))
+    >>> count_operations(plain), count_operations(optimise_function(plain))
     (5, 4)
     """
     original = to_term_graph(function)
