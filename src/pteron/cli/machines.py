@@ -190,7 +190,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.kinematics import architecture, inverse_kinematics, singular_orientations
     from pteron.manipulator.template_masses import template_masses
     from pteron.workspace import home_poses, limited_joints, pose_margins
-    from pteron.workspace.holding import holding, holding_warnings, singular_within_rounding
+    from pteron.workspace.holding import holding_warnings, measure_holding, singular_within_rounding
     from pteron.workspace.leg_layout import layout_warnings
     from pteron.workspace.load_warnings import load_warnings
     from pteron.workspace.mode_places import elbow_warnings, mode_places
@@ -199,7 +199,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     # Refuses a singular layout, and one without a common reach with by how much legs miss it
     both = home_poses(robot)
     home = np.array(both.pose)
-    held = holding(robot, home)
+    held = measure_holding(robot, home)
     if reason := singular_within_rounding(robot, held):
         raise ModelError(reason)
     layout = architecture(robot)

@@ -47,7 +47,7 @@ from pteron.workspace import (
     reach_volume,
 )
 from pteron.workspace.load_warnings import load_warnings
-from pteron.workspace.reach_slices import Plane, reached, slice_planes
+from pteron.workspace.reach_slices import Plane, reach_sides, slice_planes
 from pteron.workspace.screw_lengths import screw_warnings
 from pteron.workspace.tilts import largest_tilt
 
@@ -253,7 +253,7 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
         extent = _extent(box, plane, half.tolist())
         whole = reach_slice(robot, home, plane, extent=extent, points=_FINE)
         # The box holds the whole reach: this plane may reach a small part of it.
-        cut = reach_slice(robot, home, plane, extent=reached(whole), points=_FINE)
+        cut = reach_slice(robot, home, plane, extent=reach_sides(whole), points=_FINE)
     type_i = numeric(robot, "reach")(cut.poses)[1].min(axis=-1)
     type_ii = _type_ii(robot, cut.poses)
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
