@@ -17,12 +17,12 @@ def template(folder: str, name: str, **filters: Callable[..., Any]) -> jinja2.Te
     # Slow to load, and needed only when a page or a notebook's table is made.
     import jinja2
 
-    made = jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.PackageLoader("pteron", folder),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= filters
-    return made.get_template(name)
+    environment.filters |= filters
+    return environment.get_template(name)

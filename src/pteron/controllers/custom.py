@@ -18,7 +18,7 @@ from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import graph_of
 from pteron.kernels.loop_code import LOOP_INPUTS
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.toml import told
+from pteron.toml import joined_faults
 
 _REFERENCE = ("pose", "velocity", "acceleration")
 _MEMORY = ("memory", "next_memory")
@@ -96,7 +96,7 @@ class Custom:
         if sorted(names[1]) != sorted(needed):
             faults.append(f"outputs: {', '.join(names[1])} given, {', '.join(needed)} expected")
         if faults:
-            raise DataError(f"controller: {told(faults)}")
+            raise DataError(f"controller: {joined_faults(faults)}")
         _ = self._program
 
     @property
@@ -125,7 +125,7 @@ class Custom:
             if port.size != sizes.get(port.name, port.size)
         ]
         if wrong:
-            raise DataError(f"controller: {told(wrong)} for {model.name}")
+            raise DataError(f"controller: {joined_faults(wrong)} for {model.name}")
         return CustomLaw(self, model)
 
     @cached_property

@@ -41,7 +41,7 @@ def _positive_number(message: str, argument: object) -> float:
 
 
 def period_of(seconds: float) -> float:
-    """Return a period in s, or refuse what is none."""
+    """Return a period in s after a check that it is positive, finite and no rate."""
     period = _positive_number(
         "period: {} given, seconds between two samples expected, such as 0.001", seconds
     )

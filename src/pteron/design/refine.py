@@ -17,7 +17,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.workspace.exchange import POINTS, Program, improve_unknowns
-from pteron.workspace.samples import Samples, fixed_samples, shape_samples
+from pteron.workspace.shape_samples import Samples, fixed_samples, shape_samples
 
 _EXCHANGES = 8
 """Most times that counterexamples of the result's proof join its conditions."""

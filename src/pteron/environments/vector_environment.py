@@ -74,9 +74,9 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         render_mode: str | None = None,
         machines: Machines | None = None,
     ) -> None:
-        for name, value in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
-            if value is not None and value < 1:
-                raise DataError(f"{name}: {value} given, 1 or more expected")
+        for name, number in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
+            if number is not None and number < 1:
+                raise DataError(f"{name}: {number} given, 1 or more expected")
         machine = as_manipulator(robot)
         if machines is not None and (len(machines) != num_envs or machines.robot != machine):
             raise DataError(
@@ -94,7 +94,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self.num_envs = num_envs
         pair = spaces(self.world.bounds, len(self.world.forces))
         self.single_observation_space, self.single_action_space = pair
-        self.observation_space, self.action_space = (batch_space(one, num_envs) for one in pair)
+        self.observation_space, self.action_space = (batch_space(space, num_envs) for space in pair)
         self.render_mode = checked_mode(render_mode)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / period))}
         self._most = max_episode_steps
@@ -147,7 +147,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
             return [int(seed) + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise DataError(f"seed: {len(seed)} seeds given, {self.num_envs} expected")
-        return [None if one is None else int(one) for one in seed]
+        return [None if number is None else int(number) for number in seed]
 
     def _start(self, chosen: Bools, options: dict[str, Any] | None) -> None:
         generators = [self._generators[i] for i in np.flatnonzero(chosen).tolist()]
@@ -161,8 +161,8 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         if self._state is None:
             raise DataError("step before reset; call reset first")
         starting = self._done
-        before = self._state
-        self._state, distance, reward, ended = self.world.after(before, actions)
+        last_state = self._state
+        self._state, distance, reward, ended = self.world.after(last_state, actions)
         self._steps = self._steps + 1
         if starting.any():
             self._start(starting, None)
@@ -174,10 +174,10 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self._done = ended | late
         infos = self._infos(distance, np.ones_like(ended))
         if ended.any():
-            told = np.full(self.num_envs, None, dtype=object)
+            reasons = np.full(self.num_envs, None, dtype=object)
             for i in np.flatnonzero(ended).tolist():
-                told[i] = self.world.why(self._state.pose[i], self._state.velocity[i])
-            infos |= {"stopped": told, "_stopped": ended.copy()}
+                reasons[i] = self.world.why(self._state.pose[i], self._state.velocity[i])
+            infos |= {"stopped": reasons, "_stopped": ended.copy()}
         return self.world.observed(self._state), reward, ended, late, infos
 
     def _infos(self, distance: NDArray[Any], known: Bools) -> dict[str, Any]:

@@ -168,69 +168,71 @@ class World:
         DataError
             If an option is unknown, or a pose is none that the machine may have.
         """
-        given = {key: self._pose(key, value) for key, value in (options or {}).items()}
-        poses = self._drawn(generators, None)
-        targets = self._drawn(generators, given.get("pose", poses))
+        chosen = {key: self._pose(key, option) for key, option in (options or {}).items()}
+        poses = self._draw_poses(generators, None)
+        targets = self._draw_poses(generators, chosen.get("pose", poses))
         velocity, clock = np.zeros_like(poses), np.zeros(len(poses))
         if self.motion is not None:
             clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
-            if "pose" not in given:
+            if "pose" not in chosen:
                 poses, velocity, _ = self.motion.at(self.motion.time[0] + clock)
-        begun = np.broadcast_to(given.get("pose", poses), poses.shape)
+        start_poses = np.broadcast_to(chosen.get("pose", poses), poses.shape)
         return EpisodeState(
-            begun,
+            start_poses,
             velocity,
-            drive_states(self.robot, begun, velocity),
-            np.broadcast_to(given.get("target", targets), poses.shape),
+            drive_states(self.robot, start_poses, velocity),
+            np.broadcast_to(chosen.get("target", targets), poses.shape),
             clock,
         )
 
-    def _drawn(self, generators: Sequence[np.random.Generator], others: ArrayLike | None) -> Array:
+    def _draw_poses(
+        self, generators: Sequence[np.random.Generator], others: ArrayLike | None
+    ) -> Array:
         """Return a random pose of each generator with margin enough, or home where it has none.
 
         It is apart from the other poses (m,) or (B, m). Where all draws are too far from home they
         are brought nearer.
         """
         shape = (_DRAWS, self.robot.freedom)
-        drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
+        draws = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
         box = self.travel(self.spread) if self.box is None else self.box
-        drawn = np.where(drawn < 0.0, -drawn * box[0], drawn * box[1])
-        found = np.tile(self.home, (len(drawn), 1))
-        left = np.arange(len(drawn))
-        elsewhere = None if others is None else np.broadcast_to(others, found.shape)
+        draws = np.where(draws < 0.0, -draws * box[0], draws * box[1])
+        poses_found = np.tile(self.home, (len(draws), 1))
+        missing = np.arange(len(draws))
+        other_poses = None if others is None else np.broadcast_to(others, poses_found.shape)
         for share in _SHARES:
-            poses = self.home + share * drawn[left]
-            good: Any = self.margin_of(poses) >= self.least
-            if elsewhere is not None:
-                away = self.metres(poses - elsewhere[left, None, :])
-                good &= away > _APART * self.tolerance
-            has = good.any(axis=-1)
-            found[left[has]] = poses[has, good[has].argmax(axis=-1)]
-            left = left[~has]
-            if not len(left):
+            poses = self.home + share * draws[missing]
+            is_valid: Any = self.margin_of(poses) >= self.least
+            if other_poses is not None:
+                distances = self.metres(poses - other_poses[missing, None, :])
+                is_valid &= distances > _APART * self.tolerance
+            has = is_valid.any(axis=-1)
+            poses_found[missing[has]] = poses[has, is_valid[has].argmax(axis=-1)]
+            missing = missing[~has]
+            if not len(missing):
                 break
-        return found
+        return poses_found
 
     def margin_of(self, poses: Array) -> Array:
         """Return the margin of poses, negative beyond a singularity of type II."""
-        across = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
+        beyond = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
         smallest = pose_margins(self.robot, poses).least
-        return np.where(across, -np.abs(smallest), smallest)
+        return np.where(beyond, -np.abs(smallest), smallest)
 
     @cached_property
     def _side(self) -> float:
         return float(numeric(self.robot, "type_ii")(self.home)[0])
 
-    def _pose(self, key: str, value: Any) -> Array:
+    def _pose(self, key: str, option: Any) -> Array:
         """Return a pose of the options after a check."""
         if key not in ("pose", "target"):
             raise DataError(f"options: {key!r} is unknown; the valid ones are pose, target")
         if key == "target" and self.motion is not None:
             raise DataError("options: a target given, but the target follows the motion")
-        pose = np.asarray(value, dtype=float)
+        pose = np.asarray(option, dtype=float)
         if pose.shape != (self.robot.freedom,) or not np.isfinite(pose).all():
             names = " ".join(self.robot.coordinates)
-            raise DataError(f"options: {key} is {value!r}, {names} expected, m and rad")
+            raise DataError(f"options: {key} is {option!r}, {names} expected, m and rad")
         if self.margin_of(pose[None])[0] <= ENDS:
             raise DataError(
                 f"options: {key} {pose.tolist()} is out of reach, singular, or beyond the joints' "
@@ -270,21 +272,21 @@ class World:
 
     def _action(self, action: Any, shape: tuple[int, ...]) -> Array:
         """Return an action of machines (..., n) after a check; a machine has as many drives."""
-        given = as_array(action, "action", ())
-        if given.shape != shape:
-            raise DataError(f"action: shape {given.shape} given, {shape} expected")
-        if not np.isfinite(given).all():
+        action_array = as_array(action, "action", ())
+        if action_array.shape != shape:
+            raise DataError(f"action: shape {action_array.shape} given, {shape} expected")
+        if not np.isfinite(action_array).all():
             raise DataError("action: not finite numbers given; numbers from -1 to 1 expected")
-        return given
+        return action_array
 
     def why(self, pose: Array, velocity: Array) -> str:
         """Return why the episode of a machine ended, in its last state (m,)."""
         if (np.abs(velocity) > self._speeds).any():
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
-        found = pose_margins(self.robot, pose)
-        leg = int(found.type_i.argmin()) + 1
-        if self.margin_of(pose[None])[0] < 0.0 <= found.least or found.type_ii < ENDS:
+        margins = pose_margins(self.robot, pose)
+        leg = int(margins.type_i.argmin()) + 1
+        if self.margin_of(pose[None])[0] < 0.0 <= margins.least or margins.type_ii < ENDS:
             return "next to a singularity of type II: the actuators hardly hold the platform"
-        if found.joints.min() < ENDS <= found.type_i.min():
-            return f"leg {int(found.joints.argmin()) + 1} is at its joint's limit"
+        if margins.joints.min() < ENDS <= margins.type_i.min():
+            return f"leg {int(margins.joints.argmin()) + 1} is at its joint's limit"
         return f"leg {leg} is at the end of its reach"

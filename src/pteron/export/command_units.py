@@ -71,7 +71,7 @@ def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
     ports[place] = replace(ports[place], name=NAMES[output])
     scale = ca.reshape(ca.DM(factors(robot, output)), results[place].shape)
     results[place] = results[place] * scale
-    return Program.from_expressions(given.name, symbols, given.inputs, results, ports)
+    return Program.of(given.name, symbols, given.inputs, results, ports)
 
 
 _PER_READING = {
@@ -106,7 +106,7 @@ def at_readings(given: Program, robot: Manipulator) -> Program:
         else:
             power = _PER_READING.get(port.name, 0)
             results.append(per_joint(result, power) if power else result)
-    return Program.from_expressions(given.name, symbols, given.inputs, results, given.outputs)
+    return Program.of(given.name, symbols, given.inputs, results, given.outputs)
 
 
 def told_meaning(robot: Manipulator, output: Output) -> str:

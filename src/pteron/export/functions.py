@@ -326,7 +326,7 @@ def _without_status(given: Program) -> Program:
     """Return a program without its last output, all others the same to the bit."""
     symbols = given.function.sx_in()
     results = given.function.call(symbols)[:-1]
-    return Program.from_expressions(given.name, symbols, given.inputs, results, given.outputs[:-1])
+    return Program.of(given.name, symbols, given.inputs, results, given.outputs[:-1])
 
 
 def _table(

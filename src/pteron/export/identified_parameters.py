@@ -173,9 +173,9 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
     grouping = ca.sparsify(ca.SX(ca.DM(base.grouping)))
     ports = (*load.inputs[:3], Port(_NAME, (base.rank,), shared=True))
     loaded, found = Port(f"loaded_{_NAME}", (base.rank,)), given + ca.mtimes(grouping, more.T)
-    return Program.from_expressions(
+    return Program.of(
         load.name, [mass, center, inertia, given], ports, [found], [loaded]
-    ).optimise()
+    ).optimised()
 
 
 def _recombined(given: Program, matrix: Array) -> Program:
@@ -187,4 +187,4 @@ def _recombined(given: Program, matrix: Array) -> Program:
     taken = list(symbols)
     taken[place] = ca.mtimes(ca.sparsify(ca.SX(ca.DM(matrix))), symbols[place])
     results = given.function.call(taken)
-    return Program.from_expressions(given.name, symbols, ports, results, given.outputs).optimise()
+    return Program.of(given.name, symbols, ports, results, given.outputs).optimised()

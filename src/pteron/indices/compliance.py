@@ -324,7 +324,7 @@ def _square(rows: Array) -> Array:
 
 
 def _constrained_compliance(compliance: Array, twists: Array, length: float) -> Array:
-    """Return the compliance (m, m) of a pose's coordinates while parasitic motions are held.
+    """Return the compliance (m, m) of a pose's coordinates with parasitic motions constrained.
 
     The platform moves by twists x' alone, `twists` (6, m), so that its stiffness is T^T C^-1 T. A
     direction in which nothing gives way (C is singular where links are rigid) allows no x' that

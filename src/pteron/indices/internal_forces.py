@@ -60,17 +60,18 @@ def size_of(robot: Manipulator) -> float:
 
 
 def force_units(robot: Manipulator) -> Array:
-    """Return what makes the legs' forces and moments (6 n,) comparable: 1, and the size, m."""
+    """Return the units that make the legs' forces and moments (6 n,) comparable: 1, and m."""
     return np.tile(np.repeat([1.0, size_of(robot)], 3), robot.joint_count)
 
 
 def balance_loads(
     robot: Manipulator, equations: Equations, right: Array, presumed: Array
 ) -> BalancedLoads:
-    """Return what holds loads: right sides (B, R, K) and (B, S, K).
+    """Return the leg forces that balance loads, given as right sides (B, R, K) and (B, S, K).
 
-    First what must hold; of that what is nearest to what the legs are presumed to hold. Moments
-    count as forces at the machine's size, so that no rank depends on a unit.
+    The necessary equations hold exactly; among their solutions the one nearest to the presumed
+    equations is taken. Moments count as forces at the machine's size, so that no rank depends on a
+    unit.
     """
     count, length = equations.rows.shape[-1], size_of(robot)
     unit_sizes = force_units(robot)
@@ -100,7 +101,7 @@ def balance_loads(
 
 
 def _range(projectors: Array) -> Array:
-    """Return columns (B, n, r) at right angles that span what products of projections reach."""
+    """Return orthonormal columns (B, n, r) that span the range of products of projections."""
     columns, sizes, _ = np.linalg.svd(projectors)
     counts = sizes > 0.5  # each is 0 or 1, but for rounding
     return np.asarray(
@@ -133,7 +134,7 @@ def wrench_shift(arms: Array) -> Array:
 
 
 def inverse(matrices: Array) -> Array:
-    """Return the pseudo-inverse of matrices, those of small singular values left out."""
+    """Return the pseudo-inverse of matrices, small singular values truncated."""
     return np.asarray(np.linalg.pinv(matrices, rcond=_RANK))
 
 

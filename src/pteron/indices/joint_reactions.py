@@ -179,9 +179,9 @@ def _solve_reactions(
     wrench: Array,
     moment: Array,
 ) -> tuple[Array, Array, Array, Array, int]:
-    """Return points, what the joints pass on (B, n, j, 6), actuator forces, unheld, self-stresses.
+    """Return points, joint wrenches (B, n, j, 6), actuator forces, residual, self-stress count.
 
-    Of what self-stress leaves free that of the least norm is taken.
+    Where a self-stress leaves the wrenches undetermined, the minimum-norm solution is taken.
     """
     state = pose, velocity, acceleration
     balance = Equations(*evaluate_kernel(robot, "reactions", "nan", *state))

@@ -164,11 +164,11 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
            [0.05, 0.  , 0.  ]])
     """
     robot = as_manipulator(robot)
-    given = as_array(pose, "pose", (robot.freedom,), columns=robot.coordinates)
-    coordinates = inverse_kinematics(robot, given)
-    chain: Array = evaluate_kernel(robot, "joint_points", "raise", given)
-    points: Array = evaluate_kernel(robot, "platform_points", "raise", given)
-    p, axes = robot.platform.at(given)
+    poses = as_array(pose, "pose", (robot.freedom,), columns=robot.coordinates)
+    coordinates = inverse_kinematics(robot, poses)
+    chain: Array = evaluate_kernel(robot, "joint_points", "raise", poses)
+    points: Array = evaluate_kernel(robot, "platform_points", "raise", poses)
+    p, axes = robot.platform.at(poses)
     links = tuple(
         _links(leg, chain[..., i, :, :], coordinates[..., i], points[..., i, :])
         for i, leg in enumerate(robot.legs)
@@ -177,7 +177,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
         chain,
         links,
         points,
-        _parts(robot, given, p),
+        _parts(robot, poses, p),
         p,
         p + robot.platform.tool @ axes,
         axes,
@@ -213,29 +213,29 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
     platform = robot.platform
     frame = np.array(platform.frame)
     arms = np.array([leg.platform_point for leg in robot.legs])
-    still = np.array([leg.fixed_offset for leg in robot.legs]) @ frame.T
+    offsets = np.array([leg.fixed_offset for leg in robot.legs]) @ frame.T
     if not platform.angles:
-        arms, still = arms + still, np.zeros_like(still)
-    found = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
+        arms, offsets = arms + offsets, np.zeros_like(offsets)
+    parts = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
     for hinge in _distinct(arms):
-        own = _corners(still[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
-        if len(own):
+        corners = _corners(offsets[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
+        if len(corners):
             hub = p + platform.arms(hinge[None], poses)[..., 0, :]
-            found.append(Part(hub, hub[..., None, :] + own @ frame))
-    return tuple(found)
+            parts.append(Part(hub, hub[..., None, :] + corners @ frame))
+    return tuple(parts)
 
 
 def _corners(arms: Array) -> Array:
     """Return the distinct arms (k, 3) that lead away from a hub, in order round its z axis."""
-    led = _distinct(arms[np.abs(arms).max(axis=-1) > _COINCIDENT])
-    away = led - led.mean(axis=0) if len(led) else led
-    return led[np.argsort(np.arctan2(away[:, 1], away[:, 0]), kind="stable")]
+    arms_out = _distinct(arms[np.abs(arms).max(axis=-1) > _COINCIDENT])
+    offsets = arms_out - arms_out.mean(axis=0) if len(arms_out) else arms_out
+    return arms_out[np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]), kind="stable")]
 
 
 def _distinct(points: Array) -> Array:
-    """Return the points (k, 3) but for those that are where one before them is."""
-    apart = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
-    return points[[bool(apart[i, :i].all()) for i in range(len(points))]]
+    """Return the distinct points (k, 3), each at its first place."""
+    differs = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
+    return points[[bool(differs[i, :i].all()) for i in range(len(points))]]
 
 
 def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
@@ -264,23 +264,23 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     array([-0.3,  0.3])
     """
     robot = as_manipulator(robot)
-    given = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
-    points = joint_points(robot, given.reshape(-1, robot.freedom))
-    found = []
+    array = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
+    points = joint_points(robot, array.reshape(-1, robot.freedom))
+    guides = []
     for i, leg in enumerate(robot.legs):
-        used, slides = points.coordinates[:, i], "p" in leg.bodies
+        coordinates, slides = points.coordinates[:, i], "p" in leg.bodies
         axis = np.array(leg.base_axis)
         if not slides and not leg.goes_round:
             path = points.links[i][0, :1]
         elif slides:
             spare = _SPARE * leg.size
-            limits = leg.limits or (used.min() - spare, used.max() + spare)
+            limits = leg.limits or (coordinates.min() - spare, coordinates.max() + spare)
             path = np.array(leg.guide_point) + np.multiply.outer(np.array(limits), axis)
         else:
-            low, high = leg.limits or (used[0] - np.pi, used[0] + np.pi)
-            angles = np.linspace(low, high, 2 + int((high - low) / _ARC)) - used[0]
+            low, high = leg.limits or (coordinates[0] - np.pi, coordinates[0] + np.pi)
+            angles = np.linspace(low, high, 2 + int((high - low) / _ARC)) - coordinates[0]
             center, end = points.links[i][0, :2]
-            turned = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
-            path = center + turned.apply(end - center)
-        found.append(Guide(slides, axis, path))
-    return tuple(found)
+            rotations = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
+            path = center + rotations.apply(end - center)
+        guides.append(Guide(slides, axis, path))
+    return tuple(guides)

@@ -57,7 +57,7 @@ class Cut(NamedTuple):
         )
 
     def may_be_row(self, record: Record) -> bool:
-        """Say whether it is more like a row with a fault than like a line above the rows."""
+        """Return whether a record is more likely a faulty row than a header line."""
         cells = record.cells
         if len(cells) == self.width and self.columns:
             cells = tuple(cells[j] for j in self.columns)

@@ -227,7 +227,7 @@ def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
 
 
 def _number_repeated(names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return the names, repeated ones numbered, and the numbered ones with those in the file."""
+    """Return distinct names, repeated ones numbered, and a map from numbered to original names."""
     numbered: list[str] = []
     repeated: dict[str, str] = {}
     seen: Counter[str] = Counter()

@@ -140,7 +140,7 @@ def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
     """Return a paving as a lattice, as fine as the smallest boxes, or as `most` cells allow."""
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
     start, extent = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
-    sizes = [list(paving.places_by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
+    sizes = [list(paving.by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
     finest = np.array([depth for depth, _ in chain(*sizes)]).max(axis=0, initial=0)
     nonempty = np.concatenate([paving.inner, paving.boundary])
     low, high = (
@@ -163,7 +163,7 @@ def _filled_shares(
     first: NDArray[np.int64],
     shape: tuple[int, ...],
 ) -> Array:
-    """Return which share of each cell boxes fill, given as by `Paving.places_by_size`."""
+    """Return which share of each cell boxes fill, given as by `Paving.by_size`."""
     shares = np.zeros(int(np.prod(shape)))
     strides = np.cumprod(np.append(1, shape[:0:-1]))[::-1]
     for depth, places in sizes:

@@ -20,7 +20,7 @@ from pteron.kernels.bisection import bisect_condition
 from pteron.kernels.one_thread import one_thread
 from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.lattice_minima import failing_places
-from pteron.workspace.samples import Samples, Shape, lattice
+from pteron.workspace.shape_samples import Samples, Shape, lattice
 from pteron.workspace.smooth_conditions import SmoothConditions
 
 _PER_ROW = 3

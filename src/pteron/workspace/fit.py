@@ -11,7 +11,7 @@ import scipy  # type: ignore[import-untyped]
 from pteron.kernels import Array
 from pteron.workspace.exchange import POINTS, Program, improve_unknowns
 from pteron.workspace.proofs import Proof
-from pteron.workspace.samples import Shape, shape_samples
+from pteron.workspace.shape_samples import Shape, shape_samples
 from pteron.workspace.smooth_conditions import SmoothConditions
 
 _COARSE = 25

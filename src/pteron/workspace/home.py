@@ -30,8 +30,8 @@ from pteron.workspace.home_starts import (
     sides,
 )
 from pteron.workspace.margins import pose_margins
+from pteron.workspace.reach_errors import limits_error, why_unreachable
 from pteron.workspace.simplex_ascent import climb
-from pteron.workspace.unreachable import limits_error, unreachable_error
 
 _STARTS = 8
 """Best poses of each kind, on each side of the base, that are improved by a local search."""
@@ -209,7 +209,7 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
     try:
         best_type_ii(robot)
     except ModelError:
-        raise unreachable_error(robot) from None
+        raise why_unreachable(robot) from None
     candidates = _candidates(robot)
     starts = _starts(robot, candidates)
     refined = np.concatenate([_refine_level_starts(robot, starts), _refine_poses(robot, starts)])
@@ -218,7 +218,7 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
     if most <= 0.0:
         reachable = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
         raise (
-            limits_error(robot, refined[reachable]) if reachable.any() else unreachable_error(robot)
+            limits_error(robot, refined[reachable]) if reachable.any() else why_unreachable(robot)
         )
     side = sides(robot, refined)
     if not _are_mirrored(robot, refined, margins, side):

@@ -19,7 +19,7 @@ from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.fit import Fit, largest_fit, proved_fit
 from pteron.workspace.proofs import Proof, expect_space, prove
 from pteron.workspace.regions import Box, Cylinder, Region
-from pteron.workspace.samples import Shape, cube
+from pteron.workspace.shape_samples import Shape, cube
 from pteron.workspace.smooth_conditions import smooth_conditions
 from pteron.workspace.volume import bounding_box, expect_places
 

@@ -142,7 +142,10 @@ def _contact(
 def _find_crossing(
     side: Paving, test: IntervalTest, k: int, low: Array, high: Array
 ) -> Array | None:
-    """Return a pose on an edge, of boxes of which a corner is proved inside it, and one beyond."""
+    """Return a pose on a condition's boundary, bisected in a box.
+
+    Of the box one corner is proved inside and one outside; None where there is no such box.
+    """
     corners = np.array(list(np.ndindex(*(2,) * low.shape[1])))
     for a, b in zip(low, high, strict=True):
         poses = np.where(corners == 1, b, a)

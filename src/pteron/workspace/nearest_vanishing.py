@@ -166,7 +166,7 @@ class Search:
         return self._sizes[0] * float(np.linalg.norm(state[: len(self.moving)]))
 
     def _values(self, states: Array) -> tuple[Array, Array, Array]:
-        """Return the residuals of states (K, k + R), the nonnegative quantities, and their slopes.
+        """Return equality residuals, inequality residuals and both Jacobians at states (K, k + R).
 
         The value and r^2 - g, (K, 1 + R); r and the squares of the other legs' measures, (K, R + n)
         or one less; the slopes (K, 1 + 2 R + n, k + R).

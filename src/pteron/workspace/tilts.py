@@ -90,7 +90,7 @@ class TiltedBall:
         least = np.maximum(np.maximum(low[:, self.angles], -high[:, self.angles]), 0.0)
         return np.asarray(far | (np.cos(least).prod(axis=-1) < math.cos(self.tilt) - 1e-12))
 
-    def sample_poses(self) -> Array:
+    def sampled(self) -> Array:
         """Return poses (K, m) spread over it, a third of them on its rim."""
         free = len(self.lengths) + 2
         shares = scipy.stats.qmc.Sobol(free, seed=0).random(_SAMPLES)
@@ -246,14 +246,14 @@ def _largest_region(
         radius, tilt = sizes(size)
         return TiltedBall(tuple(reference.tolist()), radius, tilt, lengths, angles)
 
-    if not keeps(robot, required, region(0.0).sample_poses()).all():
+    if not keeps(robot, required, region(0.0).sampled()).all():
         raise ModelError(
-            f"not even the middle, pose {region(0.0).sample_poses()[-1].tolist()}, serves",
+            f"not even the middle, pose {region(0.0).sampled()[-1].tolist()}, serves",
             subject=robot.name,
         )
     shares = ((1.0 - tolerance) ** k for k in range(1, _SHARES + 1))
     size, proof = largest_proved(
-        robot, required, region, lambda size: region(size).sample_poses(), most, _HALVINGS, shares
+        robot, required, region, lambda size: region(size).sampled(), most, _HALVINGS, shares
     )
     if not proof.holds:
         raise ModelError(

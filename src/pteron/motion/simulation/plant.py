@@ -98,33 +98,33 @@ def advance(
     expect(np.isfinite(span[0]), "step", shown(step), "a time in s")
     if not span[1] >= 0.0 or span[1] % 1.0:
         raise DataError(f"count: {shown(count)} given, a whole number of 0 or more expected")
-    ones = {"pose": pose, "velocity": velocity, "forces": forces}
-    sizes = dict.fromkeys(ones, robot.freedom) | {"forces": robot.joint_count}
+    inputs = {"pose": pose, "velocity": velocity, "forces": forces}
+    sizes = dict.fromkeys(inputs, robot.freedom) | {"forces": robot.joint_count}
     columns = robot.column_names
     if wrench is not None:
-        ones["wrench"] = wrench
+        inputs["wrench"] = wrench
     sizes["wrench"] = len(columns["wrench"])
     parts = {
-        name: as_array(value, name, (sizes[name],), columns=columns.get(name, ()))
-        for name, value in ones.items()
+        name: as_array(array, name, (sizes[name],), columns=columns.get(name, ()))
+        for name, array in inputs.items()
     }
     lead = broadcast_lead({name: part.shape[:-1] for name, part in parts.items()})
     batch = math.prod(lead)
-    whole = {
+    rows = {
         name: np.broadcast_to(part, (*lead, sizes[name])).reshape(batch, 1, -1)
         for name, part in parts.items()
     }
     general = machines is not None and machines.geometry is not None
-    made = loop(robot, general=general)
-    count_drives = robot.joint_count * len(made.kind.extra_states)
+    simulator = loop(robot, general=general)
+    count_drives = robot.joint_count * len(simulator.kind.extra_states)
     if drives is None:
-        drives = drive_states(robot, whole["pose"], whole["velocity"]).reshape(*lead, count_drives)
-    begun = as_array(drives, "drives", (count_drives,))
-    begun = np.broadcast_to(begun, (*lead, count_drives)).reshape(batch, 1, count_drives)
-    state = np.concatenate([whole["pose"], whole["velocity"], begun], axis=-1)
-    arrays = made.idle(robot, state) | {"given": np.ascontiguousarray(whole["forces"])}
+        drives = drive_states(robot, rows["pose"], rows["velocity"]).reshape(*lead, count_drives)
+    drive_rows = as_array(drives, "drives", (count_drives,))
+    drive_rows = np.broadcast_to(drive_rows, (*lead, count_drives)).reshape(batch, 1, count_drives)
+    state = np.concatenate([rows["pose"], rows["velocity"], drive_rows], axis=-1)
+    arrays = simulator.idle(robot, state) | {"given": np.ascontiguousarray(rows["forces"])}
     if wrench is not None:
-        arrays["wrench"] = np.ascontiguousarray(whole["wrench"])
+        arrays["wrench"] = np.ascontiguousarray(rows["wrench"])
     if machines is not None:
         if len(machines) != batch or machines.robot != robot:
             raise DataError(
@@ -132,21 +132,21 @@ def advance(
                 f"{robot.name} expected, one for each state"
             )
         arrays |= machines.numbers
-    done, piece = 0, max(1, _PIECE // max(1, batch))
-    while batch and done < count:  # in pieces, between which Ctrl-C is seen
-        steps = min(piece, int(count) - done)
-        made.run(arrays, 1, [step, 0.0, 0.0, step * steps], [steps, 0, 0, 0, 0, 0, 0, 0, 0])
-        done += steps
+    steps_done, piece = 0, max(1, _PIECE // max(1, batch))
+    while batch and steps_done < count:  # in pieces, between which Ctrl-C is seen
+        steps = min(piece, int(count) - steps_done)
+        simulator.run(arrays, 1, [step, 0.0, 0.0, step * steps], [steps, 0, 0, 0, 0, 0, 0, 0, 0])
+        steps_done += steps
     m = robot.freedom
     state = arrays["state"].reshape(*lead, 2 * m + count_drives)
-    served = (arrays["fault"] == 0.0).reshape(lead)
-    return state[..., :m], state[..., m : 2 * m], state[..., 2 * m :], served
+    succeeded = (arrays["fault"] == 0.0).reshape(lead)
+    return state[..., :m], state[..., m : 2 * m], state[..., 2 * m :], succeeded
 
 
 def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
     """Return the state (..., K) of drives that bend or lag and hold the machine without haste."""
-    found = motor_states(robot, pose, velocity, np.zeros_like(pose))
-    return np.concatenate([np.empty((*pose.shape[:-1], 0)), *found.values()], axis=-1)
+    states = motor_states(robot, pose, velocity, np.zeros_like(pose))
+    return np.concatenate([np.empty((*pose.shape[:-1], 0)), *states.values()], axis=-1)
 
 
 def motor_states(
@@ -160,14 +160,16 @@ def motor_states(
     force, motor = np.nan_to_num(force), inverse_kinematics(robot, pose)
     for i, leg in enumerate(robot.legs):
         if leg.drive and leg.drive.elastic:
-            bends, held = leg.drive.elastic, force[..., i]
-            motor[..., i] += held / bends.stiffness + np.sign(held) * bends.backlash / 2.0
-    found = {"motor": motor, "current": force}
-    found["motor_rate"] = rates = joint_rates(robot, pose, velocity).actuated
-    slid = [leg.drive.coulomb / leg.drive.lugre.stiffness if leg.drive and leg.drive.lugre else 0.0
-            for leg in robot.legs]  # fmt: skip
-    found["bristle"] = np.sign(rates) * np.array(slid)
-    return {name: found[name] for name, _ in kind.extra_states}
+            bends, load = leg.drive.elastic, force[..., i]
+            motor[..., i] += load / bends.stiffness + np.sign(load) * bends.backlash / 2.0
+    states = {"motor": motor, "current": force}
+    states["motor_rate"] = rates = joint_rates(robot, pose, velocity).actuated
+    deflections = [
+        leg.drive.coulomb / leg.drive.lugre.stiffness if leg.drive and leg.drive.lugre else 0.0
+        for leg in robot.legs
+    ]
+    states["bristle"] = np.sign(rates) * np.array(deflections)
+    return {name: states[name] for name, _ in kind.extra_states}
 
 
 _PIECE = 200_000
@@ -188,16 +190,16 @@ class Adaptive:
         self._tolerance = tolerance
 
     def go(
-        self, steps: int, step: float, held: Loads, arrays: Mapping[str, Array], alive: Array
+        self, steps: int, step: float, loads_held: Loads, arrays: Mapping[str, Array], alive: Array
     ) -> None:
         """Go on by so many steps, as `pteron.kernels.samples.Plant.go` does."""
         state, clock, span = arrays["state"][0, 0], arrays["clock"][0, 0], steps * step
-        m, loads = len(state) // 2, (held["forces"][0], held["wrench"][0])
+        m, loads = len(state) // 2, (loads_held["forces"][0], loads_held["wrench"][0])
 
         def rates(_: float, state: Array) -> Array:
             velocity = state[m:]
-            found, status = self._accelerations(state[:m], velocity, *loads)
-            return np.concatenate([velocity, found if status else np.full(m, np.nan)])
+            acceleration, status = self._accelerations(state[:m], velocity, *loads)
+            return np.concatenate([velocity, acceleration if status else np.full(m, np.nan)])
 
         if not np.isfinite(rates(0.0, state)).all():
             alive[:] = 0.0

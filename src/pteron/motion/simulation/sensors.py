@@ -49,17 +49,19 @@ class Sensors:
 
     def __post_init__(self) -> None:
         for name in ("encoder", "noise", "motor_encoder", "delay"):
-            given = getattr(self, name)
-            values = as_array(0.0 if given is None and name == "motor_encoder" else given, name, ())
-            scalar = name == "delay" and values.ndim
-            if scalar or not (np.isfinite(values).all() and (values >= 0.0).all()):
-                wanted = "0 s or more" if name == "delay" else "0 or more"
-                raise DataError(f"{name}: {given} given, {wanted} expected")
+            numbers = getattr(self, name)
+            array = as_array(
+                0.0 if numbers is None and name == "motor_encoder" else numbers, name, ()
+            )
+            scalar = name == "delay" and array.ndim
+            if scalar or not (np.isfinite(array).all() and (array >= 0.0).all()):
+                expected = "0 s or more" if name == "delay" else "0 or more"
+                raise DataError(f"{name}: {numbers} given, {expected} expected")
         for name in ("seed", "samples"):
-            whole: object = getattr(self, name)
-            if not isinstance(whole, int) or isinstance(whole, bool) or whole < 0:
+            samples: object = getattr(self, name)
+            if not isinstance(samples, int) or isinstance(samples, bool) or samples < 0:
                 raise DataError(
-                    f"{name}: {shown(whole)} given, a whole number of 0 or more expected"
+                    f"{name}: {shown(samples)} given, a whole number of 0 or more expected"
                 )
         cutoff = 1.0 if self.cutoff is None else as_array(self.cutoff, "cutoff", ())
         if np.ndim(cutoff) or not (np.isfinite(cutoff) and cutoff > 0.0):
@@ -69,7 +71,7 @@ class Sensors:
 def encoder_arrays(
     sensors: Sensors, robot: Manipulator, period: float, state: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return what a control loop takes of encoders that begin in a state: numbers and memory.
+    """Return a control loop's arrays for encoders that begin in a state: numbers and memory.
 
     The angle of a crank that may go all the way round jumps by a turn: its readings go on by the
     shorter way.
@@ -79,7 +81,9 @@ def encoder_arrays(
     rates = joint_rates(robot, pose, velocity).actuated
     at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
     numbers = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
-    steps, noises, fine = (_per_joint(value, key, len(joints)) for key, value in numbers.items())
+    steps, noises, fine = (
+        _joint_array(setting, key, len(joints)) for key, setting in numbers.items()
+    )
     round_ = np.array([float(leg.goes_round) for leg in robot.legs])
     if "motor" in state:
         soft = DriveKind.from_robot(robot).elastic
@@ -87,18 +91,21 @@ def encoder_arrays(
         rates = np.concatenate([rates, np.where(soft, state["motor_rate"], rates)])
         steps, noises = np.concatenate([steps, fine]), np.tile(noises, 2)
         round_ = np.concatenate([round_, np.where(soft, 0.0, round_)])
-    at = [encoder_of(leg.drive) for leg in robot.legs]
-    found = {
+    encoders = [encoder_of(leg.drive) for leg in robot.legs]
+    arrays = {
         "encoders": encoder_memory(joints, rates, steps, period),
         "steps": steps,
         "noises": noises,
         "round": round_,
         "share": np.array([_share(sensors, period)]),
         "at_motor": np.array(
-            [*(float(e == "motor") for e in at), *(float(e in ("motor", "both")) for e in at)]
+            [
+                *(float(e == "motor") for e in encoders),
+                *(float(e in ("motor", "both")) for e in encoders),
+            ]
         ),
     }
-    return {name: value.reshape(1, 1, -1) for name, value in found.items()}
+    return {name: setting.reshape(1, 1, -1) for name, setting in arrays.items()}
 
 
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
@@ -106,10 +113,10 @@ def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> 
 
     `steps` (E,) are theirs, `period` is from one sample to the next.
     """
-    before = joints - period * rates
+    last_readings = joints - period * rates
     widths = np.where(steps > 0.0, steps, 1.0)
-    before = np.where(steps > 0.0, steps * np.round(before / widths), before)
-    return np.concatenate([joints, np.zeros_like(joints), before, rates], axis=-1)
+    last_readings = np.where(steps > 0.0, steps * np.round(last_readings / widths), last_readings)
+    return np.concatenate([joints, np.zeros_like(joints), last_readings, rates], axis=-1)
 
 
 def encoder_noise(
@@ -130,43 +137,45 @@ def encoder_of(drive: Drive | None) -> str:
 
 
 def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
-    """Return what a sample's difference counts in each rate that is told (n,), NaN: it is exact.
+    """Return the filter gain of each estimated rate (n,); NaN where the rate is measured.
 
     A rate is that of the differences of its encoder where this rounds or is noisy, and it is the
     motor's where the drive tells the motor's.
     """
     count = robot.joint_count
     at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
-    given = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
-    steps, noises, fine = (_per_joint(value, key, count) for key, value in given.items())
+    settings = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
+    steps, noises, fine = (_joint_array(setting, key, count) for key, setting in settings.items())
     motors = [encoder_of(leg.drive) in ("motor", "both") for leg in robot.legs]
     rough = np.where(motors, fine, steps) + noises > 0.0
     return np.where(rough, _share(sensors, period), np.nan)
 
 
 def _share(sensors: Sensors, period: float) -> float:
-    """Return what a sample's difference counts in a rate, by the filter's cut-off."""
+    """Return the filter gain of a rate estimated from differences, by the filter's cut-off."""
     if sensors.cutoff is None:
         return 1.0
     return -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
 
 
-def expect_sensed(robot: Manipulator, law: Program) -> None:
+def expect_encoders(robot: Manipulator, law: Program) -> None:
     """Refuse a controller that needs readings of motors where there is no encoder."""
-    asked = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
-    without = [str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"]
-    if asked and without:
+    motor_readings = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
+    legs_without = [
+        str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"
+    ]
+    if motor_readings and legs_without:
         raise DataError(
-            f"controller: needs {' and '.join(asked)}, which no sensor gives: the encoder of leg "
-            f"{', '.join(without)} of {robot.name} is at the joint; take joints and joint_rates, "
-            'or give its drive.elastic encoder = "both"'
+            f"controller: needs {' and '.join(motor_readings)}, which no sensor gives: the encoder "
+            f"of leg {', '.join(legs_without)} of {robot.name} is at the joint; take joints and "
+            'joint_rates, or give its drive.elastic encoder = "both"'
         )
 
 
-def _per_joint(value: float | tuple[float, ...], name: str, count: int) -> Array:
-    given = np.asarray(value, dtype=float)
-    if given.shape not in ((), (count,)):
+def _joint_array(setting: float | tuple[float, ...], name: str, count: int) -> Array:
+    array = np.asarray(setting, dtype=float)
+    if array.shape not in ((), (count,)):
         raise DataError(
-            f"{name}: shape {given.shape} given, one number or {count} expected, one for each joint"
+            f"{name}: shape {array.shape} given, one number or {count} expected, one for each joint"
         )
-    return np.broadcast_to(given, (count,)).copy()
+    return np.broadcast_to(array, (count,)).copy()

@@ -17,7 +17,7 @@ from pteron.kinematics.evaluate import finite_pose, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
-from pteron.motion.simulation.loop import ControlLaw, Loads, Timing, run
+from pteron.motion.simulation.loop import ControlLaw, Loads, Timing, run_simulation
 from pteron.motion.simulation.plant import Method
 from pteron.motion.simulation.sensors import Sensors
 from pteron.motion.simulation.simulation import Simulation
@@ -155,52 +155,43 @@ def simulate(
     """
     robot = as_manipulator(robot)
     if controller is not None:
-        _expect_controller(controller)
+        _expect_controller(controller, forces)
     if model is not None:
         model = as_manipulator(model)
-    if controller is not None and forces is not None:
-        raise DataError("controller and forces given; give one of them")
     if motion is not None and controller is None:
         raise DataError("motion given, but no controller that follows it")
     period = period if controller is None else controller.period
     check_positive(period=period, step=step, tolerance=tolerance)
     check_delay(delay)
-    expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
-
-    if method == "dop853" and not DriveKind.from_robot(robot).plain:
-        raise DataError(
-            f'method: "dop853" given, but the drives of {robot.name} bend, lag or ripple; "rk4" '
-            "has them"
-        )
-
+    _expect_method(robot, method)
     reference = reference_of(robot, motion, start, duration, period)
     pose, velocity = reference.pose[0], reference.velocity[0]
     if start is not None:
         pose, velocity = _state(robot, start)
     masses = _masses(payload, reference.time)
-    loaded = {mass: with_payload(robot, mass) for mass in dict.fromkeys(masses.tolist())}
+    machines = {mass: with_payload(robot, mass) for mass in dict.fromkeys(masses.tolist())}
     source: ControlLaw | Array
     if controller is None:
-        source = _of_time(forces, robot, "forces", reference.time)
+        source = _sample_source(forces, robot, "forces", reference.time)
     else:
-        believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
-        source = controller.law(believed)
-    about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
+        known_machine = model or (machines[masses[0]] if len(machines) == 1 else robot)
+        source = controller.law(known_machine)
+    sample_poses = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
     sensors = sensors or Sensors()
     sensing = sensors.delay + sensors.samples * period
-    length = allowed_step(robot, about, step, usual=step == STEP)
+    length = allowed_step(robot, sample_poses, step, usual=step == STEP)
     timing = Timing(delay, method, length, tolerance, sensing)
-    loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench", reference.time))
+    loads = Loads(masses, machines, _sample_source(wrench, robot, "wrench", reference.time))
 
-    def made(timing: Timing) -> Simulation:
-        given = (pose, velocity), reference, source, loads, sensors, timing
-        return run(robot, *given, limits=limits and controller is not None)
+    def run_with(timing: Timing) -> Simulation:
+        arguments = (pose, velocity), reference, source, loads, sensors, timing
+        return run_simulation(robot, *arguments, limits=limits and controller is not None)
 
-    return made(timing) if error is None else _within(made, timing, error, period)
+    return run_with(timing) if error is None else _refine_steps(run_with, timing, error, period)
 
 
-def _within(
-    made: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
+def _refine_steps(
+    run_with: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
 ) -> Simulation:
     """Return a simulation whose steps are shortened until no pose changes by more than the error.
 
@@ -211,14 +202,14 @@ def _within(
     check_positive(error=error)
     if timing.method != "rk4":
         raise DataError('error: goes with method "rk4"; the steps of "dop853" have `tolerance`')
-    coarse, changes = made(timing), [np.inf]
+    coarse, changes = run_with(timing), [np.inf]
     for _ in range(_HALVINGS):
         length = min(timing.step, coarse.step)
         count = round(period / length)
         timing = replace(timing, step=period / (2 * count + 1) if count else length / 2.0)
-        fine = made(timing)
-        both = min(len(fine.time), len(coarse.time))
-        changes.append(float(np.abs(fine.pose[:both] - coarse.pose[:both]).max()))
+        fine = run_with(timing)
+        common_length = min(len(fine.time), len(coarse.time))
+        changes.append(float(np.abs(fine.pose[:common_length] - coarse.pose[:common_length]).max()))
         if max(changes[-2:]) <= _SAFE * error and len(fine.time) == len(coarse.time):
             return fine
         coarse = fine
@@ -229,27 +220,40 @@ def _within(
     )
 
 
-def _expect_controller(controller: object) -> None:
+def _expect_method(robot: Manipulator, method: Method) -> None:
+    """Refuse a method of integration that there is not, or that the drives do not allow."""
+    expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
+    if method == "dop853" and not DriveKind.from_robot(robot).plain:
+        raise DataError(
+            f'method: "dop853" given, but the drives of {robot.name} bend, lag or ripple; "rk4" '
+            "has them"
+        )
+
+
+def _expect_controller(controller: object, forces: object) -> None:
+    """Refuse an argument that is no controller, and forces given beside one."""
     period = getattr(controller, "period", None)
     if isinstance(controller, type) or not isinstance(period, float | int):
         raise DataError(
             f"controller: {shown(controller)} given, one such as ComputedTorque() expected"
         )
+    if forces is not None:
+        raise DataError("controller and forces given; give one of them")
 
 
 def check_delay(delay: float) -> None:
-    """Refuse what is no delay."""
+    """Refuse a delay that is negative or not finite."""
     expect(_is_number(delay) and delay >= 0.0, "delay", shown(delay), "0 s or more")
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.number) and bool(np.isfinite(value))
+def _is_number(number: object) -> bool:
+    return isinstance(number, int | float | np.number) and bool(np.isfinite(number))
 
 
 def check_positive(**positive: float) -> None:
-    """Refuse what is no number above 0."""
-    for name, value in positive.items():
-        expect(_is_number(value) and value > 0.0, name, shown(value), "a number above 0")
+    """Refuse a number that is not positive and finite."""
+    for name, number in positive.items():
+        expect(_is_number(number) and number > 0.0, name, shown(number), "a number above 0")
 
 
 def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array, Array]:
@@ -266,7 +270,7 @@ def reference_of(
     duration: float | None,
     period: float,
 ) -> Motion:
-    """Return what the machine is to do, at the samples: the motion, or rest where it starts."""
+    """Return the reference motion at the samples: the given one, or rest at the start."""
     if motion is not None:
         motion.expect_ascending()
     if duration is None:
@@ -288,28 +292,28 @@ def reference_of(
         return Motion(time, *(finite_rows(robot, part, name) for part, name in parts))
     if start is None:
         raise DataError("start: not given, nor a motion to start on; give a pose and a velocity")
-    rest = np.zeros((len(time), robot.freedom))
-    return Motion(time, rest + _state(robot, start)[0], rest, rest)
+    zeros = np.zeros((len(time), robot.freedom))
+    return Motion(time, zeros + _state(robot, start)[0], zeros, zeros)
 
 
 def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Array:
-    """Return what is carried at each sample, kg."""
-    given = as_array(payload, "payload", ())
-    if given.ndim == 0:
-        return np.full(len(time), given)
-    pairs = given.ndim == 2 and given.shape[1:] == (2,) and bool(np.isfinite(given[:, 0]).all())
-    if not pairs or (np.diff(given[:, 0]) < 0.0).any():
+    """Return the payload at each sample (T,), kg."""
+    array = as_array(payload, "payload", ())
+    if array.ndim == 0:
+        return np.full(len(time), array)
+    pairs = array.ndim == 2 and array.shape[1:] == (2,) and bool(np.isfinite(array[:, 0]).all())
+    if not pairs or (np.diff(array[:, 0]) < 0.0).any():
         raise DataError("payload: a mass, or pairs of time and mass in the order of time, expected")
-    if not (given[:, 1] >= 0.0).all():
-        wrong = given[~(given[:, 1] >= 0.0), 1][0]
+    if not (array[:, 1] >= 0.0).all():
+        wrong = array[~(array[:, 1] >= 0.0), 1][0]
         raise DataError(f"payload: {wrong} given, a mass of 0 kg or more expected")
-    k = np.searchsorted(given[:, 0], time + 1e-9, side="right")
-    masses: Array = np.append(0.0, given[:, 1])[k]
+    k = np.searchsorted(array[:, 0], time + 1e-9, side="right")
+    masses: Array = np.append(0.0, array[:, 1])[k]
     return masses
 
 
-def _of_time(
-    given: PoseLike | Callable[[float], PoseLike] | None,
+def _sample_source(
+    source: PoseLike | Callable[[float], PoseLike] | None,
     robot: Manipulator,
     name: str,
     time: Array,
@@ -318,13 +322,13 @@ def _of_time(
     columns = robot.column_names[name]
     size = len(columns)
 
-    def numbers(value: PoseLike, told: str) -> Array:
-        found = as_array(pick_columns(value, columns, told), told, (size,))
-        expect(found.ndim == 1, told, f"shape {found.shape}", f"({size},)")
-        expect(np.isfinite(found).all(), told, shown(found.tolist()), "finite numbers")
-        return found
+    def numbers(row: PoseLike, title: str) -> Array:
+        array = as_array(pick_columns(row, columns, title), title, (size,))
+        expect(array.ndim == 1, title, f"shape {array.shape}", f"({size},)")
+        expect(np.isfinite(array).all(), title, shown(array.tolist()), "finite numbers")
+        return array
 
-    if callable(given):
-        return np.array([numbers(given(now), f"{name}({now:g})") for now in time.tolist()])
-    held = np.zeros(size) if given is None else numbers(given, name)
-    return np.tile(held, (len(time), 1))
+    if callable(source):
+        return np.array([numbers(source(now), f"{name}({now:g})") for now in time.tolist()])
+    constant = np.zeros(size) if source is None else numbers(source, name)
+    return np.tile(constant, (len(time), 1))

@@ -1,4 +1,4 @@
-"""`DriveMargin`: what a drive of the machine's file can do over what a cycle asks of it."""
+"""`DriveMargin`: a limit of a drive in the machine's file over the load of a cycle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.shapes import PerJoint
 
 
 class DriveMargin(NamedTuple):
-    """A limit of a drive in the machine's file over what the cycle asks of it, at the joint."""
+    """A limit of a drive in the machine's file over the cycle's load, at the joint."""
 
     leg: int
     limit: str
@@ -59,7 +59,7 @@ def drive_margins(
     `needed` has what a cycle takes of each joint (n,), by quantity: of some or of all. `forces` and
     `speeds` (..., n) are those of its moments.
     """
-    found = []
+    margins = []
     for i, leg in enumerate(robot.legs):
         drive, force = leg.drive or Drive(), leg.joint.force_unit
         limits = (
@@ -67,7 +67,7 @@ def drive_margins(
             ("max_force", "peak_force", drive.max_force, force),
             ("max_speed", "peak_speed", drive.max_speed, f"{leg.joint.unit}/s"),
         )
-        found += [
+        margins += [
             DriveMargin(i + 1, key, quantity, most, float(needed[quantity][i]), unit)
             for key, quantity, most, unit in limits
             if most is not None and quantity in needed
@@ -75,6 +75,6 @@ def drive_margins(
         by_speed = [key for key in ("curve", "winding") if getattr(drive, key)]
         if by_speed and forces.size:
             peak = motor_peak(drive, forces[..., i], speeds[..., i])
-            told = " and ".join(by_speed), "force_at_speed", peak.most, peak.force, force
-            found.append(DriveMargin(i + 1, *told))
-    return tuple(found)
+            speed_fields = " and ".join(by_speed), "force_at_speed", peak.most, peak.force, force
+            margins.append(DriveMargin(i + 1, *speed_fields))
+    return tuple(margins)

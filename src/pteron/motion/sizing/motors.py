@@ -15,7 +15,7 @@ from pteron.bodies.tables import Number, TomlTable
 from pteron.errors import DataError, warn_unlikely
 from pteron.renamed import former_attribute
 from pteron.tables import read_table
-from pteron.toml import read_toml, told, validated
+from pteron.toml import joined_faults, read_toml, to_model
 
 _FASTEST = 3000.0
 """Speed, rad/s, from which on `Motor.warnings` asks whether it is in revolutions per minute: 29 000
@@ -62,35 +62,35 @@ class Motor:
     def __post_init__(self) -> None:
         faults = []
         for key in _NUMBERS:
-            value, least = getattr(self, key), key == "rotor_inertia"
-            if not (math.isfinite(value) and (value > 0.0 or (least and value == 0.0))):
-                wanted = "0 or more" if least else "a number above 0"
-                faults.append(f"{key}: {value:g} given, {wanted} expected")
+            number, least = getattr(self, key), key == "rotor_inertia"
+            if not (math.isfinite(number) and (number > 0.0 or (least and number == 0.0))):
+                expected = "0 or more" if least else "a number above 0"
+                faults.append(f"{key}: {number:g} given, {expected} expected")
         if not faults and self.peak_torque < self.rated_torque:
             faults.append(
                 f"peak_torque: {self.peak_torque:g} N m given, at least rated_torque expected, "
                 f"{self.rated_torque:g} N m"
             )
         if faults:
-            raise DataError(told(faults), subject=f"motor {self.name}")
+            raise DataError(joined_faults(faults), subject=f"motor {self.name}")
 
     doubts = former_attribute("doubts", "warnings")
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings of unlikely numbers, most often in a wrong unit, one line each."""
-        found = []
+        texts = []
         if self.max_speed >= _FASTEST:
-            found.append(
+            texts.append(
                 f"motor {self.name}: max_speed of {self.max_speed:g} rad/s: is it in revolutions "
                 "per minute?"
             )
         if self.rated_torque < _SLUGGISH * self.rotor_inertia:
-            found.append(
+            texts.append(
                 f"motor {self.name}: rotor_inertia of {self.rotor_inertia:g} kg m^2 with a rated "
                 f"torque of {self.rated_torque:g} N m: is it in kg cm^2?"
             )
-        return tuple(found)
+        return tuple(texts)
 
 
 def read_motors(path: str | Path) -> tuple[Motor, ...]:
@@ -119,8 +119,12 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     UnlikelyValue
         Of each of `Motor.warnings`.
     """
-    rows = _from_toml(path) if Path(path).suffix.lower() == ".toml" else _from_table(path)
-    found, names = [], set()
+    rows = (
+        _read_toml_motors(path)
+        if Path(path).suffix.lower() == ".toml"
+        else _read_table_motors(path)
+    )
+    motors, names = [], set()
     for place, row in rows:
         try:
             motor = Motor(**row)
@@ -131,15 +135,15 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
         for text in motor.warnings:
             warn_unlikely(text)
         names.add(motor.name)
-        found.append(motor)
-    if not found:
+        motors.append(motor)
+    if not motors:
         raise DataError(f"{path}: lists no motor")
-    return tuple(found)
+    return tuple(motors)
 
 
-_NAMED: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
-_NAMED["price"] = Number | None, None  # for who chooses among them
-_MotorTable: Any = create_model("_MotorTable", __base__=TomlTable, **_NAMED)
+_MOTOR_KEYS: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
+_MOTOR_KEYS["price"] = Number | None, None  # for who chooses among them
+_MotorTable: Any = create_model("_MotorTable", __base__=TomlTable, **_MOTOR_KEYS)
 
 
 class _MotorsFile(TomlTable):
@@ -149,13 +153,13 @@ class _MotorsFile(TomlTable):
 _Rows = list[tuple[str, dict[str, Any]]]
 
 
-def _from_toml(path: str | Path) -> _Rows:
+def _read_toml_motors(path: str | Path) -> _Rows:
     document = read_toml(path, DataError, "no such file")
-    listed = validated(_MotorsFile, document, str(path), DataError)
-    return [(str(path), motor.model_dump(exclude={"price"})) for motor in listed.motors]
+    motor_file = to_model(_MotorsFile, document, str(path), DataError)
+    return [(str(path), motor.model_dump(exclude={"price"})) for motor in motor_file.motors]
 
 
-def _from_table(path: str | Path) -> _Rows:
+def _read_table_motors(path: str | Path) -> _Rows:
     table = read_table(path)
     numbers = table.numbers(_NUMBERS)
     if "name" in table.columns:

@@ -83,7 +83,7 @@ def trial(
     Parameters are those of `simulate`, and so is what it raises.
     """
     robot = as_manipulator(robot)
-    found = simulate(
+    simulation = simulate(
         robot,
         motion,
         controller,
@@ -92,21 +92,21 @@ def trial(
         sensors=sensors,
         delay=delay,
     )
-    if found.stopped:
-        return Trial(*_UNKNOWN, found.stopped)
-    moving = found.time <= motion.duration
-    off = _tool(robot, found.pose) - _tool(robot, found.reference.pose)
+    if simulation.stopped:
+        return Trial(*_UNKNOWN, simulation.stopped)
+    moving = simulation.time <= motion.duration
+    off = _tool_places(robot, simulation.pose) - _tool_places(robot, simulation.reference.pose)
     errors = np.linalg.norm(off, axis=-1)
     most = limits_of(robot).force
-    shares = found.forces / np.where(np.isfinite(most), most, 1.0)
-    power = np.maximum(found.forces * found.motor_rates, 0.0).sum(axis=-1)
+    shares = simulation.forces / np.where(np.isfinite(most), most, 1.0)
+    power = np.maximum(simulation.forces * simulation.motor_rates, 0.0).sum(axis=-1)
     return Trial(
         float(errors[moving].max()),
         float(np.sqrt((errors[moving] ** 2).mean())),
-        *_end(found, motion, off, moving),
+        *_settling_figures(simulation, motion, off, moving),
         float(np.abs(shares).max()),
         float(np.sqrt((shares**2).mean(axis=0)).max()),
-        float(np.trapezoid(power, found.time)),
+        float(np.trapezoid(power, simulation.time)),
         "",
     )
 
@@ -168,7 +168,7 @@ def trials(
         )
     usual: dict[str, Any] = {"robot": robot, "motion": motion, "model": model}
     usual |= {"controller": controller, "sensors": sensors, "delay": delay}
-    asked: list[tuple[str, float, dict[str, Any]]] = [
+    variations: list[tuple[str, float, dict[str, Any]]] = [
         *(
             ("bandwidth", b, {"controller": replace(controller, bandwidth=b, **plain)})
             for b in bandwidths
@@ -178,12 +178,12 @@ def trials(
         *(("stiffness", k, {"robot": _stiffer(robot, k)}) for k in stiffnesses),
     ]
     rows = []
-    for changed, value, other in asked:
+    for changed, setting, other in variations:
         try:
-            made = trial(**usual | other)
+            figures = trial(**usual | other)
         except PteronError as error:
-            made = Trial(*_UNKNOWN, str(error))
-        rows.append({"changed": changed, "value": float(value), **asdict(made)})
+            figures = Trial(*_UNKNOWN, str(error))
+        rows.append({"changed": changed, "value": float(setting), **asdict(figures)})
     return pl.DataFrame(rows)
 
 
@@ -196,37 +196,43 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
     """Return the machine with all its transmissions so much stiffer."""
     expect(0.0 < factor < np.inf, "stiffnesses", f"{factor:g}", "factors above 0")
 
-    def changed(drive: Drive | None) -> Drive | None:
+    def stiffen(drive: Drive | None) -> Drive | None:
         if drive is None or drive.elastic is None:
             return drive
         stiffness = factor * drive.elastic.stiffness
         return replace(drive, elastic=replace(drive.elastic, stiffness=stiffness))
 
-    legs = tuple(replace(leg, drive=changed(leg.drive)) for leg in robot.legs)
+    legs = tuple(replace(leg, drive=stiffen(leg.drive)) for leg in robot.legs)
     return replace(robot, legs=legs)
 
 
-def _tool(robot: Manipulator, poses: Array) -> Array:
-    rest = np.zeros_like(poses)
-    place = tool_path(robot.platform, poses, rest, rest)[0]
+def _tool_places(robot: Manipulator, poses: Array) -> Array:
+    zero_rates = np.zeros_like(poses)
+    place = tool_path(robot.platform, poses, zero_rates, zero_rates)[0]
     return place if place.shape[-1] else poses
 
 
-def _end(
-    found: Simulation, motion: Motion, off: Array, moving: NDArray[np.bool_]
+def _settling_figures(
+    simulation: Simulation, motion: Motion, errors: Array, moving: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Return settling time and overshoot after the motion's end; NaN where it does not end."""
-    after = off[~moving]
+    after = errors[~moving]
     if not len(after) or np.abs(motion.velocity[-1]).max() > 1e-6:
         return float("nan"), float("nan")
-    band = max(_SETTLED * float(np.linalg.norm(off[moving], axis=-1).max()), _LEAST)
+    band = max(_SETTLED * float(np.linalg.norm(errors[moving], axis=-1).max()), _LEAST)
     outside = np.flatnonzero(np.linalg.norm(after - after[-1], axis=-1) > band)
-    settled = float(found.time[~moving][outside[-1]] - motion.duration) if len(outside) else 0.0
+    settled = (
+        float(simulation.time[~moving][outside[-1]] - motion.duration) if len(outside) else 0.0
+    )
     if len(outside) and outside[-1] >= len(after) - 2:
         settled = float("nan")
-    places = _tool(found.robot, motion.pose)
-    gone = places[-1] - places
-    lengths = np.linalg.norm(gone, axis=-1)
-    last = gone[np.flatnonzero(lengths > 0.01 * lengths.max())[-1]] if lengths.max() else after[0]
-    along = last / (np.linalg.norm(last) or 1.0)
-    return settled, max(float((after @ along).max()), 0.0)
+    places = _tool_places(simulation.robot, motion.pose)
+    displacements = places[-1] - places
+    lengths = np.linalg.norm(displacements, axis=-1)
+    last = (
+        displacements[np.flatnonzero(lengths > 0.01 * lengths.max())[-1]]
+        if lengths.max()
+        else after[0]
+    )
+    direction = last / (np.linalg.norm(last) or 1.0)
+    return settled, max(float((after @ direction).max()), 0.0)

@@ -17,7 +17,7 @@ from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion, told_pose
+from pteron.motion.motion import Motion, pose_text
 from pteron.motion.payload import with_payload
 from pteron.motion.simulation import Sensors
 from pteron.motion.simulation.sensors import rate_shares
@@ -113,12 +113,12 @@ class Tuning:
     @property
     def worst(self) -> int:
         """The state whose margins are the least share of those required."""
-        return int(np.argmin([self.required.share(found) for found in self.margins]))
+        return int(np.argmin([self.required.share(margins) for margins in self.margins]))
 
     @property
     def least(self) -> dict[str, float]:
         """The least margins of all states: factors, rad, s and the disk margin."""
-        each = [one.least for one in self.margins]
+        each = [margins.least for margins in self.margins]
         return {name: min(least[name] for least in each) for name in each[0]}
 
     def gains(self) -> dict[str, list[float]]:
@@ -139,10 +139,10 @@ class Tuning:
         columns: dict[str, Any] = {"t": pl.Series(self.moments).fill_nan(None)}
         columns |= dict(zip(self.robot.coordinates, self.states[:, 0].T, strict=True))
         for name in ("gain", "phase", "delay", "crossover"):
-            each = np.array([getattr(one, name) for one in self.margins]).T
-            columns |= {f"{name}_{i}": values for i, values in enumerate(each, start=1)}
+            each = np.array([getattr(margins, name) for margins in self.margins]).T
+            columns |= {f"{name}_{i}": column for i, column in enumerate(each, start=1)}
         for name in ("common_gain", "common_delay", "disk", "slowest"):
-            columns[name] = [getattr(one, name) for one in self.margins]
+            columns[name] = [getattr(margins, name) for margins in self.margins]
         return pl.DataFrame(columns)
 
 
@@ -222,11 +222,11 @@ def tune(
         [linearised(robot, *state) for state in states],
         {"delay": late, "share": rate_shares(sensors, robot, controller.period)},
     )
-    chosen = search.chosen()
+    chosen = search.choose_controller()
     every = range(len(states))
     loops = tuple(search.loop(chosen, i) for i in every)
-    found = tuple(Margins(loop) for loop in loops)
-    return Tuning(robot, chosen, required, states, moments, loops, found)
+    margins = tuple(Margins(loop) for loop in loops)
+    return Tuning(robot, chosen, required, states, moments, loops, margins)
 
 
 def _states(robot: Manipulator, motion: Motion | None, poses: Array | None) -> tuple[Array, Array]:
@@ -236,8 +236,8 @@ def _states(robot: Manipulator, motion: Motion | None, poses: Array | None) -> t
         within = (joint_distances(robot, inverse_kinematics(robot, poses)) >= 0.0).all(axis=-1)
         poses = poses[within][:_PLACES]
     poses = finite_rows(robot, poses, "poses").reshape(-1, robot.freedom)
-    rest = np.zeros_like(poses)
-    states, times = np.stack([poses, rest, rest], axis=1), np.full(len(poses), np.nan)
+    zero_rates = np.zeros_like(poses)
+    states, times = np.stack([poses, zero_rates, zero_rates], axis=1), np.full(len(poses), np.nan)
     if motion is not None:
         motion.expect_ascending()
         moments = np.linspace(motion.time[0], motion.time[-1], _MOMENTS)
@@ -266,40 +266,45 @@ class _Search:
         """Return the least share of the required margins at some states, and the state."""
         return min((self.required.share(Margins(self.loop(controller, i))), i) for i in which)
 
-    def chosen(self) -> Controller:
+    def choose_controller(self) -> Controller:
         """Return the controller with the greatest bandwidth that serves at all states."""
-        own, every = self.controller, range(len(self.states))
-        most = np.pi / own.period
-        given = own.bandwidth is not None or getattr(own, "proportional", None) is not None
-        if own.bandwidth is not None and np.max(own.bandwidth) >= most:
+        controller, every = self.controller, range(len(self.states))
+        most = np.pi / controller.period
+        has_gains = (
+            controller.bandwidth is not None
+            or getattr(controller, "proportional", None) is not None
+        )
+        if controller.bandwidth is not None and np.max(controller.bandwidth) >= most:
             raise DataError(
-                f"bandwidth: {np.max(own.bandwidth):g} rad/s given, below {most:.4g} rad/s "
-                f"expected: half the sample rate of {1.0 / own.period:g} Hz"
+                f"bandwidth: {np.max(controller.bandwidth):g} rad/s given, below {most:.4g} rad/s "
+                f"expected: half the sample rate of {1.0 / controller.period:g} Hz"
             )
-        if given:
-            share, at = self.share(own, every)
+        if has_gains:
+            share, at = self.share(controller, every)
             if share < 1.0:
-                raise DataError(f"{self._told(own, at)}; lower the gains, or ask for less")
-            return own
+                raise DataError(
+                    f"{self._margins_text(controller, at)}; lower the gains, or ask for less"
+                )
+            return controller
         tried: list[tuple[float, Controller]] = []
         few = [0]
-        for more in _DAMPINGS if isinstance(own, Feedback) else (1.0,):
-            trial = own
-            if isinstance(own, Feedback) and more > 1.0:
-                trial = replace(own, damping=float(more * np.max(own.damping)))
-            found = self._greatest(trial, most * (1.0 - 1e-9), few, tried)
-            if found is not None:
-                return found
-        best = max(tried, key=lambda one: one[0])[1]
+        for factor in _DAMPINGS if isinstance(controller, Feedback) else (1.0,):
+            trial = controller
+            if isinstance(controller, Feedback) and factor > 1.0:
+                trial = replace(controller, damping=float(factor * np.max(controller.damping)))
+            greatest = self._greatest(trial, most * (1.0 - 1e-9), few, tried)
+            if greatest is not None:
+                return greatest
+        best = max(tried, key=lambda trial_share: trial_share[0])[1]
         _, at = self.share(best, every)
         raise DataError(
-            f"no bandwidth has the margins asked for; best {self._told(best, at)}; ask for less, "
-            "sample faster, or shorten the delay"
+            f"no bandwidth has the margins asked for; best {self._margins_text(best, at)}; ask for "
+            "less, sample faster, or shorten the delay"
         )
 
     def _greatest(
         self,
-        own: Controller,
+        controller: Controller,
         high: float,
         few: list[int],
         tried: list[tuple[float, Controller]],
@@ -310,34 +315,34 @@ class _Search:
         """
 
         def share(bandwidth: float) -> float:
-            one = replace(own, bandwidth=bandwidth)
-            tried.append((self.share(one, few)[0], one))
+            attempt = replace(controller, bandwidth=bandwidth)
+            tried.append((self.share(attempt, few)[0], attempt))
             return tried[-1][0]
 
         while True:  # bisect at few states; add the one that serves least at what is found
             low = high
             while share(low) < 1.0:
                 high, low = low, low * _FINER
-                if low < _SLOWEST * np.pi / own.period:
+                if low < _SLOWEST * np.pi / controller.period:
                     return None
             while high - low > _EXACT * low:
                 middle = float(np.sqrt(low * high))
                 low, high = (middle, high) if share(middle) >= 1.0 else (low, middle)
-            found = replace(own, bandwidth=low)
-            least, at = self.share(found, range(len(self.states)))
+            best = replace(controller, bandwidth=low)
+            least, at = self.share(best, range(len(self.states)))
             if least >= 1.0:
-                return found
+                return best
             few.append(at)
             high = low
 
-    def _told(self, controller: Controller, i: int) -> str:
-        least, asked = Margins(self.loop(controller, i)).least, self.required
-        wanted = f", {1e3 * asked.delay:.3g} ms" if asked.delay else ""
+    def _margins_text(self, controller: Controller, i: int) -> str:
+        least, required = Margins(self.loop(controller, i)).least, self.required
+        delay_text = f", {1e3 * required.delay:.3g} ms" if required.delay else ""
         rate = controller.bandwidth
         with_ = f"with {np.max(rate):.4g} rad/s" if rate is not None else "with these gains"
         return (
-            f"{with_}, at pose {told_pose(self.states[i][0])} the margins are a gain of "
+            f"{with_}, at pose {pose_text(self.states[i][0])} the margins are a gain of "
             f"{least['gain']:.3g}, {np.degrees(least['phase']):.3g} degrees and "
             f"{1e3 * least['delay']:.3g} ms; "
-            f"{asked.gain:.3g}, {np.degrees(asked.phase):.3g} degrees{wanted} asked for"
+            f"{required.gain:.3g}, {np.degrees(required.phase):.3g} degrees{delay_text} asked for"
         )

@@ -23,7 +23,7 @@ _TOUCH = 1e-6
 """Depth of a pose in all legs' reach, over the longest leg, up to which it is out of reach."""
 
 
-def unreachable_error(robot: Manipulator) -> ModelError:
+def why_unreachable(robot: Manipulator) -> ModelError:
     """Return the error for a machine that reaches no pose, or none within its joints' limits."""
     if not np.isfinite(robot.platform.at(np.zeros(robot.freedom))[0]).all():
         return ModelError(
